@@ -1,0 +1,1 @@
+"""From records to the twelve constants, their curves and their covariance."""

@@ -1,0 +1,1 @@
+"""The metrological model and its thermal functions: pure floats, no fitting."""

@@ -1,0 +1,53 @@
+"""The metrological model a = K^-1 (U - U0), P1 (1), and its twelve passport constants."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from triaxcal.model.types import FloatArray
+
+CONSTANT_NAMES: tuple[str, ...] = (
+    "Kxx", "Kxy", "Kxz",
+    "Kyx", "Kyy", "Kyz",
+    "Kzx", "Kzy", "Kzz",
+    "U0x", "U0y", "U0z",
+)  # fmt: skip
+"""Order of the twelve constants in every array with a last axis of 12: K row by row, then U0.
+
+K_ij is the output of axis i (V) for 1 g along axis j; U0_i the bias of axis i (V).
+"""
+
+SCALE_FACTORS = (0, 4, 8)
+CROSS_SENSITIVITIES = (1, 2, 3, 5, 6, 7)
+BIASES = (9, 10, 11)
+
+
+def pack_constants(K_v_per_g: FloatArray, U0_v: FloatArray) -> FloatArray:
+    """Twelve constants, shape (..., 12), of K (..., 3, 3) in V/g and U0 (..., 3) in V."""
+    return np.concatenate([K_v_per_g.reshape(*K_v_per_g.shape[:-2], 9), U0_v], axis=-1)
+
+
+def unpack_constants(constants: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """K (..., 3, 3) in V/g and U0 (..., 3) in V of constants of shape (..., 12)."""
+    K = constants[..., :9].reshape(*constants.shape[:-1], 3, 3)
+    return K, constants[..., 9:]
+
+
+def voltage_from_force(constants: FloatArray, force_g: FloatArray) -> FloatArray:
+    """U = K a + U0 in V, P1 (9); constants (..., 12), force (..., 3) in g."""
+    K, U0 = unpack_constants(constants)
+    voltage: FloatArray = np.einsum("...ij,...j->...i", K, force_g) + U0
+    return voltage
+
+
+def force_from_voltage(constants: FloatArray, voltage_v: FloatArray) -> FloatArray:
+    """Solve P1 (1), a = K^-1 (U - U0) in g; constants (..., 12), voltage (..., 3) in V.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When K is singular.
+    """
+    K, U0 = unpack_constants(constants)
+    solution = np.linalg.solve(K, (voltage_v - U0)[..., None])[..., 0]
+    return solution.astype(np.float64)

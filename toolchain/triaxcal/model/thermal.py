@@ -1,0 +1,87 @@
+"""Thermal functions of the twelve constants: P1 (3) and (4) in one form.
+
+Both the polynomial and the continuous piecewise-linear function are piecewise polynomials: one
+segment of any order, or several of order 1. Beyond two segments the paper's form (4), anchored at
+T0, is discontinuous; here each segment has its own origin, so neighbours meet at the knots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from triaxcal.model.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class PiecewisePolynomial:
+    """A vector of functions of temperature, one polynomial a segment.
+
+    Attributes
+    ----------
+    breaks_degc : tuple of float, length m + 1
+        Ends of the m segments, rising. A temperature on an inner break belongs to the segment
+        above it; one outside is evaluated on the end segment (callers clamp first).
+    origins_degc : tuple of float, length m
+        Where each segment's dT is zero.
+    coefficients : array, shape (m, functions, order + 1)
+        Per degC^n, constant term first.
+    """
+
+    breaks_degc: tuple[float, ...]
+    origins_degc: tuple[float, ...]
+    coefficients: FloatArray
+
+    def __post_init__(self) -> None:
+        segments = len(self.origins_degc)
+        if len(self.breaks_degc) != segments + 1 or self.coefficients.shape[0] != segments:
+            raise ValueError("breaks, origins and coefficients disagree about the segments")
+        if any(b <= a for a, b in pairwise(self.breaks_degc)):
+            raise ValueError("breaks must rise")
+
+    @property
+    def order(self) -> int:
+        """Order of the polynomials."""
+        return int(self.coefficients.shape[2]) - 1
+
+    def segment_index(self, temp_degc: FloatArray) -> IntArray:
+        """Segment of each temperature, same shape as `temp_degc`."""
+        inner = np.asarray(self.breaks_degc[1:-1])
+        return np.searchsorted(inner, temp_degc, side="right").astype(np.int64)
+
+    def __call__(self, temp_degc: FloatArray | float) -> FloatArray:
+        """Values, shape (..., functions), at temperatures of shape (...)."""
+        temp = np.asarray(temp_degc, dtype=np.float64)
+        segment = self.segment_index(temp)
+        delta = temp - np.asarray(self.origins_degc)[segment]
+        coefficients = self.coefficients[segment]
+        value = coefficients[..., self.order]
+        for n in range(self.order - 1, -1, -1):
+            value = value * delta[..., None] + coefficients[..., n]
+        result: FloatArray = np.asarray(value)
+        return result
+
+
+@dataclass(frozen=True)
+class ThermalModel:
+    """The twelve constants over temperature.
+
+    Attributes
+    ----------
+    kind : str
+        "polynomial" or "piecewise-linear".
+    t0_degc : float
+        Reference temperature of the relative coefficients, P1 (3).
+    curves : PiecewisePolynomial
+        Twelve functions in the order of `CONSTANT_NAMES`: V/g for K, V for U0.
+    """
+
+    kind: str
+    t0_degc: float
+    curves: PiecewisePolynomial
+
+    def constants_at(self, temp_degc: FloatArray | float) -> FloatArray:
+        """Twelve constants, shape (..., 12), at temperatures of shape (...)."""
+        return self.curves(temp_degc)

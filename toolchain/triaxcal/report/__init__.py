@@ -1,0 +1,1 @@
+"""Tables and pictures for people. Reads every room; no room imports it."""

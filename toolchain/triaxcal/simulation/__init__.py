@@ -1,0 +1,1 @@
+"""Units that do not exist, made by exact physics from a stated truth."""
