@@ -2,11 +2,43 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+from triaxcal.errors import RefusedError
+from triaxcal.tomltable import Layout, Table, checked_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
 THERMAL_MODELS = ("polynomial", "piecewise-linear")
 METHODS = ("matrix", "inverse", "additive", "additive-simplified", "additive-first-order")
+
+FORMAT = 1
+UNIT_FILE = "unit.toml"
+STANDARD_GRAVITY_M_PER_S2 = 9.80665
+PLAUSIBLE_DEGC = (-200.0, 400.0)
+"""Temperatures outside these are mistakes: no electronic accelerometer works there."""
+
+_LAYOUT: Layout = {
+    "": {"format": True, "serial": True, "description": False},
+    "adc": {"bits": True, "full_scale_v": True, "code_min": False, "code_max": False},
+    "temperature_sensor": {"degc_per_code": True, "degc_at_zero": False},
+    "site": {"local_gravity_m_per_s2": True},
+    "thermal": {
+        "t0_degc": True,
+        "range_degc": False,
+        "model": False,
+        "order": False,
+        "knots_degc": False,
+    },
+    "fit": {"estimator": False},
+    "sensor": {"polarity": False},
+    "compensation": {"method": False, "output_q": False, "model_error_max_micro_g": False},
+    "limits": {"at_t0_g": False, "over_range_g": False},
+}
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
+_NAME_RULE = "1 to 64 of A-Z a-z 0-9 - _, the first a letter or digit"
 
 
 @dataclass(frozen=True)
@@ -90,3 +122,201 @@ class UnitDescription:
     output_q: int
     model_error_max_micro_g: float
     limits: Limits
+
+
+def read_unit(folder: Path) -> UnitDescription:
+    """Description of the unit in `folder`, from its unit.toml.
+
+    Raises
+    ------
+    RefusedError
+        When there is no such unit, its file breaks a rule of docs/file-formats.md, or another
+        unit beside it has the same serial number.
+    """
+    path = find_unit(folder)
+    document = read_toml(path)
+    version = document.get("format", FORMAT)
+    if type(version) is not int or version != FORMAT:
+        raise RefusedError(
+            f"{path}, format",
+            f"found {shown(version)}",
+            expected=str(FORMAT),
+            remedy="a file of another format needs the triaxcal that knows it",
+        )
+    tables = checked_tables(str(path), document, _LAYOUT)
+    unit = _unit_from_tables(folder.absolute().name, tables)
+    _refuse_duplicate_serial(folder, unit.serial)
+    return unit
+
+
+def check_unit_name(name: str, where: str = "unit name") -> None:
+    """Refuse a name of a unit, or a serial number, that is unfit for folders and C comments.
+
+    Raises
+    ------
+    RefusedError
+        Unless it is 1 to 64 ASCII letters, digits, '-' and '_', the first a letter or digit.
+    """
+    if not _NAME.fullmatch(name):
+        raise RefusedError(where, f"found {shown(name)}", expected=_NAME_RULE)
+
+
+def list_units(units_dir: Path) -> list[str]:
+    """Names of the units in a folder, sorted; none when there is no such folder."""
+    try:
+        names = sorted(entry.name for entry in units_dir.iterdir())
+    except OSError:
+        return []
+    return [name for name in names if _NAME.fullmatch(name) and _is_unit(units_dir / name)]
+
+
+def find_unit(folder: Path) -> Path:
+    """Path of the unit.toml in a unit's folder.
+
+    Raises
+    ------
+    RefusedError
+        When the name is unfit, a '..' follows a named folder, or the folder has no unit.toml;
+        names the units that there are.
+    """
+    if any(b == ".." and a != ".." for a, b in pairwise(folder.parts)):
+        raise RefusedError(str(folder), "'..' in the name of a unit", expected=_NAME_RULE)
+    check_unit_name(folder.absolute().name, f"unit {shown(str(folder))}")
+    if _is_unit(folder):
+        return folder / UNIT_FILE
+    for units_dir in (folder, folder.parent, folder.parent.parent):
+        if names := list_units(units_dir):
+            more = f" and {len(names) - 20} more" if len(names) > 20 else ""
+            remedy = f"units in {units_dir}: " + ", ".join(names[:20]) + more
+            break
+    else:
+        remedy = "make it as docs/add-a-unit.md tells"
+    found = f"no {UNIT_FILE} in it" if folder.is_dir() else "no such unit"
+    raise RefusedError(str(folder), found, remedy=remedy)
+
+
+def _is_unit(folder: Path) -> bool:
+    try:
+        return (folder / UNIT_FILE).is_file()
+    except OSError:  # a folder that may not be entered
+        return False
+
+
+def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
+    top, thermal, site = tables[""], tables["thermal"], tables["site"]
+    compensation, limits = tables["compensation"], tables["limits"]
+    if "description" in top:
+        top.text("description")  # for people; nothing is made of it
+    check_unit_name(top.text("serial"), top.where("serial"))
+    range_degc = (
+        thermal.rising("range_degc", *PLAUSIBLE_DEGC, range(2, 3))
+        if "range_degc" in thermal
+        else None
+    )
+    gravity_m_per_s2 = site.number("local_gravity_m_per_s2", 9.7, 9.9)
+    return UnitDescription(
+        name=name,
+        serial=top.text("serial"),
+        adc=_adc(tables["adc"]),
+        temperature_sensor=_temperature_sensor(tables["temperature_sensor"]),
+        gravity_g=gravity_m_per_s2 / STANDARD_GRAVITY_M_PER_S2,
+        t0_degc=thermal.number("t0_degc", *PLAUSIBLE_DEGC),
+        range_degc=(range_degc[0], range_degc[1]) if range_degc else None,
+        polarity=_polarity(tables["sensor"]),
+        estimator=_choice(tables["fit"], "estimator", ("auto", *ESTIMATORS)),
+        thermal=_thermal_choice(thermal),
+        method=_choice(compensation, "method", METHODS),
+        output_q=compensation.integer("output_q", 8, 30) if "output_q" in compensation else 24,
+        model_error_max_micro_g=_number(
+            compensation, "model_error_max_micro_g", 1e-3, 1e6, default=1.0
+        ),
+        limits=Limits(
+            at_t0_g=_number(limits, "at_t0_g", 1e-9, 1.0, default=3e-4),
+            over_range_g=_number(limits, "over_range_g", 1e-9, 1.0, default=10e-4),
+        ),
+    )
+
+
+def _choice(table: Table, key: str, choices: tuple[str, ...]) -> str:
+    """One of `choices`, the first by default."""
+    return table.choice(key, choices) if key in table else choices[0]
+
+
+def _number(table: Table, key: str, low: float, high: float, *, default: float) -> float:
+    return table.number(key, low, high) if key in table else default
+
+
+def _adc(table: Table) -> Adc:
+    bits = table.integer("bits", 8, 32)
+    half = 2 ** (bits - 1)
+    low = table.integer("code_min", -half, half - 1) if "code_min" in table else -half
+    high = table.integer("code_max", -half, half - 1) if "code_max" in table else half - 1
+    if low >= high:
+        key = "code_min" if "code_min" in table else "code_max"
+        raise table.refuse(key, f"code_min below code_max, which are {low} and {high}")
+    return Adc(bits, table.number("full_scale_v", 1e-3, 100.0), low, high)
+
+
+def _temperature_sensor(table: Table) -> TemperatureSensor:
+    return TemperatureSensor(
+        degc_per_code=table.number("degc_per_code", 1e-6, 10.0),
+        degc_at_zero=_number(table, "degc_at_zero", -1e4, 1e4, default=0.0),
+    )
+
+
+def _thermal_choice(table: Table) -> ThermalChoice:
+    model = _choice(table, "model", ("auto", *THERMAL_MODELS))
+    for key, owner in (("order", "polynomial"), ("knots_degc", "piecewise-linear")):
+        if key in table and model != owner:
+            raise RefusedError(
+                table.where(key),
+                f'given with model = "{model}"',
+                expected=f'it with model = "{owner}" only',
+                remedy="remove it, or choose that model",
+            )
+    return ThermalChoice(
+        model=model,
+        order=table.integer("order", 0, 9) if "order" in table else None,
+        knots_degc=(
+            table.rising("knots_degc", *PLAUSIBLE_DEGC, range(1, 65))
+            if "knots_degc" in table
+            else None
+        ),
+    )
+
+
+def _polarity(table: Table) -> tuple[int, int, int] | None:
+    if "polarity" not in table:
+        return None
+    signs = table.values["polarity"]
+    legal = isinstance(signs, list) and all(type(s) is int and abs(s) == 1 for s in signs)
+    if not isinstance(signs, list) or not legal or len(signs) != 3:
+        raise table.refuse("polarity", "a list of three signs, each 1 or -1")
+    return (signs[0], signs[1], signs[2])
+
+
+def _refuse_duplicate_serial(folder: Path, serial: str) -> None:
+    units_dir = folder.absolute().parent
+    for name in list_units(units_dir):
+        other = units_dir / name
+        if not other.samefile(folder) and _serial_leniently(other / UNIT_FILE, serial) == serial:
+            raise RefusedError(
+                f"{folder / UNIT_FILE}, serial",
+                f'"{serial}" is also the serial of {folder.parent / name}',
+                expected="a serial number of its own for each unit",
+                remedy="correct one of the two",
+            )
+
+
+def _serial_leniently(path: Path, serial: str) -> object:
+    """Serial in another unit's file; None when unreadable, or when `serial` is nowhere in it.
+
+    A broken neighbour must not block this unit, and a thousand neighbours must not cost a
+    thousand parses.
+    """
+    try:
+        if serial.encode() not in path.read_bytes():
+            return None
+        return read_toml(path).get("serial")
+    except (OSError, RefusedError):
+        return None
