@@ -149,14 +149,28 @@ class Table:
         return finite
 
 
-def checked_tables(file: str, document: Mapping[str, object], layout: Layout) -> dict[str, Table]:
-    """Tables of a document whose keys are exactly those of `layout`.
+def read_tables(path: Path, layout: Layout, version: int) -> dict[str, Table]:
+    """Tables of a file whose `format` is `version` and whose keys are exactly those of `layout`.
 
     Raises
     ------
     RefusedError
-        Naming every missing and every unexpected key at once, or a key that should be a table.
+        As `read_toml`; for another format; naming every missing and every unexpected key at
+        once; for a key that should be a table.
     """
+    document = read_toml(path)
+    found = document.get("format", version)  # when absent, it is listed with the other missing
+    if type(found) is not int or found != version:
+        raise RefusedError(
+            f"{path}, format",
+            f"found {shown(found)}",
+            expected=str(version),
+            remedy="another format needs a triaxcal that knows it",
+        )
+    return _checked_tables(str(path), document, layout)
+
+
+def _checked_tables(file: str, document: Mapping[str, object], layout: Layout) -> dict[str, Table]:
     tables = {"": {k: v for k, v in document.items() if k not in layout}}
     for name in layout:
         if name:

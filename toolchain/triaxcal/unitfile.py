@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from triaxcal.errors import RefusedError
-from triaxcal.tomltable import Layout, Table, checked_tables, read_toml, shown
+from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
 THERMAL_MODELS = ("polynomial", "piecewise-linear")
@@ -134,16 +134,7 @@ def read_unit(folder: Path) -> UnitDescription:
         unit beside it has the same serial number.
     """
     path = find_unit(folder)
-    document = read_toml(path)
-    version = document.get("format", FORMAT)
-    if type(version) is not int or version != FORMAT:
-        raise RefusedError(
-            f"{path}, format",
-            f"found {shown(version)}",
-            expected=str(FORMAT),
-            remedy="a file of another format needs the triaxcal that knows it",
-        )
-    tables = checked_tables(str(path), document, _LAYOUT)
+    tables = read_tables(path, _LAYOUT, FORMAT)
     unit = _unit_from_tables(folder.absolute().name, tables)
     _refuse_duplicate_serial(folder, unit.serial)
     return unit

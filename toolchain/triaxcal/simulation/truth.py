@@ -1,0 +1,143 @@
+"""What the simulated unit truly is, and the plan of its measurement: units/<UNIT>/truth.toml."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.model.metrological import CONSTANT_NAMES, voltage_from_force
+from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
+from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.tomltable import Layout, Table, read_tables, shown
+from triaxcal.unitfile import PLAUSIBLE_DEGC, Adc
+
+FORMAT = 1
+TRUTH_FILE = "truth.toml"
+SEED_MAX = 2**63 - 1
+
+_LAYOUT: Layout = {
+    "": {"format": True},
+    "curves": {"t0_degc": True, **dict.fromkeys(CONSTANT_NAMES, True)},
+    "noise": {"reading_sd_v": True, "thermometer_sd_degc": True, "dwell_temp_sd_degc": True},
+    "plan": {
+        "seed": True,
+        "readings_per_dwell": True,
+        "temperatures_degc": True,
+        "check_temperatures_degc": True,
+    },
+}
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Exact properties of a simulated unit.
+
+    Attributes
+    ----------
+    constants : ThermalModel
+        Cubic curves of the twelve constants.
+    reading_sd_v : float
+        Noise of one reading of each axis, V.
+    thermometer_sd_degc : float
+        Noise of one reading of the thermometer.
+    dwell_temp_sd_degc : float
+        Spread of the dwells' true temperatures about the nominal ones.
+    """
+
+    constants: ThermalModel
+    reading_sd_v: float
+    thermometer_sd_degc: float
+    dwell_temp_sd_degc: float
+
+    def voltage_v(self, force_g: FloatArray, temp_degc: FloatArray | float) -> FloatArray:
+        """Outputs without noise in V, P1 (9).
+
+        Force (..., 3) in g, true temperature (...); the result is (..., 3), axis order x, y, z.
+        """
+        return voltage_from_force(self.constants.constants_at(temp_degc), force_g)
+
+    def codes(self, adc: Adc, force_g: FloatArray, temp_degc: FloatArray | float) -> IntArray:
+        """Codes without noise, shapes as in `voltage_v`; beyond its range the ADC saturates."""
+        return codes_of_voltage(adc, self.voltage_v(force_g, temp_degc))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is measured: each test position at each temperature, each check position likewise.
+
+    Attributes
+    ----------
+    seed : int
+        Seed of the noise.
+    readings_per_dwell : int
+        Readings in each mean.
+    temperatures_degc, check_temperatures_degc : tuple of float
+        Nominal temperatures of TP1..TP6 and of CP1..CP6, rising.
+    """
+
+    seed: int
+    readings_per_dwell: int
+    temperatures_degc: tuple[float, ...]
+    check_temperatures_degc: tuple[float, ...]
+
+
+def codes_of_voltage(adc: Adc, voltage_v: FloatArray) -> IntArray:
+    """Codes of voltages, same shape: to the nearest (ties to even), saturated at the ADC's ends."""
+    codes = np.rint(voltage_v / adc.volts_per_code)
+    return np.clip(codes, adc.code_min, adc.code_max).astype(np.int64)
+
+
+def read_truth(folder: Path) -> tuple[Truth, Plan]:
+    """Truth and plan in a unit's truth.toml.
+
+    Raises
+    ------
+    RefusedError
+        When the file cannot be read or breaks a rule of docs/file-formats.md.
+    """
+    tables = read_tables(folder / TRUTH_FILE, _LAYOUT, FORMAT)
+    noise = tables["noise"]
+    truth = Truth(
+        constants=_curves(tables["curves"]),
+        reading_sd_v=noise.number("reading_sd_v", 0.0, 1.0),
+        thermometer_sd_degc=noise.number("thermometer_sd_degc", 0.0, 10.0),
+        dwell_temp_sd_degc=noise.number("dwell_temp_sd_degc", 0.0, 10.0),
+    )
+    return truth, _plan(tables["plan"])
+
+
+def check_seed(seed: int, where: str) -> None:
+    """Refuse a seed that truth.toml could not hold.
+
+    Raises
+    ------
+    RefusedError
+        Unless it is a whole number from 0 to 2^63 - 1.
+    """
+    if not 0 <= seed <= SEED_MAX:
+        raise RefusedError(where, f"found {shown(seed)}", expected="a whole number, 0 to 2^63 - 1")
+
+
+def _curves(table: Table) -> ThermalModel:
+    t0_degc = table.number("t0_degc", *PLAUSIBLE_DEGC)
+    rows = [[float(c) for c in table.decimals(name, 4)] for name in CONSTANT_NAMES]
+    curves = PiecewisePolynomial(
+        breaks_degc=PLAUSIBLE_DEGC,
+        origins_degc=(t0_degc,),
+        coefficients=np.array([rows], dtype=np.float64),
+    )
+    return ThermalModel(kind="polynomial", t0_degc=t0_degc, curves=curves)
+
+
+def _plan(table: Table) -> Plan:
+    lengths = range(65)
+    return Plan(
+        seed=table.integer("seed", 0, SEED_MAX),
+        # Two readings at least: a standard deviation of one has no meaning.
+        readings_per_dwell=table.integer("readings_per_dwell", 2, 1_000_000),
+        temperatures_degc=table.rising("temperatures_degc", *PLAUSIBLE_DEGC, lengths),
+        check_temperatures_degc=table.rising("check_temperatures_degc", *PLAUSIBLE_DEGC, lengths),
+    )

@@ -1,0 +1,56 @@
+"""`triaxcal simulate`: the measurements of a unit that nobody measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from triaxcal.errors import RefusedError
+from triaxcal.records import MEASUREMENTS_FILE, write_measurements
+from triaxcal.records_csv import DEVIATIONS, READINGS
+from triaxcal.simulation.dwells import simulate_codes
+from triaxcal.simulation.published import TABLES_FILE, write_published_measurements
+from triaxcal.simulation.truth import TRUTH_FILE, check_seed, read_truth
+from triaxcal.unitfile import read_unit
+
+
+def write_simulated_unit(folder: Path, seed: int | None = None) -> Path:
+    """Write measurements.csv of a unit folder that has a truth.toml or a tables.toml.
+
+    With truth.toml the readings are simulated; `seed` replaces the one in the file. With
+    tables.toml they are computed from published constants, without noise. Returns the path
+    written; the same input gives the same bytes.
+
+    Raises
+    ------
+    RefusedError
+        When a file is missing or wrong, both are there, or a seed is given with tables.toml.
+    """
+    unit = read_unit(folder)
+    has_truth, has_tables = (folder / TRUTH_FILE).exists(), (folder / TABLES_FILE).exists()
+    if has_truth == has_tables:
+        found = "both truth.toml and tables.toml" if has_truth else "no truth.toml"
+        raise RefusedError(
+            str(folder), found, expected="one of them, as docs/file-formats.md describes"
+        )
+    if has_tables:
+        if seed is not None:
+            raise RefusedError(
+                f"{folder / TABLES_FILE}", "nothing random in it", remedy="leave out the seed"
+            )
+        return write_published_measurements(folder, unit)
+    truth, plan = read_truth(folder)
+    if seed is not None:
+        check_seed(seed, "seed")
+        plan = replace(plan, seed=seed)
+    target = folder / MEASUREMENTS_FILE
+    write_measurements(
+        target,
+        ("position", "temp_code", *READINGS["code"], "count", *DEVIATIONS["code"]),
+        [
+            (d.position, d.temp_code, *d.mean_code, d.count, *d.sd_code)
+            for d in simulate_codes(unit, truth, plan)
+        ],
+        (f"Simulated from {TRUTH_FILE}, seed {plan.seed}; nothing here was measured.",),
+    )
+    return target
