@@ -50,7 +50,7 @@ def write_published_measurements(folder: Path, unit: UnitDescription) -> Path:
     target = folder / MEASUREMENTS_FILE
     comments = (
         f"Computed from {TABLES_FILE} by U = K a + U0 with |a| = 1 g; nothing here was measured.",
-        f"Source of the constants: {tables[''].text('source')}",
+        f"Source of the constants: {' '.join(tables[''].text('source').split())}",
     )
     write_measurements(target, ("position", "temp_degc", "ux_v", "uy_v", "uz_v"), rows, comments)
     return target
