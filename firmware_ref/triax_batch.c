@@ -1,0 +1,31 @@
+#include "triax_batch.h"
+
+#include "triax_calib.h"
+
+static void run(const triax_calib_t *calib, size_t count, const int32_t *temp_code,
+                const int32_t *raw_code, int32_t *accel, uint32_t *status)
+{
+    size_t i;
+    for (i = 0; i < count; i++) {
+        triax_state_t state;
+        status[i] = triax_set_temperature(&state, calib, temp_code[i]);
+        status[i] |= triax_apply(&state, &raw_code[3 * i], &accel[3 * i]);
+    }
+}
+
+void triax_batch(size_t count, const int32_t *temp_code, const int32_t *raw_code, int32_t *accel,
+                 uint32_t *status)
+{
+    run(&TRIAX_CALIB, count, temp_code, raw_code, accel, status);
+}
+
+uint32_t triax_batch_image(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
+                           const int32_t *raw_code, int32_t *accel, uint32_t *status)
+{
+    triax_calib_t calib;
+    const uint32_t loaded = triax_calib_load(&calib, image, size);
+    if (loaded == TRIAX_STATUS_OK) {
+        run(&calib, count, temp_code, raw_code, accel, status);
+    }
+    return loaded;
+}

@@ -1,0 +1,179 @@
+#include "triax_ref.h"
+
+/* Rounds towards minus infinity; divisor > 0. C's division rounds towards zero. */
+static int64_t floor_div(int64_t value, int64_t divisor)
+{
+    const int64_t quotient = value / divisor;
+    return (value % divisor < 0) ? quotient - 1 : quotient;
+}
+
+static int64_t power_of_two(int exponent)
+{
+    int64_t power = 1;
+    while (exponent-- > 0) {
+        power *= 2;
+    }
+    return power;
+}
+
+static int64_t absolute(int64_t value)
+{
+    return (value < 0) ? -value : value;
+}
+
+static int64_t clamp(int64_t value, int64_t low, int64_t high)
+{
+    if (value < low) {
+        return low;
+    }
+    return (value > high) ? high : value;
+}
+
+static int32_t saturate(int64_t value)
+{
+    return (int32_t)clamp(value, INT32_MIN, INT32_MAX);
+}
+
+/* Step H: Horner's rule in Q31 temperature, each step halving and flooring. */
+static int32_t thermal_function(const int32_t *c, int order, int32_t x_q31)
+{
+    int64_t p = c[order];
+    int k;
+    for (k = order - 1; k >= 0; k--) {
+        p = c[k] + floor_div((int64_t)x_q31 * p, INT64_C(4294967296));
+    }
+    return (int32_t)p;
+}
+
+/* Step I: K^-1 by cofactors written out, one division, nine products. */
+static int invert(triax_ref_state_t *state, const triax_ref_t *ref, int32_t k[3][3], const int32_t u0[3])
+{
+    int64_t adj[3][3];
+    int64_t det;
+    int64_t reciprocal;
+    int64_t least = power_of_two(ref->reciprocal_log2 - 31) + 1;
+    int fits = 1;
+    int i;
+    int j;
+
+#define MINOR(a, b, c, d) ((int64_t)k a * k d - (int64_t)k b * k c)
+    adj[0][0] = MINOR([1][1], [1][2], [2][1], [2][2]);
+    adj[0][1] = -MINOR([0][1], [0][2], [2][1], [2][2]);
+    adj[0][2] = MINOR([0][1], [0][2], [1][1], [1][2]);
+    adj[1][0] = -MINOR([1][0], [1][2], [2][0], [2][2]);
+    adj[1][1] = MINOR([0][0], [0][2], [2][0], [2][2]);
+    adj[1][2] = -MINOR([0][0], [0][2], [1][0], [1][2]);
+    adj[2][0] = MINOR([1][0], [1][1], [2][0], [2][1]);
+    adj[2][1] = -MINOR([0][0], [0][1], [2][0], [2][1]);
+    adj[2][2] = MINOR([0][0], [0][1], [1][0], [1][1]);
+#undef MINOR
+    for (i = 0; i < 3; i++) {
+        for (j = 0; j < 3; j++) {
+            adj[i][j] = saturate(floor_div(adj[i][j], power_of_two(ref->adjugate_shift)));
+        }
+    }
+    det = floor_div(k[0][0] * adj[0][0], 4) + floor_div(k[0][1] * adj[1][0], 4) +
+          floor_div(k[0][2] * adj[2][0], 4);
+    det = saturate(floor_div(det, power_of_two(ref->determinant_shift)));
+    reciprocal = power_of_two(ref->reciprocal_log2) / ((absolute(det) < least) ? least : absolute(det));
+    if (det < 0) {
+        reciprocal = -reciprocal;
+    }
+    for (i = 0; i < 3; i++) {
+        int64_t offset = 0;
+        int64_t row = 0;
+        for (j = 0; j < 3; j++) {
+            const int64_t product = adj[i][j] * reciprocal + power_of_two(ref->gain_shift - 1);
+            state->gain[i][j] = saturate(floor_div(product, power_of_two(ref->gain_shift)));
+            offset += floor_div((int64_t)state->gain[i][j] * u0[j], 4);
+            row += absolute(state->gain[i][j]);
+        }
+        offset = -floor_div(offset + power_of_two(29), power_of_two(30));
+        if (ref->output_shift > 32) {
+            offset += power_of_two(ref->output_shift - 33);
+        }
+        state->offset[i] = saturate(offset);
+        if (row + 2 * absolute(state->offset[i]) >= power_of_two(32) - 8) {
+            fits = 0;
+        }
+    }
+    return fits;
+}
+
+uint32_t triax_ref_set_temperature(triax_ref_state_t *state, const triax_ref_t *ref, int32_t temp_code)
+{
+    const int32_t code = (int32_t)clamp(temp_code, ref->temp_min_code, ref->temp_max_code);
+    uint32_t status = TRIAX_REF_OK;
+    const triax_ref_segment_t *segment;
+    int32_t x_q31;
+    int32_t k[3][3];
+    int32_t offset[3];
+    int s = ref->segments - 1;
+    int i;
+    int j;
+
+    if (temp_code < ref->temp_min_code) {
+        status |= TRIAX_REF_TEMP_LOW;
+    }
+    if (temp_code > ref->temp_max_code) {
+        status |= TRIAX_REF_TEMP_HIGH;
+    }
+    while (s > 0 && code < ref->segment[s].first_code) {
+        s--;
+    }
+    segment = &ref->segment[s];
+    x_q31 = (code - segment->origin_code) * segment->gain;
+    for (i = 0; i < 3; i++) {
+        for (j = 0; j < 3; j++) {
+            k[i][j] = thermal_function(segment->coefficient[4 * i + j], ref->order, x_q31);
+        }
+        offset[i] = thermal_function(segment->coefficient[4 * i + 3], ref->order, x_q31);
+    }
+    if (ref->inverse_form) {
+        if (!invert(state, ref, k, offset)) {
+            const triax_ref_state_t zero = {{{0}}, {0}};
+            *state = zero;
+            status |= TRIAX_REF_BAD_IMAGE;
+        }
+        return status;
+    }
+    for (i = 0; i < 3; i++) {
+        for (j = 0; j < 3; j++) {
+            state->gain[i][j] = k[i][j];
+        }
+        state->offset[i] = offset[i];
+    }
+    return status;
+}
+
+/* Step A: the sum of three products, offset and rounding, then one floor. */
+uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
+                         const int32_t raw_code[3], int32_t accel[3])
+{
+    const int64_t scale = power_of_two(ref->raw_shift);
+    uint32_t status = TRIAX_REF_OK;
+    int64_t u[3];
+    int i;
+
+    for (i = 0; i < 3; i++) {
+        const int64_t clamped = clamp(raw_code[i], ref->raw_min, ref->raw_max);
+        if (clamped != raw_code[i]) {
+            status |= TRIAX_REF_RAW_RANGE;
+        }
+        u[i] = clamped * scale;
+    }
+    for (i = 0; i < 3; i++) {
+        int64_t sum = state->gain[i][0] * u[0] + state->gain[i][1] * u[1] + state->gain[i][2] * u[2];
+        int64_t result;
+        sum += state->offset[i] * INT64_C(4294967296);
+        if (ref->output_shift <= 32) {
+            sum += power_of_two(ref->output_shift - 1);
+        }
+        result = floor_div(sum, power_of_two(ref->output_shift));
+        accel[i] = saturate(result);
+        if (accel[i] != result) {
+            status |= TRIAX_REF_SATURATED;
+        }
+    }
+    return status;
+}

@@ -1,0 +1,76 @@
+/*
+ * triax_ref.h - reference of the compensation arithmetic, for any shape.
+ *
+ * Written by hand from docs/fixed-point.md, not from the templates: one plain function a step,
+ * shifts as floor divisions, every parameter read from the image. It is what the generated
+ * routine is compared with, not what a unit runs.
+ */
+#ifndef TRIAX_REF_H
+#define TRIAX_REF_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define TRIAX_REF_MAX_SEGMENTS 64
+#define TRIAX_REF_MAX_ORDER 9
+#define TRIAX_REF_HEADER_WORDS 15
+
+/* The same bits as TRIAX_STATUS_*. */
+enum {
+    TRIAX_REF_OK = 0,
+    TRIAX_REF_TEMP_LOW = 1,
+    TRIAX_REF_TEMP_HIGH = 2,
+    TRIAX_REF_RAW_RANGE = 4,
+    TRIAX_REF_SATURATED = 8,
+    TRIAX_REF_BAD_IMAGE = 16
+};
+
+typedef struct {
+    int32_t first_code;
+    int32_t origin_code;
+    int32_t gain;
+    int32_t coefficient[12][TRIAX_REF_MAX_ORDER + 1];
+} triax_ref_segment_t;
+
+typedef struct {
+    /* shape */
+    int inverse_form;
+    int segments;
+    int order;
+    int output_q;
+    int output_shift;
+    int32_t raw_min;
+    int32_t raw_max;
+    int raw_shift;
+    int adjugate_shift;
+    int determinant_shift;
+    int reciprocal_log2;
+    int gain_shift;
+    /* constants */
+    int32_t temp_min_code;
+    int32_t temp_max_code;
+    triax_ref_segment_t segment[TRIAX_REF_MAX_SEGMENTS];
+} triax_ref_t;
+
+typedef struct {
+    int32_t gain[3][3];
+    int32_t offset[3];
+} triax_ref_state_t;
+
+/* Reads an image of any shape; TRIAX_REF_BAD_IMAGE when it is damaged or beyond the limits above. */
+uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size);
+
+uint32_t triax_ref_set_temperature(triax_ref_state_t *state, const triax_ref_t *ref, int32_t temp_code);
+
+uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
+                         const int32_t raw_code[3], int32_t accel[3]);
+
+/*
+ * Runs count vectors: temp_code[count], raw_code[count][3] to accel[count][3] and status[count],
+ * the temperature's status or-ed with the sample's. Returns TRIAX_REF_BAD_IMAGE when the image
+ * does not open; nothing is written then.
+ */
+uint32_t triax_ref_batch(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
+                         const int32_t *raw_code, int32_t *accel, uint32_t *status);
+
+#endif

@@ -1,0 +1,121 @@
+#include "triax_ref.h"
+
+typedef struct {
+    const uint8_t *bytes;
+    size_t size;
+    size_t at;
+} reader_t;
+
+static uint32_t next_word(reader_t *reader)
+{
+    uint32_t word = 0;
+    int i;
+    for (i = 3; i >= 0; i--) {
+        word = word * 256u + reader->bytes[reader->at + (size_t)i];
+    }
+    reader->at += 4;
+    return word;
+}
+
+static int32_t next_int(reader_t *reader)
+{
+    const int64_t word = next_word(reader);
+    return (int32_t)((word >= INT64_C(2147483648)) ? word - INT64_C(4294967296) : word);
+}
+
+/* CRC-32 of IEEE 802.3 by polynomial division, most significant bit of each reflected byte first. */
+static uint32_t crc32(const uint8_t *bytes, size_t size)
+{
+    uint32_t remainder = 0xFFFFFFFFu;
+    size_t i;
+    int bit;
+    for (i = 0; i < 8 * size; i++) {
+        const uint32_t input = ((uint32_t)bytes[i / 8] >> (i % 8)) & 1u;
+        const uint32_t out = (remainder >> 31) ^ input;
+        remainder = (remainder << 1) ^ (out ? 0x04C11DB7u : 0u);
+    }
+    for (i = 0, bit = 31; i < 16; i++, bit--) {
+        const uint32_t low = (remainder >> i) & 1u;
+        const uint32_t high = (remainder >> bit) & 1u;
+        remainder &= ~((1u << i) | (1u << bit));
+        remainder |= (high << i) | (low << bit);
+    }
+    return ~remainder;
+}
+
+static int within(int32_t value, int32_t low, int32_t high)
+{
+    return value >= low && value <= high;
+}
+
+static int shape_is_legal(const triax_ref_t *ref)
+{
+    return within(ref->inverse_form, 0, 1) && within(ref->segments, 1, TRIAX_REF_MAX_SEGMENTS) &&
+           within(ref->order, 0, TRIAX_REF_MAX_ORDER) && within(ref->output_shift, 1, 62) &&
+           ref->raw_min < ref->raw_max && within(ref->raw_shift, 0, 31) &&
+           within(ref->adjugate_shift, 0, 62) && within(ref->determinant_shift, 0, 62) &&
+           (!ref->inverse_form ||
+            (within(ref->reciprocal_log2, 31, 62) && within(ref->gain_shift, 1, 62)));
+}
+
+uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
+{
+    reader_t reader = {image, size, 0};
+    int s;
+    int f;
+    int k;
+
+    if (size < 4 * (TRIAX_REF_HEADER_WORDS + 3) || size % 4 != 0) {
+        return TRIAX_REF_BAD_IMAGE;
+    }
+    if (next_word(&reader) != 0x43585254u || next_word(&reader) != 1u || next_word(&reader) != size) {
+        return TRIAX_REF_BAD_IMAGE;
+    }
+    ref->inverse_form = next_int(&reader);
+    ref->segments = next_int(&reader);
+    ref->order = next_int(&reader);
+    ref->output_q = next_int(&reader);
+    ref->output_shift = next_int(&reader);
+    ref->raw_min = next_int(&reader);
+    ref->raw_max = next_int(&reader);
+    ref->raw_shift = next_int(&reader);
+    ref->adjugate_shift = next_int(&reader);
+    ref->determinant_shift = next_int(&reader);
+    ref->reciprocal_log2 = next_int(&reader);
+    ref->gain_shift = next_int(&reader);
+    if (!shape_is_legal(ref)) {
+        return TRIAX_REF_BAD_IMAGE;
+    }
+    if (size != 4u * (size_t)(TRIAX_REF_HEADER_WORDS + 3 + ref->segments * (3 + 12 * (ref->order + 1)))) {
+        return TRIAX_REF_BAD_IMAGE;
+    }
+    ref->temp_min_code = next_int(&reader);
+    ref->temp_max_code = next_int(&reader);
+    for (s = 0; s < ref->segments; s++) {
+        ref->segment[s].first_code = next_int(&reader);
+        ref->segment[s].origin_code = next_int(&reader);
+        ref->segment[s].gain = next_int(&reader);
+        for (f = 0; f < 12; f++) {
+            for (k = 0; k <= ref->order; k++) {
+                ref->segment[s].coefficient[f][k] = next_int(&reader);
+            }
+        }
+    }
+    return (next_word(&reader) == crc32(image, size - 4)) ? TRIAX_REF_OK : TRIAX_REF_BAD_IMAGE;
+}
+
+uint32_t triax_ref_batch(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
+                         const int32_t *raw_code, int32_t *accel, uint32_t *status)
+{
+    static triax_ref_t ref;
+    size_t i;
+    if (triax_ref_open(&ref, image, size) != TRIAX_REF_OK) {
+        return TRIAX_REF_BAD_IMAGE;
+    }
+    for (i = 0; i < count; i++) {
+        triax_ref_state_t state;
+        status[i] = triax_ref_set_temperature(&state, &ref, temp_code[i]);
+        status[i] |= triax_ref_apply(&state, &ref, &raw_code[3 * i], &accel[3 * i]);
+    }
+    return TRIAX_REF_OK;
+}

@@ -1,0 +1,90 @@
+"""The C compiler: found, started in the background, its complaints in one line."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.errors import RefusedError
+
+FLAGS = (
+    "-std=c99", "-O2", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion",
+    "-Wsign-conversion",
+)  # fmt: skip
+"""The routine is clean under these; a warning is an error."""
+
+
+def find_compiler() -> str:
+    """Path of gcc.
+
+    Raises
+    ------
+    RefusedError
+        When it is not installed.
+    """
+    found = shutil.which("gcc")
+    if found is None:
+        raise RefusedError(
+            "gcc", "not found", remedy="install it: sudo apt-get install gcc libc6-dev"
+        )
+    return found
+
+
+def compiler_version() -> str:
+    """First line of gcc --version."""
+    command = [find_compiler(), "--version"]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n")[0]
+
+
+@dataclass(frozen=True)
+class Compilation:
+    """A compilation under way."""
+
+    process: subprocess.Popen[str]
+    library: Path
+
+    def load(self) -> ctypes.CDLL:
+        """Wait for it and load the library.
+
+        Raises
+        ------
+        RefusedError
+            When the compiler refused: its first complaint.
+        """
+        complaints, _ = self.process.communicate()
+        if self.process.returncode != 0:
+            lines = [line for line in complaints.splitlines() if "error" in line.lower()]
+            raise RefusedError(
+                "gcc",
+                (lines or complaints.splitlines() or ["failed without a word"])[0],
+                remedy="check the compiler with a small program, and the space in the temp folder",
+            )
+        return ctypes.CDLL(str(self.library))
+
+    def cancel(self) -> None:
+        """Stop it, if it still runs."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.communicate()
+
+
+def compile_library(
+    sources: Sequence[Path], library: Path, include: Sequence[Path] = ()
+) -> Compilation:
+    """Start gcc on C sources, to a shared library."""
+    command = [
+        find_compiler(),
+        *FLAGS,
+        "-shared",
+        "-fPIC",
+        *(f"-I{folder}" for folder in include),
+        "-o",
+        str(library),
+        *map(str, sources),
+    ]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    return Compilation(process, library)

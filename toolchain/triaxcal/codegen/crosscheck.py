@@ -1,0 +1,189 @@
+"""Three implementations must agree bit for bit, or nothing is delivered.
+
+The Python integer model, the handwritten reference C (from the image) and the generated C (from
+triax_calib.h, and from the image through triax_calib_load) answer the same vectors.
+"""
+
+from __future__ import annotations
+
+import itertools
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.codegen.routines import Answers, Generated, Int32Array, Routine
+from triaxcal.errors import RefusedError
+from triaxcal.fixedpoint.integer_model import STATUS_OK, apply, set_temperature
+from triaxcal.fixedpoint.plan import Plan
+
+INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
+RANDOM_VECTORS = 1_000_000
+SEED = 20130526
+_BLOCK = 8192  # of the Python model: its working arrays stay in the cache
+
+
+@dataclass(frozen=True)
+class VectorSet:
+    """Named vectors: temperature codes (n,) and raw codes (n, 3)."""
+
+    name: str
+    temp: Int32Array
+    raw: Int32Array
+
+
+@dataclass(frozen=True)
+class CrossCheck:
+    """Result of a cross-check that found no mismatch.
+
+    Attributes
+    ----------
+    vectors : dict
+        Number of vectors by set.
+    largest_error_lsb : float
+        Largest error seen against the real-valued plan, in output LSB.
+    """
+
+    vectors: dict[str, int]
+    largest_error_lsb: float
+
+    @property
+    def total(self) -> int:
+        """Vectors in all."""
+        return sum(self.vectors.values())
+
+
+def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[VectorSet]:
+    """Every temperature code x lattice, a boundary grid, random in range, random int32."""
+    rng = np.random.Generator(np.random.PCG64(SEED))
+    shape = plan.shape
+    low, high = plan.temp_min_code, plan.temp_max_code
+    in_range = (
+        rng.integers(low, high, random_vectors, dtype=np.int32, endpoint=True),
+        rng.integers(
+            shape.raw_min, shape.raw_max, (random_vectors, 3), dtype=np.int32, endpoint=True
+        ),
+    )
+    anything = (
+        rng.integers(INT32_MIN, INT32_MAX, random_vectors, dtype=np.int32, endpoint=True),
+        rng.integers(INT32_MIN, INT32_MAX, (random_vectors, 3), dtype=np.int32, endpoint=True),
+    )
+    return [
+        _lattice(plan),
+        _boundary(plan),
+        VectorSet("random in range", *in_range),
+        VectorSet("random int32", *anything),
+    ]
+
+
+def _product(name: str, temp: list[int], raw_axis: list[int]) -> VectorSet:
+    raw = np.array(list(itertools.product(raw_axis, repeat=3)), dtype=np.int32)
+    temps = np.repeat(np.array(temp, dtype=np.int32), len(raw))
+    return VectorSet(name, temps, np.tile(raw, (len(temp), 1)))
+
+
+def _lattice(plan: Plan) -> VectorSet:
+    """Every code of the range and two beyond each end x corners, faces, edges and centre."""
+    temps = list(range(plan.temp_min_code - 2, plan.temp_max_code + 3))
+    middle = (plan.shape.raw_min + plan.shape.raw_max) // 2
+    raw = [plan.shape.raw_min, middle + 1, plan.shape.raw_max]
+    return _product("every temperature code", temps, raw)
+
+
+def _boundary(plan: Plan) -> VectorSet:
+    """Around every limit of temperature, segment and raw code, and the ends of int32."""
+    limits = {INT32_MIN, -1, 0, 1, INT32_MAX}
+    edges = [plan.temp_min_code, plan.temp_max_code]
+    edges += [s.first_code for s in plan.segments] + [s.origin_code for s in plan.segments]
+    temps = limits | {e + d for e in edges for d in (-1, 0, 1)}
+    raws = limits | {e + d for e in (plan.shape.raw_min, plan.shape.raw_max) for d in (-1, 0, 1)}
+    return _product("boundaries", _within_int32(temps), _within_int32(raws))
+
+
+def _within_int32(values: set[int]) -> list[int]:
+    return sorted(v for v in values if INT32_MIN <= v <= INT32_MAX)
+
+
+def python_routine(plan: Plan) -> Routine:
+    """The integer model as a routine: set_temperature once a code, then gathered."""
+    states, _ = set_temperature(plan, plan.temp_codes)
+
+    def run(temp: Int32Array, raw: Int32Array) -> Answers:
+        accel = np.empty((len(temp), 3), np.int32)
+        status = np.empty(len(temp), np.uint32)
+        for start in range(0, len(temp), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            codes = temp[block].astype(np.int64)
+            index = np.clip(codes, plan.temp_min_code, plan.temp_max_code) - plan.temp_min_code
+            result, flags = apply(plan, states.at(index), raw[block].astype(np.int64))
+            accel[block] = result
+            status[block] = flags | (codes < plan.temp_min_code) | (codes > plan.temp_max_code) * 2
+        return accel, status
+
+    return run
+
+
+def cross_check(
+    plan: Plan, sets: list[VectorSet], generated: Generated, reference: Routine, image: bytes
+) -> CrossCheck:
+    """Run every vector through the three implementations and the image through the loader.
+
+    Raises
+    ------
+    RefusedError
+        At the first mismatch: its input and both outputs.
+    """
+    python = python_routine(plan)
+    largest = 0.0
+    real = plan.real_rows()
+    with ThreadPoolExecutor(2) as pool:
+        for vectors in sets:
+            from_c = pool.submit(generated.run, vectors.temp, vectors.raw)
+            from_reference = pool.submit(reference, vectors.temp, vectors.raw)
+            expected = python(vectors.temp, vectors.raw)
+            _compare(vectors, "generated C", from_c.result(), expected)
+            _compare(vectors, "reference C", from_reference.result(), expected)
+            largest = max(largest, _largest_error(plan, real, vectors, expected))
+    boundary = next(v for v in sets if v.name == "boundaries")
+    loaded, answers = generated.run_image(image, boundary.temp, boundary.raw)
+    if loaded != STATUS_OK:
+        raise RefusedError("triax_calib_load", f"refused its own image with status {loaded}")
+    _compare(
+        boundary, "generated C with the image", answers, generated.run(boundary.temp, boundary.raw)
+    )
+    return CrossCheck({v.name: len(v.temp) for v in sets}, largest)
+
+
+def _compare(vectors: VectorSet, name: str, found: Answers, expected: Answers) -> None:
+    differs = (found[0] != expected[0]).any(axis=1) | (found[1] != expected[1])
+    if not differs.any():
+        return
+    i = int(differs.argmax())
+    raise RefusedError(
+        f"cross-check, vector {i} of '{vectors.name}'",
+        f"temp_code {vectors.temp[i]}, raw_code {vectors.raw[i].tolist()}: {name} gives "
+        f"{found[0][i].tolist()} status {found[1][i]}",
+        expected=f"{expected[0][i].tolist()} status {expected[1][i]}",
+        remedy=f"{int(differs.sum())} of {len(differs)} vectors differ: do not use this build, "
+        "report it",
+    )
+
+
+def _largest_error(
+    plan: Plan,
+    real: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
+    vectors: VectorSet,
+    answers: Answers,
+) -> float:
+    """Largest |integer - real| in LSB over the vectors that no limit touched."""
+    shape = plan.shape
+    clean = np.flatnonzero(answers[1] == STATUS_OK)
+    largest = 0.0
+    for start in range(0, len(clean), _BLOCK):
+        chosen = clean[start : start + _BLOCK]
+        rows = real[vectors.temp[chosen].astype(np.int64) - plan.temp_min_code]
+        u = vectors.raw[chosen].astype(np.float64) * 2.0 ** (shape.raw_shift - 32)
+        exact = (rows[:, :, :3] @ u[:, :, None])[:, :, 0] + rows[:, :, 3]
+        error = np.abs(answers[0][chosen] - exact * 2.0 ** (32 - shape.output_shift))
+        largest = max(largest, float(error.max()))
+    return largest

@@ -1,0 +1,83 @@
+"""The binary image triax_calib.bin: 32-bit little-endian words and a CRC-32.
+
+magic "TRXC", version, size in bytes, twelve words of shape,
+temp_min_code, temp_max_code,
+a segment: first_code, origin_code, gain, 12 x (order + 1) coefficients, constant first,
+CRC-32 (IEEE 802.3) of all before it.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.compensation import DIRECT
+
+MAGIC = int.from_bytes(b"TRXC", "little")
+VERSION = 1
+HEADER_NAMES = (
+    "magic TRXC",
+    "version of the layout",
+    "size in bytes",
+    "form: 0 direct, 1 inverse",
+    "segments",
+    "order",
+    "output Q",
+    "output shift",
+    "raw code min",
+    "raw code max",
+    "raw shift",
+    "adjugate shift",
+    "determinant shift",
+    "log2 of the reciprocal",
+    "gain shift",
+)
+
+
+def header_words(plan: Plan) -> list[int]:
+    """First words of the image, each 0 to 2^32 - 1, in the order of `HEADER_NAMES`."""
+    shape = plan.shape
+    inverse = shape.inverse
+    shifts = (
+        (0, 0, 0, 0)
+        if inverse is None
+        else (
+            inverse.adjugate_shift,
+            inverse.determinant_shift,
+            inverse.reciprocal_log2,
+            inverse.gain_shift,
+        )
+    )
+    words = [
+        MAGIC,
+        VERSION,
+        image_size(plan),
+        0 if shape.form == DIRECT else 1,
+        shape.segments,
+        shape.order,
+        shape.output_q,
+        shape.output_shift,
+        shape.raw_min,
+        shape.raw_max,
+        shape.raw_shift,
+        *shifts,
+    ]
+    return [w % 2**32 for w in words]
+
+
+def image_size(plan: Plan) -> int:
+    """Bytes of the image."""
+    shape = plan.shape
+    segment_words = 3 + 12 * (shape.order + 1)
+    return 4 * (len(HEADER_NAMES) + 2 + shape.segments * segment_words + 1)
+
+
+def image_bytes(plan: Plan) -> bytes:
+    """Render the image of a plan."""
+    words = [*header_words(plan), plan.temp_min_code, plan.temp_max_code]
+    for segment in plan.segments:
+        words += [segment.first_code, segment.origin_code, segment.gain]
+        words += segment.coefficients.ravel().tolist()
+    payload = struct.pack(f"<{len(words)}I", *(w % 2**32 for w in words))
+    return payload + struct.pack("<I", zlib.crc32(payload))

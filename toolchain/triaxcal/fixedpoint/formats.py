@@ -1,0 +1,143 @@
+"""Choosing formats: as many spare bits below the output LSB as provably fit, or a refusal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.fixedpoint.arithmetic import INT32_MAX, saturate_int32
+from triaxcal.fixedpoint.inversion import (
+    InverseShifts,
+    adjugate,
+    invert,
+    quarter_determinant,
+    reciprocal,
+)
+from triaxcal.model.types import FloatArray, IntArray
+
+MAX_SPARE_BITS = 16
+MIN_SPARE_BITS = -4
+"""Below this the gain's own last place costs more than 16 output LSB: a smaller Q says as much."""
+
+ROW_LIMIT = 2**32 - 8
+"""|n_i0| + |n_i1| + |n_i2| + 2 |b_i| stays below this: the 64-bit sum and its high word plus b
+cannot overflow for any int32 raw codes (docs/fixed-point.md, step R)."""
+
+_NAMES = tuple(
+    f"{matrix}{row}{column}" if column else f"{offset}{row}"
+    for matrix, offset in (("N", "b"), ("K", "U0"))
+    for row in "xyz"
+    for column in ("x", "y", "z", "")
+)
+FUNCTION_NAMES = {"direct": _NAMES[:12], "inverse": _NAMES[12:]}
+"""Names of the twelve functions in image order."""
+
+
+def choose_spare_bits(real: FloatArray, output_q: int, where: str) -> int:
+    """Largest number of spare bits with which the direct form fits.
+
+    `real`, shape (segments, 12, order + 1), is in units of no spare bits.
+
+    Raises
+    ------
+    RefusedError
+        Naming the row or the coefficient that does not fit, and the highest output_q that does.
+    """
+    stage = _stage_bounds(real)
+    for spare in range(MAX_SPARE_BITS, MIN_SPARE_BITS - 1, -1):
+        if _fits(stage * 2.0**spare, real.shape[2], spare):
+            return spare
+    fitting = next(
+        (s for s in range(MIN_SPARE_BITS - 1, -40, -1) if _fits(stage * 2.0**s, real.shape[2], s)),
+        None,
+    )
+    raise _refusal(stage * 2.0**MIN_SPARE_BITS, output_q, fitting, where)
+
+
+def _stage_bounds(real: FloatArray) -> FloatArray:
+    """Bound of |p_k| but for rounding, shape (12, order + 1), worst segment."""
+    tails = np.cumsum(np.abs(real)[:, :, ::-1], axis=2)[:, :, ::-1]
+    bounds: FloatArray = (tails * 2.0 ** np.arange(real.shape[2])).max(axis=0)
+    return bounds
+
+
+def _fits(stage: FloatArray, terms: int, spare: int) -> bool:
+    stage = stage + terms + 2.0  # at most 3/2 for each rounded coefficient and floor
+    rows = _row_sums(stage) + 2.0 ** (spare + 1)
+    return bool(stage.max() <= INT32_MAX and rows.max() < ROW_LIMIT)
+
+
+def _row_sums(stage: FloatArray) -> FloatArray:
+    final = stage[:, 0].reshape(3, 4)
+    sums: FloatArray = final[:, :3].sum(axis=1) + 2 * final[:, 3]
+    return sums
+
+
+def _refusal(stage: FloatArray, output_q: int, fitting: int | None, where: str) -> RefusedError:
+    f, k = np.unravel_index(int(stage.argmax()), stage.shape)
+    name = FUNCTION_NAMES["direct"][f]
+    largest_g = _row_sums(stage).max() / 2.0 ** (MIN_SPARE_BITS + 1 + output_q)
+    culprit = (
+        f"the declared raw range stands for {largest_g:.4g} g"
+        if k == 0
+        else f"the temperature coefficient of order {k} of {name} is too steep for the range"
+    )
+    remedy = "lower compensation.output_q or declare a narrower adc.code_min to adc.code_max"
+    if fitting is not None and output_q - (MIN_SPARE_BITS - fitting) > 0:
+        remedy = f"set compensation.output_q = {output_q - (MIN_SPARE_BITS - fitting)} or lower"
+        remedy += ", or declare a narrower adc.code_min to adc.code_max"
+    return RefusedError(
+        where,
+        f"{culprit}, which does not fit int32 at compensation.output_q = {output_q}",
+        remedy=remedy,
+    )
+
+
+def choose_inverse(
+    functions: IntArray, k_bits: int, output_q: int, where: str
+) -> tuple[InverseShifts, int]:
+    """Shifts of the inversion and spare bits, from the integers at every temperature code.
+
+    `functions`, shape (n, 3, 4), are K (times 2^k_bits raw LSB per g) and U0 (raw LSB).
+
+    Raises
+    ------
+    RefusedError
+        When K is so badly conditioned, or the output so fine, that nothing fits.
+    """
+    K = functions[:, :, :3]
+    exact = adjugate(K)
+    adjugate_shift = max(0, int(np.abs(exact).max()).bit_length() - 31)
+    word = saturate_int32(exact >> adjugate_shift)
+    quarter = quarter_determinant(K, word)
+    determinant_shift = max(0, int(np.abs(quarter).max()).bit_length() - 31)
+    least = int(np.abs(quarter >> determinant_shift).min())
+    if least < 2**16:
+        raise RefusedError(
+            where,
+            "K(T) is so near to singular that its inverse has fewer than 16 significant bits",
+            remedy="look for axes that are not orthogonal, or for exchanged positions",
+        )
+    log2 = 62
+    while (1 << log2) // least > INT32_MAX:
+        log2 -= 1
+    shifts = InverseShifts(adjugate_shift, determinant_shift, log2, 0)
+    inverse = reciprocal(saturate_int32(quarter >> determinant_shift), shifts)
+    product_max = int(np.abs(word * inverse[:, None, None]).max())
+    for spare in range(MAX_SPARE_BITS, MIN_SPARE_BITS - 1, -1):
+        gain_shift = log2 + 2 + determinant_shift - k_bits - (output_q + 32 + spare)
+        if gain_shift < 1 or product_max >> gain_shift >= INT32_MAX:
+            continue
+        shifts = replace(shifts, gain_shift=gain_shift)
+        preload = 1 << (spare - 1) if spare > 0 else 0
+        gain, offset = invert(functions, shifts, preload)
+        rows = np.abs(gain).sum(axis=2) + 2 * np.abs(offset)
+        if rows.max() < ROW_LIMIT and np.abs(offset).max() < INT32_MAX:
+            return shifts, spare
+    raise RefusedError(
+        where,
+        f"the declared raw range does not fit int32 at compensation.output_q = {output_q}",
+        remedy="lower compensation.output_q or declare a narrower adc.code_min to adc.code_max",
+    )

@@ -1,0 +1,63 @@
+"""The routine in integers, vectorised: what the C must equal bit for bit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.fixedpoint.arithmetic import high_word, saturate_int32
+from triaxcal.fixedpoint.horner import horner, segment_of
+from triaxcal.fixedpoint.inversion import invert
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.types import IntArray
+
+STATUS_OK = 0
+STATUS_TEMP_LOW = 1
+STATUS_TEMP_HIGH = 2
+STATUS_RAW_RANGE = 4
+STATUS_SATURATED = 8
+STATUS_BAD_IMAGE = 16
+
+
+@dataclass(frozen=True)
+class State:
+    """What set_temperature leaves for apply: gain (n, 3, 3) and offset (n, 3), int64 arrays."""
+
+    gain: IntArray
+    offset: IntArray
+
+    def at(self, index: IntArray) -> State:
+        """States at `index`."""
+        return State(self.gain[index], self.offset[index])
+
+
+def set_temperature(plan: Plan, temp_code: IntArray) -> tuple[State, IntArray]:
+    """State and status of each code, shape (n,); any int32 is legal."""
+    status = np.where(temp_code < plan.temp_min_code, STATUS_TEMP_LOW, STATUS_OK)
+    status = np.where(temp_code > plan.temp_max_code, STATUS_TEMP_HIGH, status)
+    code = np.clip(temp_code, plan.temp_min_code, plan.temp_max_code)
+    functions = horner(plan.segments, code, segment_of(plan.segments, code)).reshape(-1, 3, 4)
+    shape = plan.shape
+    if shape.inverse is None:
+        return State(functions[:, :, :3], functions[:, :, 3]), status
+    gain, offset = invert(functions, shape.inverse, shape.rounding_in_offset)
+    return State(gain, offset), status
+
+
+def apply(plan: Plan, state: State, raw_code: IntArray) -> tuple[IntArray, IntArray]:
+    """Accelerations (n, 3) in 2^-output_q g and status (n,) of raw codes (n, 3), any int32."""
+    shape = plan.shape
+    clamped = np.clip(raw_code, shape.raw_min, shape.raw_max)
+    status = np.where((clamped != raw_code).any(axis=1), STATUS_RAW_RANGE, STATUS_OK)
+    u = clamped << shape.raw_shift
+    gain, offset = state.gain, state.offset
+    total = np.empty_like(u)
+    for i in range(3):
+        total[:, i] = gain[:, i, 0] * u[:, 0] + gain[:, i, 1] * u[:, 1] + gain[:, i, 2] * u[:, 2]
+    if not shape.saturates:
+        return (high_word(total) + offset) >> (shape.output_shift - 32), status
+    wide = (total + (offset << 32) + shape.rounding_in_sum) >> shape.output_shift
+    accel = saturate_int32(wide)
+    saturated = np.where((accel != wide).any(axis=1), STATUS_SATURATED, STATUS_OK)
+    return accel, np.bitwise_or(status, saturated)

@@ -1,0 +1,293 @@
+"""The plan: formats, shifts and coefficients that turn the float model into integers.
+
+What the routine computes, for the raw codes u shifted left to fill int32 and x the temperature
+normalised to Q31 on its segment (docs/fixed-point.md has the derivation):
+
+    p_k = c_k + floor(x p_(k+1) / 2^32)      Horner from p_order = c_order down to p_0
+    a_i = (sum_j n_ij u_j + b_i 2^32) >> output_shift       LSB 2^-output_q g
+
+In the direct form n and b are the twelve p_0; in the inverse form those are K and U0, which the
+device inverts. Each Horner step halves, so c_k carries one bit more than c_(k-1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.fixedpoint.arithmetic import INT32_MAX, round_half_up
+from triaxcal.fixedpoint.formats import choose_inverse, choose_spare_bits
+from triaxcal.fixedpoint.horner import Segment, horner, segment_of
+from triaxcal.fixedpoint.inversion import InverseShifts
+from triaxcal.model.compensation import INVERSE, Compensation
+from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.unitfile import TemperatureSensor, UnitDescription
+
+MAX_TEMPERATURE_CODES = 2**20
+"""The proof visits every temperature code; beyond this it would take minutes."""
+
+ROWS = tuple(3 * i + j if j < 3 else 9 + i for i in range(3) for j in range(4))
+"""Where each function of the image's order (row by row: three of the matrix, then the offset)
+stands in the order of `CONSTANT_NAMES`."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What the generated routine is specialised to; two images fit the same code if this agrees.
+
+    Attributes
+    ----------
+    form : str
+        "direct" or "inverse".
+    segments, order : int
+        Of the piecewise polynomial.
+    output_q : int
+        Acceleration LSB is 2^-output_q g.
+    output_shift : int
+        Right shift of the 64-bit sum, 32 + spare bits. Above 32 the result cannot leave int32.
+    raw_min, raw_max : int
+        Declared raw range; codes outside are clamped and flagged.
+    raw_shift : int
+        Left shift that makes the declared raw range fill int32.
+    inverse : InverseShifts or None
+        Shifts of the inversion on the device.
+    """
+
+    form: str
+    segments: int
+    order: int
+    output_q: int
+    output_shift: int
+    raw_min: int
+    raw_max: int
+    raw_shift: int
+    inverse: InverseShifts | None
+
+    @property
+    def saturates(self) -> bool:
+        """Whether a result may leave int32, so that the routine has to saturate."""
+        return self.output_shift <= 32
+
+    @property
+    def rounding_in_offset(self) -> int:
+        """Half an output LSB, where the offset's format can hold it: added to b."""
+        return 0 if self.saturates else 1 << (self.output_shift - 33)
+
+    @property
+    def rounding_in_sum(self) -> int:
+        """Half an output LSB, where it has to be added to the 64-bit sum."""
+        return 1 << (self.output_shift - 1) if self.saturates else 0
+
+    @property
+    def raw_box(self) -> int:
+        """Largest magnitude of a left-justified raw code."""
+        return max(abs(self.raw_min), abs(self.raw_max)) << self.raw_shift
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Integers of one unit.
+
+    Attributes
+    ----------
+    shape : Shape
+        What the code is specialised to.
+    temp_min_code, temp_max_code : int
+        Working range; codes outside are clamped and flagged.
+    segments : tuple of Segment
+        Rising in temperature; functions in image order (`ROWS`).
+    real : array, shape (segments, 12, order + 1)
+        The real-valued polynomials in x that the integers stand for, in units of each function's
+        own last place, without the bits that Horner's halving adds: the reference of the proof.
+    volts_per_lsb : float
+        Volts of one left-justified raw code.
+    """
+
+    shape: Shape
+    temp_min_code: int
+    temp_max_code: int
+    segments: tuple[Segment, ...]
+    real: FloatArray
+    volts_per_lsb: float
+
+    @property
+    def temp_codes(self) -> IntArray:
+        """Every temperature code of the working range."""
+        return np.arange(self.temp_min_code, self.temp_max_code + 1, dtype=np.int64)
+
+    def real_rows(self) -> FloatArray:
+        """What the state's integers stand for at every code, shape (codes, 3, 4), in their units.
+
+        Evaluated in floats, to see how near samples come to the proven bound.
+        """
+        codes = self.temp_codes
+        index = segment_of(self.segments, codes)
+        origin = np.array([s.origin_code for s in self.segments])[index]
+        gain = np.array([s.gain for s in self.segments])[index]
+        x = ((codes - origin) * gain / 2.0**31)[:, None]
+        value = self.real[index, :, -1]
+        for k in range(self.real.shape[2] - 2, -1, -1):
+            value = self.real[index, :, k] + x * value
+        rows = value.reshape(-1, 3, 4)
+        if self.shape.inverse is None:
+            return rows
+        N = np.linalg.inv(rows[:, :, :3]) * 2.0 ** (self.shape.inverse.scale_log2)
+        offset = -np.einsum("nij,nj->ni", N, rows[:, :, 3]) / 2.0**32
+        return np.concatenate([N, offset[:, :, None]], axis=2)
+
+
+def make_plan(compensation: Compensation, unit: UnitDescription) -> Plan:
+    """Turn a compensation into integers that provably cannot overflow.
+
+    Raises
+    ------
+    RefusedError
+        When no format holds: names the input range or the coefficient to blame.
+    """
+    where = f"unit {unit.name}"
+    low, high = _temperature_codes(compensation, unit.temperature_sensor, where)
+    raw_shift = 31 - max(unit.adc.code_max.bit_length(), (-unit.adc.code_min - 1).bit_length())
+    volts_per_lsb = unit.adc.volts_per_code / 2.0**raw_shift
+    real, frames = _device_polynomials(compensation, unit, low, high, volts_per_lsb)
+    shape = Shape(
+        form=compensation.form,
+        segments=len(frames),
+        order=compensation.curves.order,
+        output_q=unit.output_q,
+        output_shift=32,
+        raw_min=unit.adc.code_min,
+        raw_max=unit.adc.code_max,
+        raw_shift=raw_shift,
+        inverse=None,
+    )
+    plan = Plan(shape, low, high, tuple(frames), real, volts_per_lsb)
+    return _inverse_plan(plan, where) if compensation.form == INVERSE else _direct_plan(plan, where)
+
+
+def _temperature_codes(
+    compensation: Compensation, sensor: TemperatureSensor, where: str
+) -> tuple[int, int]:
+    low, high = compensation.curves.breaks_degc[0], compensation.curves.breaks_degc[-1]
+    # A range end that is a code but for rounding counts as that code.
+    codes = [(t - sensor.degc_at_zero) / sensor.degc_per_code for t in (low, high)]
+    first, last = int(np.ceil(codes[0] - 1e-6)), int(np.floor(codes[1] + 1e-6))
+    if last - first >= MAX_TEMPERATURE_CODES:
+        raise RefusedError(
+            where,
+            f"temperature_sensor.degc_per_code = {sensor.degc_per_code:g} makes "
+            f"{last - first + 1} codes of {low:g} to {high:g} degC",
+            expected=f"at most {MAX_TEMPERATURE_CODES}, each of which the proof visits",
+            remedy="drop the lowest bits of the temperature code in the driver and say so here",
+        )
+    if max(abs(first), abs(last)) > INT32_MAX // 2:
+        raise RefusedError(
+            where,
+            f"temperature codes {first} to {last} do not fit int32 with a bit to spare",
+            remedy="check temperature_sensor.degc_per_code and degc_at_zero",
+        )
+    return first, last
+
+
+def _device_polynomials(
+    compensation: Compensation,
+    unit: UnitDescription,
+    low: int,
+    high: int,
+    volts_per_lsb: float,
+) -> tuple[FloatArray, list[Segment]]:
+    """Real polynomials in x, in device units, and the frames (integers still zero) they live in.
+
+    Direct: N in 2^-(output_q + 32) g per raw LSB, b in 2^-output_q g.
+    Inverse: K in raw LSB per g, U0 in raw LSB.
+    """
+    curves, sensor = compensation.curves, unit.temperature_sensor
+    breaks = [(t - sensor.degc_at_zero) / sensor.degc_per_code for t in curves.breaks_degc]
+    firsts = [low, *(int(np.ceil(b - 1e-6)) for b in breaks[1:-1]), high + 1]
+    frames, rows = [], []
+    scale = np.empty(12)
+    if compensation.form == INVERSE:
+        scale[:] = 1.0 / volts_per_lsb
+    else:
+        scale[:9] = volts_per_lsb * 2.0 ** (unit.output_q + 32)
+        scale[9:] = 2.0**unit.output_q
+    for s in range(len(curves.origins_degc)):
+        first, last = firsts[s], firsts[s + 1] - 1
+        if last < first:
+            continue
+        origin = (first + last + 1) // 2
+        gain_log2 = 31 - max(1, origin - first).bit_length()
+        middle = sensor.degc(origin) - curves.origins_degc[s]
+        half = sensor.degc_per_code * 2.0 ** (31 - gain_log2)
+        in_x = _substitute(curves.coefficients[s], middle, half)
+        frames.append(Segment(first, origin, 1 << gain_log2, np.zeros(in_x.shape, np.int64)))
+        rows.append((in_x * scale[:, None])[list(ROWS)])
+    return np.array(rows), frames
+
+
+def _substitute(coefficients: FloatArray, middle: float, half: float) -> FloatArray:
+    """Coefficients in x of polynomials in dT = middle + half x; shape (functions, order + 1)."""
+    order = coefficients.shape[1] - 1
+    result = np.zeros_like(coefficients)
+    for n in range(order, -1, -1):
+        shifted = np.zeros_like(result)
+        shifted[:, 1:] = result[:, :-1] * half
+        result = result * middle + shifted
+        result[:, 0] += coefficients[:, n]
+    return result
+
+
+def _direct_plan(plan: Plan, where: str) -> Plan:
+    spare = choose_spare_bits(plan.real, plan.shape.output_q, where)
+    shape = replace(plan.shape, output_shift=32 + spare)
+    real = plan.real * 2.0**spare
+    preload = np.zeros(12)
+    preload[3::4] = shape.rounding_in_offset
+    return replace(plan, shape=shape, real=real, segments=_quantise(plan.segments, real, preload))
+
+
+def _inverse_plan(plan: Plan, where: str) -> Plan:
+    bits = int(np.floor(np.log2(INT32_MAX / _horner_bound(plan.real[:, _MATRIX]).max())))
+    real = plan.real.copy()
+    real[:, _MATRIX] *= 2.0**bits
+    if _horner_bound(real[:, 3::4]).max() > INT32_MAX:
+        raise RefusedError(
+            where,
+            "U0 lies beyond the declared raw range",
+            remedy="check adc.full_scale_v, adc.code_min and adc.code_max",
+        )
+    segments = _quantise(plan.segments, real, np.zeros(12))
+    codes = plan.temp_codes
+    functions = horner(segments, codes, segment_of(segments, codes)).reshape(-1, 3, 4)
+    inverse, spare = choose_inverse(functions, bits, plan.shape.output_q, where)
+    shape = replace(plan.shape, output_shift=32 + spare, inverse=inverse)
+    return replace(plan, shape=shape, real=real, segments=segments)
+
+
+_MATRIX = [f for f in range(12) if f % 4 < 3]
+
+
+def _horner_bound(real: FloatArray) -> FloatArray:
+    """Bound of |p_k| 2^-k over |x| <= 1 for every function, with one last place for rounding."""
+    bound: FloatArray = np.abs(real).sum(axis=-1) + 1
+    return bound
+
+
+def _quantise(
+    frames: tuple[Segment, ...], real: FloatArray, preload: FloatArray
+) -> tuple[Segment, ...]:
+    """Integer coefficients: half up, with 1/2 for every floor that follows them.
+
+    The floor of a Horner step loses 1/2 on average; adding it to the coefficient centres the error.
+    """
+    order = real.shape[2] - 1
+    segments = []
+    for s, frame in enumerate(frames):
+        integers = np.empty(real[s].shape, np.int64)
+        for f in range(real.shape[1]):
+            for k in range(order + 1):
+                value = real[s, f, k] * 2.0**k + (0.5 if k < order else 0.0)
+                integers[f, k] = round_half_up(value + (preload[f] if k == 0 else 0.0))
+        segments.append(replace(frame, coefficients=integers))
+    return tuple(segments)

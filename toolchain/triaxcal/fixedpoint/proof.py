@@ -1,0 +1,208 @@
+"""Proof of ranges and of the error bound, in integers and fractions only.
+
+For each temperature code the routine's n and b are integers, and what they stand for are exact
+rationals. The result is floor(y + 1/2) for y = (sum n u / 2^32 + b) / 2^spare, affine in u, so its
+largest distance from the exact value over the raw box is that of a corner:
+
+    error_i <= (sum_j |n_ij - n_ij exact| u_max / 2^32 + |b_i - b_i exact|) / 2^spare + 1/2.
+
+Every code of the working range is visited. docs/fixed-point.md, step E.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.fixedpoint.arithmetic import INT32_MAX
+from triaxcal.fixedpoint.formats import FUNCTION_NAMES, ROW_LIMIT
+from triaxcal.fixedpoint.horner import Segment
+from triaxcal.fixedpoint.integer_model import State, set_temperature
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.types import IntArray
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Proven error of the arithmetic against the real-valued model of the plan.
+
+    Attributes
+    ----------
+    lsb : float
+        Bound in output LSB, rounded up, largest over axes and temperature codes.
+    per_axis_lsb : tuple of three floats
+        The same for each axis.
+    temp_code : int
+        Where it is reached.
+    codes : int
+        Temperature codes visited: all of the working range.
+    """
+
+    lsb: float
+    per_axis_lsb: tuple[float, float, float]
+    temp_code: int
+    codes: int
+
+
+def prove(plan: Plan) -> Bound:
+    """Check every range, then bound the error at every temperature code.
+
+    Raises
+    ------
+    RefusedError
+        When a range does not hold: a fault of the planner, never of the data.
+    """
+    check_ranges(plan)
+    codes = plan.temp_codes
+    state, _ = set_temperature(plan, codes)
+    _check_rows(plan, state)
+    errors = _inverse_errors if plan.shape.inverse is not None else _direct_errors
+    axes = [errors(plan, state, codes, axis) for axis in range(3)]
+    worst = int(np.max(axes, axis=0).argmax())
+    per_axis = tuple(math.nextafter(max(axis) + 0.5, math.inf) for axis in axes)
+    return Bound(
+        lsb=max(per_axis),
+        per_axis_lsb=(per_axis[0], per_axis[1], per_axis[2]),
+        temp_code=int(codes[worst]),
+        codes=len(codes),
+    )
+
+
+def check_ranges(plan: Plan) -> None:
+    """Bound every intermediate of Horner's rule over all x of its segment, as the loader does.
+
+    |p_k| <= |c_k| + |p_(k+1)| / 2 + 1 for |x| < 2^31, and every such bound must fit int32.
+    """
+    ends = [s.first_code - 1 for s in plan.segments[1:]] + [plan.temp_max_code]
+    for segment, last in zip(plan.segments, ends, strict=True):
+        reach = max(last - segment.origin_code, segment.origin_code - segment.first_code)
+        if reach * segment.gain > INT32_MAX:
+            raise _broken(f"x at temperature code {last}")
+        bounds = horner_bounds(segment)
+        for f, bound in enumerate(bounds):
+            if bound > INT32_MAX:
+                raise _broken(FUNCTION_NAMES[plan.shape.form][f])
+        if plan.shape.inverse is None:
+            for row in range(3):
+                n0, n1, n2, b = bounds[4 * row : 4 * row + 4]
+                if n0 + n1 + n2 + 2 * b >= ROW_LIMIT:
+                    raise _broken(f"row {row} of the sum")
+
+
+def horner_bounds(segment: Segment) -> list[int]:
+    """Bound of |p_0| of each function (the largest of |p_k| when that does not fit int32)."""
+    bounds = []
+    for row in segment.coefficients.tolist():
+        bound = abs(row[-1])
+        largest = bound
+        for c in row[-2::-1]:
+            bound = abs(c) + (bound >> 1) + 1
+            largest = max(largest, bound)
+        bounds.append(largest if largest > INT32_MAX else bound)
+    return bounds
+
+
+def _check_rows(plan: Plan, state: State) -> None:
+    rows = np.abs(state.gain).sum(axis=2) + 2 * np.abs(state.offset)
+    if int(rows.max()) >= ROW_LIMIT:
+        raise _broken(f"the sum at output_q = {plan.shape.output_q}")
+
+
+def _broken(what: str) -> RefusedError:
+    return RefusedError(
+        "range proof", f"{what} could overflow", remedy="this is a fault in triaxcal: report it"
+    )
+
+
+def _exact_numerators(plan: Plan, codes: IntArray, function: int) -> tuple[list[int], int]:
+    """Exact values of one function at every code as integers over 2^shift, and the shift."""
+    shift = max(_dyadic_shift(plan, s, function) for s in range(len(plan.segments)))
+    values: list[int] = []
+    ends = [s.first_code for s in plan.segments[1:]] + [plan.temp_max_code + 1]
+    for s, (segment, end) in enumerate(zip(plan.segments, ends, strict=True)):
+        x_shift = 31 - (segment.gain.bit_length() - 1)
+        scaled = [
+            int(Fraction(float(c)) * Fraction(2) ** (shift - k * x_shift))
+            for k, c in enumerate(plan.real[s, function])
+        ]
+        for offset in range(segment.first_code - segment.origin_code, end - segment.origin_code):
+            value = scaled[-1]
+            for c in scaled[-2::-1]:
+                value = value * offset + c
+            values.append(value)
+    assert len(values) == len(codes)
+    return values, shift
+
+
+def _dyadic_shift(plan: Plan, s: int, function: int) -> int:
+    """Power of two that makes every coefficient, taken per code^k, an integer."""
+    x_shift = 31 - (plan.segments[s].gain.bit_length() - 1)
+    return max(
+        float(c).as_integer_ratio()[1].bit_length() - 1 + k * x_shift
+        for k, c in enumerate(plan.real[s, function])
+    )
+
+
+def _direct_errors(plan: Plan, state: State, codes: IntArray, axis: int) -> list[float]:
+    """Error in LSB, less the final 1/2, at every code."""
+    spare = plan.shape.output_shift - 32
+    columns = [state.gain[:, axis, j] for j in range(3)]
+    columns.append(state.offset[:, axis] - plan.shape.rounding_in_offset)
+    exact = [_exact_numerators(plan, codes, 4 * axis + j) for j in range(4)]
+    shift = max(s for _, s in exact)
+    lifts = [shift - s for _, s in exact]
+    errors = [
+        [
+            abs((found << shift) - (value << lift))
+            for found, value in zip(column.tolist(), values, strict=True)
+        ]
+        for column, (values, _), lift in zip(columns, exact, lifts, strict=True)
+    ]
+    box = plan.shape.raw_box
+    denominator = 1 << (shift + 32 + spare)
+    return [
+        ((e0 + e1 + e2) * box + (eb << 32)) / denominator
+        for e0, e1, e2, eb in zip(*errors, strict=True)
+    ]
+
+
+def _inverse_errors(plan: Plan, state: State, codes: IntArray, axis: int) -> list[float]:
+    """Error in LSB, less the final 1/2, against the exact inverse at every code."""
+    functions = [_exact_numerators(plan, codes, f) for f in range(12)]
+    shift = max(s for _, s in functions)
+    exact = [[v << (shift - s) for v in values] for values, s in functions]
+    shape = plan.shape
+    assert shape.inverse is not None
+    # K and its determinant are over 2^shift and 2^(3 shift); n = adj / det * 2^(shift + scale).
+    scale = shape.inverse.scale_log2
+    gain, offset = state.gain[:, axis].tolist(), state.offset[:, axis].tolist()
+    errors = []
+    for t in range(len(codes)):
+        adjugate, determinant = _exact_adjugate_row([exact[f][t] for f in range(12)], axis)
+        lift = max(0, -scale)
+        unit = determinant << lift
+        gain_error = sum(
+            abs(n * unit - (a << (shift + scale + lift)))
+            for n, a in zip(gain[t], adjugate, strict=True)
+        )
+        exact_offset = -sum(a * exact[4 * j + 3][t] for j, a in enumerate(adjugate))
+        offset_error = abs(
+            ((offset[t] - shape.rounding_in_offset) * unit << 32) - (exact_offset << (scale + lift))
+        )
+        denominator = abs(unit) << shape.output_shift
+        errors.append((gain_error * shape.raw_box + offset_error) / denominator)
+    return errors
+
+
+def _exact_adjugate_row(functions: list[int], row: int) -> tuple[list[int], int]:
+    """One row of the adjugate of K, and its determinant, of twelve functions in image order."""
+    K = [functions[4 * i : 4 * i + 3] for i in range(3)]
+    adjugate = []
+    for j in range(3):
+        a, b, c, d = (j + 1) % 3, (row + 1) % 3, (j + 2) % 3, (row + 2) % 3
+        adjugate.append(K[a][b] * K[c][d] - K[a][d] * K[c][b])
+    return adjugate, sum(adjugate[j] * K[j][row] for j in range(3))
