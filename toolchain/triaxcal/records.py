@@ -142,17 +142,23 @@ def _reading(row: Row, column: str, header: Header, unit: UnitDescription) -> fl
     if adc.code_min - 0.5 <= code <= adc.code_max + 0.5:
         return voltage_v
     low, high = (end * adc.volts_per_code for end in (adc.code_min, adc.code_max))
-    remedy = "the ADC was saturated, or [adc] does not describe it"
-    if header.reading_unit == "v" and low <= value / 1000.0 <= high:
-        remedy = "mV taken for V? if it is in mV, name the columns ux_mv, uy_mv, uz_mv"
-    elif header.reading_unit != "code" and adc.code_min <= value <= adc.code_max:
-        remedy = "if it is a code, name the columns ux_code, uy_code, uz_code"
     expected = {
         "v": f"{low:.10g} to {high:.10g} V",
         "mv": f"{low * 1000.0:.10g} to {high * 1000.0:.10g} mV",
         "code": f"{adc.code_min} to {adc.code_max}",
     }[header.reading_unit]
+    remedy = _range_remedy(value, header.reading_unit, adc)
     raise row.refuse(column, expected + ", the range of [adc]", remedy)
+
+
+def _range_remedy(value: float, reading_unit: str, adc: Adc) -> str:
+    # A little too large is a large reading; far too large is another unit.
+    if abs(volts(value, reading_unit, adc)) > 2.0 * adc.full_scale_v:
+        if reading_unit == "v" and abs(value) / 1000.0 <= adc.full_scale_v:
+            return "mV taken for V? if it is in mV, name the columns ux_mv, uy_mv, uz_mv"
+        if reading_unit != "code" and adc.code_min <= value <= adc.code_max:
+            return "if it is a code, name the columns ux_code, uy_code, uz_code"
+    return "the ADC was saturated, or [adc] does not describe it"
 
 
 def _deviation(row: Row, column: str, header: Header, unit: UnitDescription) -> float:
