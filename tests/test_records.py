@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from triaxcal.errors import RefusedError
 from triaxcal.records import Dwell, read_measurements, volts, write_measurements
+from triaxcal.records_csv import DEVIATIONS, READINGS
 from triaxcal.unitfile import (
     Adc,
     Limits,
@@ -100,6 +101,21 @@ def test_shipped_measurements_are_readable() -> None:
         folder = REPO / "units" / name
         read_back = read_measurements(folder / "measurements.csv", read_unit(folder))
         assert len(read_back.dwells) == dwells
+
+
+@pytest.mark.parametrize(("page", "rows"), [("file-formats.md", 2), ("add-a-unit.md", 1)])
+def test_the_example_of_the_docs_is_read(tmp_path: Path, page: str, rows: int) -> None:
+    text = (REPO / "docs" / page).read_text(encoding="utf-8")
+    blocks = [block for block in text.split("```")[1::2] if "\nTP1," in block]
+    assert len(blocks) == 1
+    assert len(read(tmp_path, blocks[0].lstrip("\n"))) == rows
+
+
+def test_the_docs_name_every_column() -> None:
+    text = (REPO / "docs/file-formats.md").read_text(encoding="utf-8")
+    columns = {"position", "temp_degc", "temp_code", "count"}
+    columns |= {c for names in READINGS.values() for c in names} | set(DEVIATIONS["v"])
+    assert all(f"`{column}`" in text for column in columns)
 
 
 def test_arrays_of_a_dwell_cannot_be_written(tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from strategies import unit_names
 from triaxcal.errors import RefusedError
 from triaxcal.unitfile import (
+    _LAYOUT,
+    METHODS,
     Adc,
     Limits,
     TemperatureSensor,
@@ -463,3 +465,26 @@ def test_a_copied_unit_is_told_by_its_serial(tmp_path: Path) -> None:
     shutil.copytree(REPO / "units/AT-SIM", tmp_path / "AT-NEW")
     with pytest.raises(RefusedError, match=r"AT-NEW/unit.toml, serial: .* of .*AT-SIM"):
         read_unit(tmp_path / "AT-NEW")
+
+
+# ---- docs/file-formats.md ----
+
+
+def test_the_docs_name_every_key_with_its_table() -> None:
+    text = (REPO / "docs/file-formats.md").read_text(encoding="utf-8")
+    section = text.split("## unit.toml")[1].split("## measurements.csv")[0]
+    table = ""
+    documented = set()
+    for line in section.split("Every key;")[1].split("Methods:")[0].splitlines():
+        cells = [cell.strip() for cell in line.split("|")]
+        if len(cells) > 2 and cells[2].startswith("`"):
+            table = cells[1].strip("`[]") or table
+            documented.add((table, cells[2].strip("`")))
+    assert documented == {(name, key) for name, keys in _LAYOUT.items() for key in keys}
+    assert all(f'`"{method}"`' in section for method in METHODS)
+
+
+def test_the_example_of_the_docs_is_read(tmp_path: Path) -> None:
+    text = (REPO / "docs/file-formats.md").read_text(encoding="utf-8")
+    example = text.split("```toml\n")[1].split("```")[0]
+    assert read_unit(make_unit(tmp_path, example)).serial == "SN-0042"
