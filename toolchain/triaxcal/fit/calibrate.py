@@ -1,0 +1,294 @@
+"""One unit's measurements -> its calibration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.fit.curves import (
+    TilterData,
+    curve_covariance,
+    fit_curves,
+    parameter_covariance,
+    shifted_voltage,
+)
+from triaxcal.fit.grouping import (
+    GroupedReadings,
+    TemperatureGroup,
+    check_position_dwells,
+    group_dwells,
+    grouped_readings,
+)
+from triaxcal.fit.plausibility import refuse_exchanged_positions, refuse_mistaken_units
+from triaxcal.fit.selection import (
+    PREFERENCE,
+    Candidate,
+    Selection,
+    candidate_shapes,
+    check_errors,
+    select,
+)
+from triaxcal.fit.thermal import (
+    EDGE_DEGC,
+    PIECEWISE_LINEAR,
+    ThermalShape,
+    refuse_undetermined,
+)
+from triaxcal.fit.tilter import (
+    constants_covariance,
+    constants_of,
+    design_matrix,
+    estimator_operators,
+    pooled_variance,
+    refuse_ill_conditioned,
+)
+from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.thermal import ThermalModel
+from triaxcal.model.types import FloatArray
+from triaxcal.records import Dwell, MeasurementSet
+from triaxcal.unitfile import UnitDescription
+
+_STEP_DEGC = 0.1
+"""A working range taken from the calibrated temperatures is rounded inward to this."""
+
+
+@dataclass(frozen=True)
+class CalibrationPoint:
+    """The constants at one calibration temperature.
+
+    Attributes
+    ----------
+    temp_degc : float
+    constants : array, shape (12,)
+        V/g and V, in the order of `CONSTANT_NAMES`.
+    covariance : array, shape (12, 12)
+    position_residual_g : float
+        Rms error of the force, per component, with these constants: noise and placement.
+    curve_residual_g : float
+        The same with the constants of the thermal curves.
+    """
+
+    temp_degc: float
+    constants: FloatArray
+    covariance: FloatArray
+    position_residual_g: float
+    curve_residual_g: float
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """A check dwell and |a| - g there, P1 (13), in g."""
+
+    dwell: Dwell
+    error_g: float
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The twelve constants of one unit over temperature, with their covariance.
+
+    Attributes
+    ----------
+    serial : str
+    estimator : str
+        One of `unitfile.ESTIMATORS`.
+    thermal : ThermalModel
+        The curves.
+    shape : ThermalShape
+        Their basis, to which `parameter_covariance` belongs.
+    range_degc : tuple of two floats
+        Working temperature range.
+    points : tuple of CalibrationPoint
+        By rising temperature.
+    parameter_covariance : array, shape (3, 4, P, 4, P)
+        Output; its constants K_ix, K_iy, K_iz, U0_i and their P parameters, twice.
+    covariance_source : str
+        Where the variances come from, in words.
+    candidates : tuple of Candidate
+        Every thermal function with the chosen estimator, and the chosen one with the others.
+    selection_reason : str
+        Why this candidate, in words.
+    check_dwells : tuple of CheckResult
+        In the order of the file.
+    """
+
+    serial: str
+    estimator: str
+    thermal: ThermalModel
+    shape: ThermalShape
+    range_degc: tuple[float, float]
+    points: tuple[CalibrationPoint, ...]
+    parameter_covariance: FloatArray
+    covariance_source: str
+    candidates: tuple[Candidate, ...]
+    selection_reason: str
+    check_dwells: tuple[CheckResult, ...]
+
+    def constants_covariance(self, temp_degc: FloatArray | float) -> FloatArray:
+        """Covariance of the curves' constants, (..., 12, 12), at temperatures of shape (...)."""
+        return curve_covariance(self.shape, self.parameter_covariance, temp_degc)
+
+
+def calibrate(unit: UnitDescription, measurements: MeasurementSet) -> Calibration:
+    """Fit the constants at each temperature, choose thermal function and estimator, fit curves.
+
+    Raises
+    ------
+    RefusedError
+        When the measurements are incomplete, contradict themselves or the unit's description, or
+        do not determine what it asks for.
+    """
+    groups = group_dwells(measurements, unit.t0_degc)
+    refuse_mistaken_units(measurements)
+    refuse_exchanged_positions(measurements.source, groups, unit.polarity)
+    _refuse_singular(measurements.source, groups, unit.gravity_g)
+    range_degc = _working_range(unit, groups)
+    readings = grouped_readings(groups, unit.adc.volts_per_code)
+    estimators = PREFERENCE if unit.estimator == "auto" else (unit.estimator,)
+    operators = [
+        estimator_operators(e, unit.gravity_g, readings.variance_v2, len(groups))
+        for e in estimators
+    ]
+    data = TilterData(readings, np.stack(operators), unit.gravity_g)
+    checks = check_position_dwells(measurements)
+    selection = _select(unit, data, estimators, checks)
+    chosen = data.only(estimators.index(selection.estimator))
+    return _calibration(unit, measurements, chosen, selection, range_degc)
+
+
+def _select(
+    unit: UnitDescription, data: TilterData, estimators: tuple[str, ...], checks: tuple[Dwell, ...]
+) -> Selection:
+    temps = data.readings.temps_degc
+    where = f"{unit.name}/unit.toml"
+    if unit.thermal.model == PIECEWISE_LINEAR and len(temps) < 2:
+        raise RefusedError(
+            f"{where}, [thermal] model",
+            f'"{PIECEWISE_LINEAR}" with one calibrated temperature ({temps[0]:.6g} degC)',
+            expected="two temperatures or more",
+            remedy='measure at more temperatures, or choose "polynomial" with order = 0',
+        )
+    shapes = candidate_shapes(unit.thermal, temps, unit.t0_degc)
+    asked_for = unit.thermal.model == PIECEWISE_LINEAR or unit.thermal.order is not None
+    if asked_for:
+        refuse_undetermined(where, shapes[0], temps)
+    return select(data, estimators, shapes, checks, asked_for=asked_for)
+
+
+def _calibration(
+    unit: UnitDescription,
+    measurements: MeasurementSet,
+    data: TilterData,
+    selection: Selection,
+    range_degc: tuple[float, float],
+) -> Calibration:
+    shape, readings = selection.shape, data.readings
+    parameters = fit_curves(data, shape)
+    shifted = shifted_voltage(readings, shape, parameters[0], unit.gravity_g)
+    variance, source = _variance(measurements, readings, shifted)
+    checks = check_position_dwells(measurements)
+    errors = check_errors(shape, parameters, checks, unit.gravity_g)[0]
+    return Calibration(
+        serial=unit.serial,
+        estimator=selection.estimator,
+        thermal=shape.model(parameters[0]),
+        shape=shape,
+        range_degc=range_degc,
+        points=_points(data, shape, parameters[0], shifted, variance),
+        parameter_covariance=parameter_covariance(data, shape, variance)[0],
+        covariance_source=source,
+        candidates=selection.candidates,
+        selection_reason=selection.reason,
+        check_dwells=tuple(
+            CheckResult(dwell, float(error)) for dwell, error in zip(checks, errors, strict=True)
+        ),
+    )
+
+
+def _points(
+    data: TilterData,
+    shape: ThermalShape,
+    parameters: FloatArray,
+    shifted: FloatArray,
+    variance_v2: FloatArray,
+) -> tuple[CalibrationPoint, ...]:
+    operators, temps = data.operators[0], data.readings.temps_degc
+    constants = constants_of(operators, shifted)
+    covariance = constants_covariance(operators, variance_v2)
+    force = design_matrix(data.gravity_g)[:, :3]
+    on_curve = shape.basis(temps) @ parameters.T
+    residuals = [
+        np.sqrt(np.mean((force_from_voltage(c[:, None], shifted) - force) ** 2, axis=(1, 2)))
+        for c in (constants, on_curve)
+    ]
+    return tuple(
+        CalibrationPoint(
+            temp_degc=float(temps[g]),
+            constants=constants[g],
+            covariance=covariance[g],
+            position_residual_g=float(residuals[0][g]),
+            curve_residual_g=float(residuals[1][g]),
+        )
+        for g in range(len(temps))
+    )
+
+
+def _variance(
+    measurements: MeasurementSet, readings: GroupedReadings, shifted: FloatArray
+) -> tuple[FloatArray, str]:
+    """Variances of the readings, shape (G, 6, 3), and where they come from."""
+    groups = len(readings.temps_degc)
+    pooled = pooled_variance(shifted)
+    if readings.variance_v2 is not None:
+        allowed = np.mean(readings.variance_v2, axis=(0, 1))
+        ratio = math.sqrt(float(np.mean(pooled / allowed)))
+        return readings.variance_v2, (
+            "the dwells' own statistics, sd^2 / count; readings scatter over the positions "
+            f"{ratio:.2f} times what they allow (1 is noise alone, more is placement)"
+        )
+    without = [
+        d.row
+        for d in measurements.dwells
+        if d.position.startswith("TP") and d.variance_of_mean_v2 is None
+    ]
+    rows = "the rows" if len(without) == 6 * groups else f"{len(without)} rows (first {without[0]})"
+    return np.broadcast_to(pooled, readings.voltage_v.shape), (
+        f"residuals over the positions, pooled over {groups} temperature{'s' * (groups != 1)} "
+        f"({2 * groups} degrees of freedom an output): {rows} carry no count and deviations"
+    )
+
+
+def _refuse_singular(source: str, groups: tuple[TemperatureGroup, ...], gravity_g: float) -> None:
+    operator = estimator_operators("equation-10", gravity_g, None, 1)[0]
+    for group in groups:
+        voltage = np.array([d.voltage_v for d in group.dwells])
+        where = f"{source}, rows {', '.join(str(d.row) for d in group.dwells)}"
+        refuse_ill_conditioned(where, group.temp_degc, constants_of(operator, voltage))
+
+
+def _working_range(
+    unit: UnitDescription, groups: tuple[TemperatureGroup, ...]
+) -> tuple[float, float]:
+    """Range of the description, or the calibrated one rounded inward to 0.1 degC.
+
+    One temperature alone is a range of +-0.5 degC.
+    """
+    low, high = groups[0].temp_degc, groups[-1].temp_degc
+    if unit.range_degc is None:
+        if len(groups) == 1:
+            return low - EDGE_DEGC, high + EDGE_DEGC
+        # The 1e-6 forgives the rounding of decimal temperatures: 0.3 / 0.1 is 2.9999999999999996.
+        steps = math.ceil(low / _STEP_DEGC - 1e-6), math.floor(high / _STEP_DEGC + 1e-6)
+        return round(steps[0] * _STEP_DEGC, 1), round(steps[1] * _STEP_DEGC, 1)
+    if unit.range_degc[0] < low - EDGE_DEGC or unit.range_degc[1] > high + EDGE_DEGC:
+        raise RefusedError(
+            f"{unit.name}/unit.toml, [thermal] range_degc",
+            f"{unit.range_degc[0]:g} to {unit.range_degc[1]:g} degC",
+            expected=f"within {EDGE_DEGC:g} degC of the calibrated temperatures, "
+            f"{low:.6g} to {high:.6g} degC",
+            remedy="narrow the range, or measure further out: curves are not extrapolated",
+        )
+    return unit.range_degc

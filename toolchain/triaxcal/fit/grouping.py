@@ -1,0 +1,181 @@
+"""Dwells in test positions -> groups of six, one group a nominal temperature.
+
+The file does not say which nominal temperature a dwell belongs to: it is read off the dwells.
+Sorted by temperature, a gap wider than `GROUP_GAP_DEGC` starts the next group. A chamber holds its
+temperature to a few tenths of a degree and calibration temperatures lie tens of degrees apart, so
+2 degC parts them with a wide margin on both sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
+from triaxcal.model.types import FloatArray
+from triaxcal.records import Dwell, MeasurementSet
+
+GROUP_GAP_DEGC = 2.0
+"""Dwells nearer than this are at one nominal temperature; also how near T0 its group must be."""
+
+
+@dataclass(frozen=True)
+class TemperatureGroup:
+    """The six test positions at one nominal temperature.
+
+    Attributes
+    ----------
+    temp_degc : float
+        Mean of the six dwells' temperatures.
+    dwells : tuple of six Dwell
+        TP1 to TP6.
+    """
+
+    temp_degc: float
+    dwells: tuple[Dwell, ...]
+
+
+@dataclass(frozen=True)
+class GroupedReadings:
+    """The groups as arrays; axes are (group, position TP1..TP6, output x, y, z).
+
+    Attributes
+    ----------
+    temps_degc : array, shape (G,)
+        Temperatures of the groups, rising.
+    dwell_temps_degc : array, shape (G, 6)
+    voltage_v : array, shape (G, 6, 3)
+    variance_v2 : array, shape (G, 6, 3), or None
+        Variances of the readings; None unless every dwell has its statistics.
+    """
+
+    temps_degc: FloatArray
+    dwell_temps_degc: FloatArray
+    voltage_v: FloatArray
+    variance_v2: FloatArray | None
+
+    def select(self, groups: list[int]) -> GroupedReadings:
+        """Only the groups with these indices."""
+        variance = None if self.variance_v2 is None else self.variance_v2[groups]
+        return GroupedReadings(
+            self.temps_degc[groups],
+            self.dwell_temps_degc[groups],
+            self.voltage_v[groups],
+            variance,
+        )
+
+
+def group_dwells(measurements: MeasurementSet, t0_degc: float) -> tuple[TemperatureGroup, ...]:
+    """Groups of the dwells in test positions, by rising temperature.
+
+    Raises
+    ------
+    RefusedError
+        When a position is missing or doubled at a temperature, or no temperature is at T0.
+    """
+    source = measurements.source
+    rows = [d for d in measurements.dwells if d.position in TEST_POSITIONS]
+    if not rows:
+        raise RefusedError(
+            source,
+            "no dwell in a test position",
+            expected="TP1 to TP6 at each calibration temperature",
+        )
+    clusters = _clusters(rows)
+    for cluster in clusters:
+        _refuse_doubled(source, cluster)
+    # The smallest first: one row with a wrong temperature spoils two groups, and shows there.
+    for cluster in sorted(clusters, key=len):
+        _refuse_incomplete(source, cluster)
+    groups = tuple(_group(cluster) for cluster in clusters)
+    nearest = min(abs(group.temp_degc - t0_degc) for group in groups)
+    if nearest > GROUP_GAP_DEGC:
+        found = ", ".join(f"{group.temp_degc:.6g}" for group in groups)
+        raise RefusedError(
+            source,
+            f"no dwells at T0 = {t0_degc:g} degC; temperatures found: {found} degC",
+            expected=f"TP1 to TP6 within {GROUP_GAP_DEGC:g} degC of T0",
+            remedy="measure there, or correct [thermal] t0_degc in unit.toml",
+        )
+    return groups
+
+
+def check_position_dwells(measurements: MeasurementSet) -> tuple[Dwell, ...]:
+    """Dwells in check positions, in the order of the file; each stands by itself."""
+    return tuple(d for d in measurements.dwells if d.position in CHECK_POSITIONS)
+
+
+def grouped_readings(
+    groups: tuple[TemperatureGroup, ...], volts_per_code: float
+) -> GroupedReadings:
+    """Arrays of the groups.
+
+    A reading never scatters less than the rounding to codes, variance code^2 / 12: a recorded
+    standard deviation below that (a quiet channel shows the same code throughout) is raised to
+    it, or its weight would be infinite.
+    """
+    least = volts_per_code**2 / 12.0
+    variances = [
+        np.maximum(d.sd_v**2, least) / d.count
+        for group in groups
+        for d in group.dwells
+        if d.sd_v is not None and d.count is not None
+    ]
+    known = len(variances) == 6 * len(groups)
+    return GroupedReadings(
+        temps_degc=np.array([group.temp_degc for group in groups]),
+        dwell_temps_degc=np.array([[d.temp_degc for d in group.dwells] for group in groups]),
+        voltage_v=np.array([[d.voltage_v for d in group.dwells] for group in groups]),
+        variance_v2=np.array(variances).reshape(len(groups), 6, 3) if known else None,
+    )
+
+
+def _clusters(rows: list[Dwell]) -> list[list[Dwell]]:
+    # The row breaks ties, so that equal temperatures keep the order of the file.
+    ordered = sorted(rows, key=lambda d: (d.temp_degc, d.row))
+    clusters = [[ordered[0]]]
+    for before, dwell in pairwise(ordered):
+        if dwell.temp_degc - before.temp_degc > GROUP_GAP_DEGC:
+            clusters.append([])
+        clusters[-1].append(dwell)
+    return clusters
+
+
+def _group(cluster: list[Dwell]) -> TemperatureGroup:
+    dwells = tuple(sorted(cluster, key=lambda d: d.position))
+    first = dwells[0].temp_degc
+    # Offsets from the first: the mean of six equal temperatures is then exactly that one.
+    mean = first + sum(d.temp_degc - first for d in dwells) / len(dwells)
+    return TemperatureGroup(temp_degc=mean, dwells=dwells)
+
+
+def _refuse_doubled(source: str, cluster: list[Dwell]) -> None:
+    seen: dict[str, Dwell] = {}
+    for dwell in sorted(cluster, key=lambda d: d.row):
+        first = seen.setdefault(dwell.position, dwell)
+        if first is not dwell:
+            raise RefusedError(
+                f"{source}, rows {first.row} and {dwell.row}",
+                f"{dwell.position} twice at one temperature "
+                f"({first.temp_degc:.6g} and {dwell.temp_degc:.6g} degC)",
+                expected=f"each position once; temperatures within {GROUP_GAP_DEGC:g} degC "
+                "of the next are one",
+                remedy="remove one of the rows, or correct its position or temperature",
+            )
+
+
+def _refuse_incomplete(source: str, cluster: list[Dwell]) -> None:
+    present = {d.position: d.row for d in cluster}
+    missing = [p for p in TEST_POSITIONS if p not in present]
+    if missing:
+        there = ", ".join(f"{p} (row {present[p]})" for p in sorted(present))
+        temp = sum(d.temp_degc for d in cluster) / len(cluster)
+        raise RefusedError(
+            source,
+            f"{', '.join(missing)} missing at {temp:.6g} degC, where there is only {there}",
+            expected="TP1 to TP6 at each calibration temperature",
+            remedy="measure what is missing, or correct the position or temperature of a row",
+        )
