@@ -12,10 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strategies import forces_g, temperatures_degc
+from strategies import constants, forces_g, temperatures_degc
 from triaxcal.errors import RefusedError
 from triaxcal.model.metrological import CONSTANT_NAMES, force_from_voltage, unpack_constants
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
+from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.records import Dwell, read_measurements
 from triaxcal.simulation.dwells import simulate
@@ -238,6 +239,23 @@ def test_without_noise_the_codes_are_the_exact_ones(
         np.testing.assert_array_equal(dwell.voltage_v, exact * unit.adc.volts_per_code)
         assert dwell.sd_v is not None
         np.testing.assert_array_equal(dwell.sd_v, np.zeros(3))
+
+
+@given(constants())
+def test_equation_10_finds_any_constants_again(expected: FloatArray) -> None:
+    """Without noise and thermal curves, to the rounding of the codes."""
+    unit = read_unit(SIM)
+    curves = PiecewisePolynomial((-200.0, 400.0), (20.0,), expected[None, :, None])
+    truth = Truth(ThermalModel("polynomial", 20.0, curves), 0.0, 0.0, 0.0)
+    dwells = simulate(unit, truth, Plan(1, 2, (20.0,), ())).dwells
+    U = {dwell.position: dwell.voltage_v for dwell in dwells}
+    K, U0 = unpack_constants(expected)
+    pairs = (("TP6", "TP5"), ("TP4", "TP2"), ("TP1", "TP3"))
+    # Each reading is off by half a code at most; means and half differences are off by no more.
+    half_code_v = unit.adc.volts_per_code / 2 * (1 + 1e-6)
+    for j, (plus, minus) in enumerate(pairs):
+        assert np.all(np.abs((U[plus] - U[minus]) / 2 - K[:, j] * unit.gravity_g) <= half_code_v)
+        assert np.all(np.abs((U[plus] + U[minus]) / 2 - U0) <= half_code_v)
 
 
 @settings(max_examples=5)
