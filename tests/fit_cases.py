@@ -103,7 +103,9 @@ def readings(
         for position in TEST_POSITIONS:
             temp = nominal + spread_degc * random.uniform(-1.0, 1.0)
             force = specific_force_g(position, gravity_g)
-            dwells.append(dwell(truth, len(dwells) + 2, position, temp, force, sd_v, count, random))
+            row = len(dwells) + 2
+            noise = {"sd_v": sd_v, "count": count, "random": random}
+            dwells.append(dwell(truth, row, position, temp, force, **noise))
     return MeasurementSet("measurements.csv", tuple(dwells))
 
 
@@ -113,10 +115,12 @@ def dwell(
     position: str,
     temp_degc: float,
     force_g: FloatArray,
+    *,
     sd_v: float | FloatArray,
     count: int | None,
     random: np.random.Generator,
 ) -> Dwell:
+    """One dwell by P1 (9) with Gaussian noise of its mean."""
     sd = np.broadcast_to(np.asarray(sd_v, dtype=np.float64), (3,))
     voltage = voltage_from_force(truth(np.array(temp_degc)), force_g) + sd * random.normal(size=3)
     recorded = None if count is None else sd * np.sqrt(count)
@@ -142,7 +146,8 @@ def with_checks(
     for temp in temps_degc:
         for m, force in enumerate(forces):
             row = len(dwells) + 2
-            dwells.append(dwell(truth, row, f"CP{m + 1}", temp, force, sd_v, count, random))
+            noise = {"sd_v": sd_v, "count": count, "random": random}
+            dwells.append(dwell(truth, row, f"CP{m + 1}", temp, force, **noise))
     return MeasurementSet(measurements.source, tuple(dwells))
 
 

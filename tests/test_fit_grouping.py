@@ -1,0 +1,124 @@
+"""Dwells to groups: what belongs together, and every refusal by its text."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fit_cases import SEVEN, TABLE_TEMPS, cubic_truth, readings, with_checks
+from triaxcal.errors import RefusedError
+from triaxcal.fit.grouping import (
+    GROUP_GAP_DEGC,
+    check_position_dwells,
+    group_dwells,
+    grouped_readings,
+)
+from triaxcal.records import MeasurementSet
+
+
+def measured(temps=TABLE_TEMPS, **options) -> MeasurementSet:
+    return readings(cubic_truth(), temps, **options)
+
+
+def changed(measurements: MeasurementSet, row: int, **changes) -> MeasurementSet:
+    dwells = tuple(replace(d, **changes) if d.row == row else d for d in measurements.dwells)
+    return MeasurementSet(measurements.source, dwells)
+
+
+def refusal(measurements: MeasurementSet, t0_degc: float = 20.0) -> str:
+    with pytest.raises(RefusedError) as caught:
+        group_dwells(measurements, t0_degc)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_groups_rise_and_hold_the_positions_in_order():
+    shuffled = list(measured(SEVEN, spread_degc=0.1).dwells)
+    random.Random(1).shuffle(shuffled)
+    groups = group_dwells(MeasurementSet("m.csv", tuple(shuffled)), 20.0)
+    assert [round(g.temp_degc) for g in groups] == list(SEVEN)
+    for group in groups:
+        assert [d.position for d in group.dwells] == ["TP1", "TP2", "TP3", "TP4", "TP5", "TP6"]
+        # Mean of six within 0.1 degC of each other: rounding of a sum of six, no more.
+        mean = np.mean([d.temp_degc for d in group.dwells])
+        assert group.temp_degc == pytest.approx(mean, abs=1e-13)
+
+
+@pytest.mark.parametrize("temp", [20.1, -39.97, 0.1, 1 / 3])
+def test_equal_temperatures_have_exactly_that_mean(temp):
+    group = group_dwells(measured([temp]), temp)[0]
+    assert group.temp_degc == temp
+
+
+def test_check_positions_are_not_grouped():
+    both = with_checks(measured(), cubic_truth(), (20.0, 30.0))
+    assert len(group_dwells(both, 20.0)) == 3
+    assert [d.position for d in check_position_dwells(both)] == [f"CP{i}" for i in range(1, 7)] * 2
+
+
+@pytest.mark.parametrize("row", range(2, 20))
+def test_a_missing_position_is_named_with_its_temperature(row):
+    full = measured()
+    gone = full.dwells[row - 2]
+    rest = MeasurementSet(full.source, tuple(d for d in full.dwells if d.row != row))
+    message = refusal(rest)
+    assert message.startswith(
+        f"measurements.csv: {gone.position} missing at {gone.temp_degc:g} degC, "
+        "where there is only TP"
+    )
+
+
+def test_several_missing_positions_are_all_named():
+    full = measured()
+    rest = MeasurementSet(full.source, full.dwells[3:])
+    message = refusal(rest)
+    assert "TP1, TP2, TP3 missing at -40 degC, where there is only TP4 (row 5)" in message
+
+
+def test_a_doubled_position_names_both_rows():
+    message = refusal(changed(measured(), 4, position="TP1"))
+    assert message.startswith("measurements.csv, rows 2 and 4: TP1 twice at one temperature")
+    assert "-40 and -40 degC" in message
+
+
+def test_a_wrong_temperature_shows_where_it_is_odd():
+    message = refusal(changed(measured(), 10, temp_degc=200.0))
+    assert "TP1, TP2, TP4, TP5, TP6 missing at 200 degC" in message
+    assert "only TP3 (row 10)" in message
+
+
+def test_no_dwells_at_t0_lists_the_temperatures():
+    message = refusal(measured((-40.0, 17.9, 70.0)))
+    assert "no dwells at T0 = 20 degC; temperatures found: -40, 17.9, 70 degC" in message
+    group_dwells(measured((-40.0, 18.1, 70.0)), 20.0)  # within the tolerance
+
+
+def test_no_dwells_at_all():
+    checks = with_checks(MeasurementSet("m.csv", ()), cubic_truth(), (20.0,))
+    assert refusal(checks).startswith("m.csv: no dwell in a test position")
+
+
+def test_the_gap_parts_groups():
+    near, far = GROUP_GAP_DEGC - 0.01, GROUP_GAP_DEGC + 0.01
+    assert "TP1 twice" in refusal(measured((20.0, 20.0 + near)))
+    assert len(group_dwells(measured((20.0, 20.0 + far)), 20.0)) == 2
+
+
+def test_arrays_carry_the_statistics_only_when_every_dwell_has_them():
+    full = measured(sd_v=1e-6, count=100)
+    arrays = grouped_readings(group_dwells(full, 20.0), volts_per_code=1e-9)
+    assert arrays.variance_v2 is not None
+    # (1e-6 sqrt(100))^2 / 100 with three roundings.
+    np.testing.assert_allclose(arrays.variance_v2, 1e-12, rtol=4 * np.finfo(float).eps)
+    arrays = grouped_readings(group_dwells(changed(full, 7, count=None), 20.0), 1e-9)
+    assert arrays.variance_v2 is None
+
+
+def test_a_quiet_channel_has_the_variance_of_its_codes():
+    quiet = measured(sd_v=0.0, count=50)
+    arrays = grouped_readings(group_dwells(quiet, 20.0), volts_per_code=3e-7)
+    assert arrays.variance_v2 is not None
+    np.testing.assert_array_equal(arrays.variance_v2, 3e-7**2 / 12.0 / 50)
