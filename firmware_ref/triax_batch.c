@@ -29,3 +29,12 @@ uint32_t triax_batch_image(const uint8_t *image, size_t size, size_t count, cons
     }
     return loaded;
 }
+
+const char *triax_batch_compiler(void)
+{
+#ifdef __VERSION__
+    return __VERSION__;
+#else
+    return "unknown";
+#endif
+}

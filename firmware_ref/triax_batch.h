@@ -13,4 +13,7 @@ void triax_batch(size_t count, const int32_t *temp_code, const int32_t *raw_code
 uint32_t triax_batch_image(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
                            const int32_t *raw_code, int32_t *accel, uint32_t *status);
 
+/* Version of the compiler that built this. */
+const char *triax_batch_compiler(void);
+
 #endif

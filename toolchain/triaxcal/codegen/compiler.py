@@ -67,9 +67,9 @@ class Compilation:
 
     def cancel(self) -> None:
         """Stop it, if it still runs."""
-        if self.process.poll() is None:
+        if self.process.returncode is None:
             self.process.kill()
-        self.process.communicate()
+            self.process.communicate()
 
 
 def compile_library(

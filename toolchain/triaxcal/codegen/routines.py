@@ -69,6 +69,13 @@ class Generated:
 
     library: ctypes.CDLL
 
+    @property
+    def compiler(self) -> str:
+        """Version of the compiler that built it."""
+        function = self.library.triax_batch_compiler
+        function.restype = ctypes.c_char_p
+        return bytes(function()).decode()
+
     def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
         """Answers with the compiled-in constants."""
         accel, status = _outputs(len(temp))

@@ -1,0 +1,75 @@
+"""The command line. The only place that prints, reads arguments and exits."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import click
+
+from triaxcal import __version__
+from triaxcal.errors import RefusedError
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="triaxcal")
+def main() -> None:
+    """From tilter readings of a triaxial accelerometer to verified fixed-point C."""
+
+
+@main.command()
+@click.argument("unit", type=click.Path(path_type=Path))
+@click.option(
+    "--build",
+    type=click.Path(path_type=Path),
+    default=Path("build"),
+    show_default=True,
+    help="Folder that receives a folder of the unit's name.",
+)
+def calib(unit: Path, build: Path) -> None:
+    """Calibrate UNIT, a folder with unit.toml and measurements.csv, and write its C."""
+    from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
+    from triaxcal.publish import publish  # noqa: PLC0415
+    from triaxcal.report.files import all_files  # noqa: PLC0415
+    from triaxcal.report.summary import summary  # noqa: PLC0415
+
+    delivery = deliver(unit)
+    files = all_files(delivery)
+    target = build / delivery.unit.name
+    publish(files, target)
+    click.echo(summary(delivery, files, str(target)))
+
+
+@main.command()
+@click.argument("unit", type=click.Path(path_type=Path))
+@click.option("--seed", type=int, help="Replaces the seed of truth.toml.")
+def simulate(unit: Path, seed: int | None) -> None:
+    """Write measurements.csv of UNIT, a folder with unit.toml and truth.toml (or tables.toml)."""
+    from triaxcal.simulation.unit import write_simulated_unit  # noqa: PLC0415
+
+    click.echo(f"{write_simulated_unit(unit, seed)} written")
+
+
+def entry() -> None:
+    """Run the command line; one line and an exit code for whatever a user can cause."""
+    try:
+        main.main(standalone_mode=False)
+    except RefusedError as refusal:
+        _leave(f"triaxcal: {refusal}", refusal.exit_code)
+    except click.exceptions.Exit as leaving:
+        sys.exit(leaving.exit_code)
+    except click.ClickException as wrong:
+        wrong.show()
+        sys.exit(2)
+    except (KeyboardInterrupt, click.Abort):
+        _leave("triaxcal: interrupted: nothing was written", 1)
+    except BrokenPipeError:
+        # The reader of our output went away; what was to be written has been.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+
+
+def _leave(message: str, code: int) -> None:
+    click.echo(message, err=True)
+    sys.exit(code)

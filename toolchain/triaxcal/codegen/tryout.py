@@ -1,0 +1,126 @@
+"""The compiled C on the unit's own dwells: | |a| - g | before and after, P1 (13), figures 5, 6."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.codegen.routines import Routine
+from triaxcal.errors import RefusedError
+from triaxcal.fixedpoint.integer_model import STATUS_OK
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g
+from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.thermal import ThermalModel
+from triaxcal.model.types import FloatArray
+from triaxcal.records import Dwell, MeasurementSet
+from triaxcal.unitfile import UnitDescription
+
+BEFORE = "before"
+T0_TOLERANCE_DEGC = 2.0
+"""A dwell this near to T0 counts as one at T0, for the limits of P1 (13)."""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """|a| - g at one dwell, in g."""
+
+    dwell: Dwell
+    at_t0: bool
+    error_g: float
+
+
+@dataclass(frozen=True)
+class MethodResult:
+    """Residuals of one method, in the order of the dwells; empty when it was refused, and why."""
+
+    method: str
+    residuals: tuple[Residual, ...]
+    refusal: str
+
+
+def run_on_dwells(
+    unit: UnitDescription,
+    thermal: ThermalModel,
+    range_degc: tuple[float, float],
+    measurements: MeasurementSet,
+    routines: Mapping[str, Routine | RefusedError],
+) -> tuple[MethodResult, ...]:
+    """Residuals before compensation (constants of T0), then of each routine.
+
+    Dwells outside the working range are left out.
+
+    Raises
+    ------
+    RefusedError
+        When a routine flags one of the unit's own dwells.
+    """
+    sensor = unit.temperature_sensor
+    half_code = 0.5 * sensor.degc_per_code
+    dwells = [
+        d for d in measurements.dwells
+        if range_degc[0] - half_code <= d.temp_degc <= range_degc[1] + half_code
+    ]  # fmt: skip
+    voltages = np.array([d.voltage_v for d in dwells])
+    raw = np.rint(voltages / unit.adc.volts_per_code).clip(unit.adc.code_min, unit.adc.code_max)
+    temp = np.array([sensor.code(d.temp_degc) for d in dwells])
+    codes = temp.astype(np.int32), np.ascontiguousarray(raw.astype(np.int32))
+    at_t0 = thermal.constants_at(unit.t0_degc)
+    results = [_result(BEFORE, unit, dwells, force_from_voltage(at_t0, voltages))]
+    for method, routine in routines.items():
+        if isinstance(routine, RefusedError):
+            results.append(MethodResult(method, (), str(routine)))
+            continue
+        accel, status = routine(*codes)
+        _refuse_flags(measurements.source, method, dwells, status)
+        results.append(
+            _result(method, unit, dwells, accel.astype(np.float64) * 2.0**-unit.output_q)
+        )
+    return tuple(results)
+
+
+def _refuse_flags(
+    source: str,
+    method: str,
+    dwells: list[Dwell],
+    status: np.ndarray[tuple[int, ...], np.dtype[np.uint32]],
+) -> None:
+    # A dwell half a code beyond an end of the range is clamped to it by intention.
+    flagged = np.flatnonzero(status & ~np.uint32(3))
+    if len(flagged):
+        raise RefusedError(
+            f"{source}, row {dwells[int(flagged[0])].row}",
+            f"the compiled C flags this dwell with status {status[flagged[0]]} (method {method})",
+            expected=f"status {STATUS_OK}",
+            remedy="check adc.code_min, adc.code_max and compensation.output_q",
+        )
+
+
+def _result(
+    method: str, unit: UnitDescription, dwells: list[Dwell], force_g: FloatArray
+) -> MethodResult:
+    errors = np.linalg.norm(force_g, axis=1) - unit.gravity_g
+    residuals = tuple(
+        Residual(d, abs(d.temp_degc - unit.t0_degc) <= T0_TOLERANCE_DEGC, float(e))
+        for d, e in zip(dwells, errors, strict=True)
+    )
+    return MethodResult(method, residuals, "")
+
+
+def model_error_g(unit: UnitDescription, thermal: ThermalModel, plan: Plan) -> float:
+    """Largest error of the plan's real functions against K(T)^-1 (U - U0(T)), in g.
+
+    Over every temperature code of the range and every raw code of the declared range.
+    """
+    rows = plan.real_rows()
+    shape = plan.shape
+    gain_unit = 2.0 ** -(shape.output_q + shape.output_shift)
+    gain = rows[:, :, :3] * (gain_unit / plan.volts_per_lsb)
+    offset = rows[:, :, 3] * (gain_unit * 2.0**32)
+    sensor = unit.temperature_sensor
+    temps = plan.temp_codes.astype(np.float64) * sensor.degc_per_code + sensor.degc_at_zero
+    exact = exact_gain_and_offset(thermal.constants_at(temps))
+    voltage_max_v = shape.raw_box * plan.volts_per_lsb
+    return float(worst_force_error_g((gain, offset), exact, voltage_max_v).max())

@@ -1,0 +1,142 @@
+"""calibration.json and verification.json: what was found and what was checked, for machines."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from typing import Any
+
+from triaxcal import __version__
+from triaxcal.codegen.compiler import FLAGS
+from triaxcal.codegen.render import shape_id
+from triaxcal.codegen.tryout import BEFORE
+from triaxcal.delivery import Delivery
+from triaxcal.fit.thermal import relative_coefficients
+from triaxcal.model.metrological import CONSTANT_NAMES
+from triaxcal.model.types import FloatArray
+
+FORMAT = 1
+
+
+def calibration_json(delivery: Delivery) -> bytes:
+    """Constants, curves, covariance and provenance; docs/file-formats.md has the layout."""
+    calibration = delivery.calibration
+    curves = calibration.thermal.curves
+    document = {
+        **_header(delivery),
+        "constants": list(CONSTANT_NAMES),
+        "units": ["V/g"] * 9 + ["V"] * 3,
+        "estimator": calibration.estimator,
+        "thermal_model": {
+            "kind": calibration.thermal.kind,
+            "label": calibration.shape.label,
+            "t0_degc": calibration.thermal.t0_degc,
+            "breaks_degc": list(curves.breaks_degc),
+            "origins_degc": list(curves.origins_degc),
+            "coefficients": curves.coefficients.tolist(),
+        },
+        "temperature_coefficients": _numbers(relative_coefficients(calibration.thermal)),
+        "range_degc": list(calibration.range_degc),
+        "at_t0": calibration.thermal.constants_at(calibration.thermal.t0_degc).tolist(),
+        "points": [
+            {
+                "temp_degc": point.temp_degc,
+                "constants": point.constants.tolist(),
+                "covariance": point.covariance.tolist(),
+                "position_residual_g": point.position_residual_g,
+                "curve_residual_g": point.curve_residual_g,
+            }
+            for point in calibration.points
+        ],
+        "parameter_covariance": calibration.parameter_covariance.tolist(),
+        "covariance_source": calibration.covariance_source,
+        "candidates": [
+            {
+                "label": c.label,
+                "estimator": c.estimator,
+                "parameters": c.parameters,
+                "held_out_g": c.held_out_g,
+                "fit_residual_g": c.fit_residual_g,
+                "chosen": c.chosen,
+            }
+            for c in calibration.candidates
+        ],
+        "selection_reason": calibration.selection_reason,
+    }
+    return _dump(document)
+
+
+def verification_json(delivery: Delivery) -> bytes:
+    """What was checked, on how many vectors, and what was proven."""
+    plan, bound, check = delivery.plan, delivery.bound, delivery.check
+    lsb_g = 2.0**-plan.shape.output_q
+    document = {
+        **_header(delivery),
+        "compiler": delivery.compiler,
+        "compiler_flags": list(FLAGS),
+        "shape": shape_id(plan),
+        "method": delivery.unit.method,
+        "model_error_g": delivery.model_error_g,
+        "arithmetic_bound": {
+            "lsb": bound.lsb,
+            "g": bound.lsb * lsb_g,
+            "per_axis_lsb": list(bound.per_axis_lsb),
+            "temp_code": bound.temp_code,
+            "temp_codes_visited": bound.codes,
+            "largest_seen_lsb": check.largest_error_lsb,
+        },
+        "cross_check": {
+            "implementations": ["Python integer model", "reference C", "generated C"],
+            "vectors": check.vectors,
+            "mismatches": 0,
+        },
+        "residuals_g": {
+            m.method: [
+                {
+                    "row": r.dwell.row,
+                    "position": r.dwell.position,
+                    "temp_degc": r.dwell.temp_degc,
+                    "error_g": r.error_g,
+                }
+                for r in m.residuals
+            ]
+            for m in delivery.methods
+        },
+        "refused_methods": {m.method: m.refusal for m in delivery.methods if m.refusal},
+        "before": f"'{BEFORE}' is the model with the constants of T0",
+        "limits_g": {
+            "at_t0": delivery.unit.limits.at_t0_g,
+            "over_range": delivery.unit.limits.over_range_g,
+        },
+        "files_sha256": {
+            name: hashlib.sha256(content).hexdigest() for name, content in delivery.files.items()
+        },
+    }
+    return _dump(document)
+
+
+def _header(delivery: Delivery) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "triaxcal": __version__,
+        "unit": delivery.unit.name,
+        "serial": delivery.unit.serial,
+        "inputs_sha256": delivery.inputs_sha256,
+    }
+
+
+def _dump(document: dict[str, Any]) -> bytes:
+    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _numbers(array: FloatArray) -> Any:
+    """Nested lists of an array; what is not a number becomes null."""
+    values: Any = array.tolist()
+    return _without_nan(values)
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if math.isnan(value) else value

@@ -1,0 +1,167 @@
+"""The terminal's summary of one delivery: short, aligned, in mg, micro-g, LSB and degC."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from triaxcal.delivery import Delivery
+from triaxcal.fit.calibrate import Calibration
+from triaxcal.model.metrological import unpack_constants
+from triaxcal.model.positions import AXES
+from triaxcal.report.temperatures import by_temperature
+
+_LABEL = 16
+
+
+def summary(delivery: Delivery, files: Iterable[str], where: str) -> str:
+    """Text of the summary; `files` lie in the folder `where`."""
+    blocks = [
+        _head(delivery),
+        _constants(delivery.calibration),
+        _candidates(delivery.calibration),
+        _residuals(delivery),
+        _verdict(delivery),
+        _entry("files", f"{where}/", *_wrap("  ".join(sorted(files)))),
+    ]
+    return "\n\n".join(blocks)
+
+
+def _entry(label: str, *lines: str) -> str:
+    indent = "\n" + " " * _LABEL
+    return f"{label:<{_LABEL}}" + indent.join(lines)
+
+
+def _wrap(text: str, width: int = 80 - _LABEL) -> list[str]:
+    lines = [""]
+    for word in text.split(" "):
+        if len(lines[-1]) + len(word) + 1 > width and lines[-1]:
+            lines.append("")
+        lines[-1] += (" " if lines[-1] else "") + word
+    return [line.strip() for line in lines]
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Columns two spaces apart, the first to the left, the others to the right."""
+    cells = [list(head), *map(list, rows)]
+    widths = [max(len(row[c]) for row in cells) for c in range(len(head))]
+    return [
+        "  ".join(
+            cell.ljust(width) if c == 0 else cell.rjust(width)
+            for c, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in cells
+    ]
+
+
+def _head(delivery: Delivery) -> str:
+    calibration, plan = delivery.calibration, delivery.plan
+    temps = ", ".join(f"{p.temp_degc:+.0f}" for p in calibration.points)
+    checks = len(calibration.check_dwells)
+    low, high = calibration.range_degc
+    measured = f"{len(delivery.measurements.dwells)} dwells: six positions at {temps} degC"
+    if checks:
+        measured += f"; {checks} check dwells"
+    method = f"{delivery.unit.method}: {_method_words(delivery)}"
+    return "\n".join(
+        [
+            _entry("unit", f"{delivery.unit.name}  (serial {delivery.unit.serial})"),
+            _entry("measured", *_wrap(measured)),
+            _entry("thermal model", *_wrap(calibration.selection_reason)),
+            _entry("method", *_wrap(method)),
+            _entry(
+                "range",
+                f"{low:g} to {high:g} degC, {_thousands(delivery.bound.codes)} temperature codes; "
+                f"LSB 2^-{plan.shape.output_q} g",
+            ),
+        ]
+    )
+
+
+def _thousands(number: int) -> str:
+    return f"{number:,}".replace(",", " ")
+
+
+def _method_words(delivery: Delivery) -> str:
+    shape = delivery.plan.shape
+    segments = "one segment" if shape.segments == 1 else f"{shape.segments} segments"
+    what = {"direct": "N(T) and offset", "inverse": "K(T) and U0(T), inverted on the device,"}
+    return (
+        f"{what[shape.form]} of order {shape.order} on {segments}; within "
+        f"{delivery.model_error_g * 1e6:.3g} micro-g of K(T)^-1 (U - U0(T)) for every raw code"
+    )
+
+
+def _constants(calibration: Calibration) -> str:
+    t0 = calibration.thermal.t0_degc
+    K, U0 = unpack_constants(calibration.thermal.constants_at(t0))
+    rows = [
+        [
+            f"  {axis}",
+            *(f"{K[i, j]:+.8f}" for j in range(3)),
+            f"{U0[i] * 1e3:+.5f}",
+        ]
+        for i, axis in enumerate(AXES)
+    ]
+    head = [f"constants at {t0:g} degC", "K.x V/g", "K.y V/g", "K.z V/g", "U0 mV"]
+    return "\n".join(_table(head, rows))
+
+
+def _candidates(calibration: Calibration) -> str:
+    rows = [
+        [
+            f"{'*' if c.chosen else ' '} {c.label}",
+            c.estimator,
+            str(c.parameters),
+            _micro_g(c.fit_residual_g),
+            "-" if c.held_out_g is None else _micro_g(c.held_out_g),
+        ]
+        for c in calibration.candidates
+    ]
+    head = ["candidates, rms micro-g", "bias estimator", "parameters", "fitted", "held out"]
+    return "\n".join(_table(head, rows))
+
+
+def _micro_g(value_g: float) -> str:
+    return f"{value_g * 1e6:.2f}" if value_g < 1e-4 else f"{value_g * 1e6:.0f}"
+
+
+def _residuals(delivery: Delivery) -> str:
+    """Largest | |a| - g | per temperature and method: figures 5 and 6 of P1 as a table."""
+    methods = [m for m in delivery.methods if m.residuals]
+    rows = []
+    for kind, prefix in (("test", "TP"), ("check", "CP")):
+        for temp, indices in by_temperature(methods[0], prefix):
+            largest = [max(abs(m.residuals[i].error_g) for i in indices) for m in methods]
+            rows.append([f"  {temp:+.0f} degC, {kind}", *(f"{v * 1e3:.4f}" for v in largest)])
+    names = [m.method.replace("additive-", "add.-") for m in methods]
+    head = ["max | |a| - g |, mg", *names]
+    lines = _table(head, rows)
+    lines += [f"  {m.method}: {m.refusal}" for m in delivery.methods if m.refusal]
+    return "\n".join(lines)
+
+
+def _verdict(delivery: Delivery) -> str:
+    bound, check, limits = delivery.bound, delivery.check, delivery.unit.limits
+    q = delivery.plan.shape.output_q
+    chosen = next(m for m in delivery.methods if m.method == delivery.unit.method)
+    at_t0 = max((abs(r.error_g) for r in chosen.residuals if r.at_t0), default=0.0)
+    over = max(abs(r.error_g) for r in chosen.residuals)
+    return "\n".join(
+        [
+            _entry(
+                "arithmetic",
+                f"proven error <= {bound.lsb:.3f} LSB ({bound.lsb * 1e6 / 2**q:.3f} micro-g); "
+                f"largest seen {check.largest_error_lsb:.3f}",
+            ),
+            _entry(
+                "cross-check",
+                f"{_thousands(check.total)} vectors: "
+                "Python = reference C = generated C, bit for bit",
+            ),
+            _entry(
+                "passed",
+                f"{at_t0 * 1e3:.4f} mg at T0 (limit {limits.at_t0_g * 1e3:g}), "
+                f"{over * 1e3:.4f} mg over the range (limit {limits.over_range_g * 1e3:g})",
+            ),
+        ]
+    )

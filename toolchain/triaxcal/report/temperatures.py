@@ -1,0 +1,24 @@
+"""Residuals grouped by temperature, as tables and pictures show them."""
+
+from __future__ import annotations
+
+from triaxcal.codegen.tryout import MethodResult
+
+SAME_TEMPERATURE_DEGC = 1.0
+"""Dwells nearer than this are shown as one temperature."""
+
+
+def by_temperature(result: MethodResult, prefix: str) -> list[tuple[float, list[int]]]:
+    """Mean temperature and indices of the dwells whose position starts with `prefix`."""
+    temps = {
+        i: residual.dwell.temp_degc
+        for i, residual in enumerate(result.residuals)
+        if residual.dwell.position.startswith(prefix)
+    }
+    groups: list[list[int]] = []
+    for i in sorted(temps, key=lambda i: temps[i]):
+        if groups and temps[i] - temps[groups[-1][-1]] < SAME_TEMPERATURE_DEGC:
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    return [(sum(temps[i] for i in group) / len(group), group) for group in groups]
