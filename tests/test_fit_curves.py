@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -107,7 +109,7 @@ def test_the_solution_is_where_rounds_of_fitting_and_shifting_end(kind, estimato
     distance = [np.abs(p - direct).max() for p in rounds(data, shape, estimator, 5)]
     floor = 20 * EPS * amplification(shape, temps)
     # Spread 0.1 degC against groups 15 degC apart, amplified by the fit: each round gains 20 times.
-    for before, after in zip(distance, distance[1:], strict=False):
+    for before, after in pairwise(distance):
         assert after <= max(before / 20.0, floor)
     assert distance[0] > 1e-8
     assert distance[4] <= 1e-13

@@ -64,7 +64,7 @@ def cramer(deltas: list[Fraction], values: list[Fraction]) -> list[Fraction]:
     matrix = [[d ** (n + 1) for n in range(len(deltas))] for d in deltas]
     whole = determinant(matrix)
     return [
-        determinant([row[:n] + [v] + row[n + 1 :] for row, v in zip(matrix, values, strict=True)])
+        determinant([[*row[:n], v, *row[n + 1 :]] for row, v in zip(matrix, values, strict=True)])
         / whole
         for n in range(len(deltas))
     ]

@@ -254,10 +254,12 @@ def _variance(
         for d in measurements.dwells
         if d.position.startswith("TP") and d.variance_of_mean_v2 is None
     ]
-    rows = "the rows" if len(without) == 6 * groups else f"{len(without)} rows (first {without[0]})"
+    rows = f"{len(without)} row{'s' * (len(without) != 1)}, first row {without[0]}"
+    if len(without) == 6 * groups:
+        rows = "all rows"
     return np.broadcast_to(pooled, readings.voltage_v.shape), (
         f"residuals over the positions, pooled over {groups} temperature{'s' * (groups != 1)} "
-        f"({2 * groups} degrees of freedom an output): {rows} carry no count and deviations"
+        f"({2 * groups} degrees of freedom an output): count and deviations are missing in {rows}"
     )
 
 

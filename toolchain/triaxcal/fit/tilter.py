@@ -44,12 +44,14 @@ def estimator_operators(
     variance_v2 : array, shape (G, 6, 3), or None
         Weights of least squares; None weights all positions alike.
     """
-    if estimator == "least-squares":
-        return _least_squares(design_matrix(gravity_g), variance_v2, groups)
+    if estimator == "least-squares" and variance_v2 is not None:
+        return _weighted_least_squares(design_matrix(gravity_g), variance_v2)
     own = _FORCES.T != 0.0
+    # With equal weights the columns of A are orthogonal: K is P1 (10), U0 the mean of all six.
+    bias = {"equation-10": ~own / 4.0, "least-squares": np.full((3, 6), 1 / 6), "half-sum": own / 2}
     operator = np.zeros((3, 4, 6))
     operator[:, :3] = _FORCES.T / (2.0 * gravity_g)
-    operator[:, 3] = own / 2.0 if estimator == "half-sum" else ~own / 4.0
+    operator[:, 3] = bias[estimator]
     return np.broadcast_to(operator, (groups, 3, 4, 6)).copy()
 
 
@@ -138,11 +140,9 @@ def refuse_ill_conditioned(where: str, temp_degc: float, constants: FloatArray) 
     )
 
 
-def _least_squares(design: FloatArray, variance_v2: FloatArray | None, groups: int) -> FloatArray:
-    if variance_v2 is None:
-        return np.broadcast_to(np.linalg.pinv(design), (groups, 3, 4, 6)).copy()
+def _weighted_least_squares(design: FloatArray, variance_v2: FloatArray) -> FloatArray:
     weights = 1.0 / np.swapaxes(variance_v2, -1, -2)[..., None, :]
-    weighted = design.T * (weights / weights.max())
+    weighted = design.T * (weights / weights.max(axis=-1, keepdims=True))
     # Condition number of the normal matrix: 3 times the spread of the weights, no more.
     solution: FloatArray = np.linalg.solve(weighted @ design, weighted)
     return solution
