@@ -10,8 +10,9 @@ from triaxcal.codegen.tryout import BEFORE, MethodResult
 from triaxcal.delivery import Delivery
 from triaxcal.report.temperatures import by_temperature
 
-PANEL_WIDTH, PANEL_HEIGHT = 132.0, 260.0
-LEFT, TOP, GAP = 64.0, 64.0, 10.0
+WIDTH = 960.0
+LEFT, RIGHT, TOP, GAP = 64.0, 16.0, 84.0, 8.0
+PANEL_HEIGHT, ROW_HEIGHT = 230.0, 290.0
 FLOOR_MG = 1e-5
 """Errors below this are drawn on the lowest line: a code of a 24-bit converter is more."""
 
@@ -27,59 +28,81 @@ COLOURS = {
 
 @dataclass(frozen=True)
 class _Scale:
-    """Logarithmic axis from 10^low to 10^high mg, top down."""
+    """Logarithmic axis from 10^high at `top` down to 10^low mg."""
 
     low: int
     high: int
+    top: float
 
     def y(self, error_mg: float) -> float:
         exponent = math.log10(max(abs(error_mg), 10.0**self.low))
-        return TOP + PANEL_HEIGHT * (self.high - exponent) / (self.high - self.low)
+        return _r(self.top + PANEL_HEIGHT * (self.high - exponent) / (self.high - self.low))
 
 
 def residuals_svg(delivery: Delivery) -> bytes:
-    """Draw one panel a temperature, one line a method, on a logarithmic axis in mg."""
+    """Draw a row of panels for test and one for check positions, one panel a temperature.
+
+    One line a method, on a logarithmic axis in mg.
+    """
     methods = [m for m in delivery.methods if m.residuals]
-    panels = [
-        (f"{temp:+.0f} degC", indices)
-        for prefix in ("TP", "CP")
-        for temp, indices in by_temperature(methods[0], prefix)
-    ]
     largest_mg = max(abs(r.error_g) * 1e3 for m in methods for r in m.residuals)
-    scale = _Scale(round(math.log10(FLOOR_MG)), math.ceil(math.log10(max(largest_mg, 1.0))))
-    limits = delivery.unit.limits
+    high = math.ceil(math.log10(max(largest_mg, 1.0)))
+    rows: list[dict[str, object]] = []
+    for prefix, title in (("TP", "test positions, fitted"), ("CP", "check positions, held out")):
+        groups = by_temperature(methods[0], prefix)
+        if groups:
+            scale = _Scale(round(math.log10(FLOOR_MG)), high, TOP + len(rows) * ROW_HEIGHT)
+            rows.append({"title": title, **_row(groups, delivery, scale)})
     context = {
         "title": f"{delivery.unit.name}: | |a| - g | before and after compensation, mg",
-        "width": LEFT + len(panels) * (PANEL_WIDTH + GAP) + GAP,
-        "height": TOP + PANEL_HEIGHT + 46,
+        "width": WIDTH,
+        "height": TOP + len(rows) * ROW_HEIGHT,
         "left": LEFT,
-        "right": LEFT + len(panels) * (PANEL_WIDTH + GAP) - GAP,
-        "top": TOP,
-        "bottom": TOP + PANEL_HEIGHT,
-        "ticks": [
-            {"y": _r(scale.y(10.0**e)), "label": f"{10.0**e:g}"}
-            for e in range(scale.low, scale.high + 1)
-        ],
-        "panels": [
-            {"title": title, **_panel(LEFT + i * (PANEL_WIDTH + GAP), indices, delivery, scale)}
-            for i, (title, indices) in enumerate(panels)
-        ],
+        "right": WIDTH - RIGHT,
+        "panel_height": PANEL_HEIGHT,
+        "floor": f"{FLOOR_MG:g}",
+        "rows": rows,
         "legend": _legend(methods, delivery.unit.method),
-        "limits": [
-            {"y": _r(scale.y(limits.at_t0_g * 1e3)), "label": "limit at T0"},
-            {"y": _r(scale.y(limits.over_range_g * 1e3)), "label": "limit over the range"},
-        ],
     }
     return environment().get_template("residuals.svg.j2").render(context).encode()
 
 
-def _panel(x0: float, indices: list[int], delivery: Delivery, scale: _Scale) -> dict[str, object]:
+def _row(
+    groups: list[tuple[float, list[int]]], delivery: Delivery, scale: _Scale
+) -> dict[str, object]:
+    width = (WIDTH - LEFT - RIGHT - GAP * (len(groups) - 1)) / len(groups)
+    limits = delivery.unit.limits
+    return {
+        "top": scale.top,
+        "bottom": scale.top + PANEL_HEIGHT,
+        "ticks": [
+            {"y": scale.y(10.0**e), "label": f"{10.0**e:g}"}
+            for e in range(scale.low, scale.high + 1)
+        ],
+        "panels": [
+            {
+                "title": f"{temp:+.0f} degC",
+                "width": _r(width),
+                **_panel(LEFT + i * (width + GAP), width, indices, delivery, scale),
+            }
+            for i, (temp, indices) in enumerate(groups)
+        ],
+        "limits": [
+            {"y": scale.y(limits.at_t0_g * 1e3), "label": "limit at T0"},
+            {"y": scale.y(limits.over_range_g * 1e3), "label": "limit over the range"},
+        ],
+    }
+
+
+def _panel(
+    x0: float, width: float, indices: list[int], delivery: Delivery, scale: _Scale
+) -> dict[str, object]:
     methods = [m for m in delivery.methods if m.residuals]
     indices = sorted(indices, key=lambda i: methods[0].residuals[i].dwell.position)
-    xs = [_r(x0 + PANEL_WIDTH * (k + 0.5) / len(indices)) for k in range(len(indices))]
+    xs = [_r(x0 + width * (k + 0.5) / len(indices)) for k in range(len(indices))]
     lines = []
     for method in sorted(methods, key=lambda m: m.method == delivery.unit.method):
-        ys = [_r(scale.y(method.residuals[i].error_g * 1e3)) for i in indices]
+        ys = [scale.y(method.residuals[i].error_g * 1e3) for i in indices]
         lines.append(
             {
                 "colour": COLOURS[method.method],
@@ -90,9 +113,7 @@ def _panel(x0: float, indices: list[int], delivery: Delivery, scale: _Scale) -> 
     labels = [methods[0].residuals[i].dwell.position for i in indices]
     return {
         "x": _r(x0),
-        "middle": _r(x0 + PANEL_WIDTH / 2),
-        "width": PANEL_WIDTH,
-        "height": PANEL_HEIGHT,
+        "middle": _r(x0 + width / 2),
         "lines": lines,
         "labels": list(zip(xs, labels, strict=True)),
     }
@@ -102,7 +123,7 @@ def _legend(methods: list[MethodResult], chosen: str) -> list[dict[str, object]]
     entries, x = [], LEFT
     for method in methods:
         label = method.method + (" (delivered)" if method.method == chosen else "")
-        entries.append({"x": x, "label": label, "colour": COLOURS[method.method]})
+        entries.append({"x": _r(x), "label": label, "colour": COLOURS[method.method]})
         x += 34 + 6.6 * len(label)
     return entries
 
