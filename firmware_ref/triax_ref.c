@@ -1,19 +1,18 @@
 #include "triax_ref.h"
 
-/* Rounds towards minus infinity; divisor > 0. C's division rounds towards zero. */
-static int64_t floor_div(int64_t value, int64_t divisor)
-{
-    const int64_t quotient = value / divisor;
-    return (value % divisor < 0) ? quotient - 1 : quotient;
-}
-
 static int64_t power_of_two(int exponent)
 {
-    int64_t power = 1;
-    while (exponent-- > 0) {
-        power *= 2;
+    return (int64_t)((uint64_t)1 << exponent);
+}
+
+/* floor(value / 2^exponent), by moving the value to where it cannot be negative. */
+static int64_t floor_div(int64_t value, int exponent)
+{
+    const uint64_t zero_at = (uint64_t)1 << 63;
+    if (exponent == 0) {
+        return value;
     }
-    return power;
+    return (int64_t)(((uint64_t)value + zero_at) >> exponent) - (int64_t)(zero_at >> exponent);
 }
 
 static int64_t absolute(int64_t value)
@@ -40,7 +39,7 @@ static int32_t thermal_function(const int32_t *c, int order, int32_t x_q31)
     int64_t p = c[order];
     int k;
     for (k = order - 1; k >= 0; k--) {
-        p = c[k] + floor_div((int64_t)x_q31 * p, INT64_C(4294967296));
+        p = c[k] + floor_div((int64_t)x_q31 * p, 32);
     }
     return (int32_t)p;
 }
@@ -69,12 +68,12 @@ static int invert(triax_ref_state_t *state, const triax_ref_t *ref, int32_t k[3]
 #undef MINOR
     for (i = 0; i < 3; i++) {
         for (j = 0; j < 3; j++) {
-            adj[i][j] = saturate(floor_div(adj[i][j], power_of_two(ref->adjugate_shift)));
+            adj[i][j] = saturate(floor_div(adj[i][j], ref->adjugate_shift));
         }
     }
-    det = floor_div(k[0][0] * adj[0][0], 4) + floor_div(k[0][1] * adj[1][0], 4) +
-          floor_div(k[0][2] * adj[2][0], 4);
-    det = saturate(floor_div(det, power_of_two(ref->determinant_shift)));
+    det = floor_div(k[0][0] * adj[0][0], 2) + floor_div(k[0][1] * adj[1][0], 2) +
+          floor_div(k[0][2] * adj[2][0], 2);
+    det = saturate(floor_div(det, ref->determinant_shift));
     reciprocal = power_of_two(ref->reciprocal_log2) / ((absolute(det) < least) ? least : absolute(det));
     if (det < 0) {
         reciprocal = -reciprocal;
@@ -84,11 +83,11 @@ static int invert(triax_ref_state_t *state, const triax_ref_t *ref, int32_t k[3]
         int64_t row = 0;
         for (j = 0; j < 3; j++) {
             const int64_t product = adj[i][j] * reciprocal + power_of_two(ref->gain_shift - 1);
-            state->gain[i][j] = saturate(floor_div(product, power_of_two(ref->gain_shift)));
-            offset += floor_div((int64_t)state->gain[i][j] * u0[j], 4);
+            state->gain[i][j] = saturate(floor_div(product, ref->gain_shift));
+            offset += floor_div((int64_t)state->gain[i][j] * u0[j], 2);
             row += absolute(state->gain[i][j]);
         }
-        offset = -floor_div(offset + power_of_two(29), power_of_two(30));
+        offset = -floor_div(offset + power_of_two(29), 30);
         if (ref->output_shift > 32) {
             offset += power_of_two(ref->output_shift - 33);
         }
@@ -169,7 +168,7 @@ uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
         if (ref->output_shift <= 32) {
             sum += power_of_two(ref->output_shift - 1);
         }
-        result = floor_div(sum, power_of_two(ref->output_shift));
+        result = floor_div(sum, ref->output_shift);
         accel[i] = saturate(result);
         if (accel[i] != result) {
             status |= TRIAX_REF_SATURATED;

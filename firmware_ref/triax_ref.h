@@ -2,7 +2,7 @@
  * triax_ref.h - reference of the compensation arithmetic, for any shape.
  *
  * Written by hand from docs/fixed-point.md, not from the templates: one plain function a step,
- * shifts as floor divisions, every parameter read from the image. It is what the generated
+ * floors without a signed shift, every parameter read from the image. It is what the generated
  * routine is compared with, not what a unit runs.
  */
 #ifndef TRIAX_REF_H

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from triaxcal.fixedpoint.arithmetic import high_word, saturate_int32
 from triaxcal.fixedpoint.horner import horner, segment_of
@@ -27,10 +28,6 @@ class State:
     gain: IntArray
     offset: IntArray
 
-    def at(self, index: IntArray) -> State:
-        """States at `index`."""
-        return State(self.gain[index], self.offset[index])
-
 
 def set_temperature(plan: Plan, temp_code: IntArray) -> tuple[State, IntArray]:
     """State and status of each code, shape (n,); any int32 is legal."""
@@ -49,7 +46,7 @@ def apply(plan: Plan, state: State, raw_code: IntArray) -> tuple[IntArray, IntAr
     """Accelerations (n, 3) in 2^-output_q g and status (n,) of raw codes (n, 3), any int32."""
     shape = plan.shape
     clamped = np.clip(raw_code, shape.raw_min, shape.raw_max)
-    status = np.where((clamped != raw_code).any(axis=1), STATUS_RAW_RANGE, STATUS_OK)
+    status = np.where(_any_axis(clamped != raw_code), STATUS_RAW_RANGE, STATUS_OK)
     u = clamped << shape.raw_shift
     gain, offset = state.gain, state.offset
     total = np.empty_like(u)
@@ -59,5 +56,10 @@ def apply(plan: Plan, state: State, raw_code: IntArray) -> tuple[IntArray, IntAr
         return (high_word(total) + offset) >> (shape.output_shift - 32), status
     wide = (total + (offset << 32) + shape.rounding_in_sum) >> shape.output_shift
     accel = saturate_int32(wide)
-    saturated = np.where((accel != wide).any(axis=1), STATUS_SATURATED, STATUS_OK)
+    saturated = np.where(_any_axis(accel != wide), STATUS_SATURATED, STATUS_OK)
     return accel, np.bitwise_or(status, saturated)
+
+
+def _any_axis(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """mask.any(axis=1) of a mask (n, 3), several times faster."""
+    return mask[:, 0] | mask[:, 1] | mask[:, 2]

@@ -12,8 +12,10 @@ Every code of the working range is visited. docs/fixed-point.md, step E.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import accumulate, chain, islice, pairwise, repeat
 
 import numpy as np
 
@@ -23,7 +25,6 @@ from triaxcal.fixedpoint.formats import FUNCTION_NAMES, ROW_LIMIT
 from triaxcal.fixedpoint.horner import Segment
 from triaxcal.fixedpoint.integer_model import State, set_temperature
 from triaxcal.fixedpoint.plan import Plan
-from triaxcal.model.types import IntArray
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def prove(plan: Plan) -> Bound:
     state, _ = set_temperature(plan, codes)
     _check_rows(plan, state)
     errors = _inverse_errors if plan.shape.inverse is not None else _direct_errors
-    axes = [errors(plan, state, codes, axis) for axis in range(3)]
+    axes = [errors(plan, state, axis) for axis in range(3)]
     worst = int(np.max(axes, axis=0).argmax())
     per_axis = tuple(math.nextafter(max(axis) + 0.5, math.inf) for axis in axes)
     return Bound(
@@ -118,70 +119,95 @@ def _broken(what: str) -> RefusedError:
     )
 
 
-def _exact_numerators(plan: Plan, codes: IntArray, function: int) -> tuple[list[int], int]:
-    """Exact values of one function at every code as integers over 2^shift, and the shift."""
-    shift = max(_dyadic_shift(plan, s, function) for s in range(len(plan.segments)))
+def _exact_values(plan: Plan, functions: Sequence[int]) -> tuple[list[list[int]], int]:
+    """Exact values of functions at every code, as integers over 2^shift, and the shift."""
+    segments = range(len(plan.segments))
+    shift = max(_dyadic_shift(plan, s, f) for s in segments for f in functions)
+    return [_exact_function(plan, f, shift) for f in functions], shift
+
+
+def _exact_function(plan: Plan, function: int, shift: int) -> list[int]:
     values: list[int] = []
     ends = [s.first_code for s in plan.segments[1:]] + [plan.temp_max_code + 1]
     for s, (segment, end) in enumerate(zip(plan.segments, ends, strict=True)):
-        x_shift = 31 - (segment.gain.bit_length() - 1)
+        x_shift = _x_shift(segment)
         scaled = [
             int(Fraction(float(c)) * Fraction(2) ** (shift - k * x_shift))
             for k, c in enumerate(plan.real[s, function])
         ]
-        for offset in range(segment.first_code - segment.origin_code, end - segment.origin_code):
-            value = scaled[-1]
-            for c in scaled[-2::-1]:
-                value = value * offset + c
-            values.append(value)
-    assert len(values) == len(codes)
-    return values, shift
+        start = segment.first_code - segment.origin_code
+        values += _tabulate(scaled, start, end - segment.first_code)
+    return values
+
+
+def _tabulate(coefficients: Sequence[int], start: int, count: int) -> list[int]:
+    """Values of a polynomial at start, start + 1, ...: exact, by its finite differences.
+
+    A polynomial of order n has a constant n-th difference, so every value costs n additions.
+    """
+    order = len(coefficients) - 1
+    differences = []
+    values = [_polynomial(coefficients, start + i) for i in range(order + 1)]
+    while values:
+        differences.append(values[0])
+        values = [b - a for a, b in pairwise(values)]
+    column: Iterable[int] = repeat(differences[-1], count)
+    for first in differences[-2::-1]:
+        column = accumulate(chain([first], column))
+    return list(islice(column, count))
+
+
+def _polynomial(coefficients: Sequence[int], at: int) -> int:
+    value = 0
+    for c in reversed(coefficients):
+        value = value * at + c
+    return value
+
+
+def _x_shift(segment: Segment) -> int:
+    """x / 2^31 is (code - origin_code) / 2^this."""
+    return 31 - (segment.gain.bit_length() - 1)
 
 
 def _dyadic_shift(plan: Plan, s: int, function: int) -> int:
     """Power of two that makes every coefficient, taken per code^k, an integer."""
-    x_shift = 31 - (plan.segments[s].gain.bit_length() - 1)
+    x_shift = _x_shift(plan.segments[s])
     return max(
         float(c).as_integer_ratio()[1].bit_length() - 1 + k * x_shift
         for k, c in enumerate(plan.real[s, function])
     )
 
 
-def _direct_errors(plan: Plan, state: State, codes: IntArray, axis: int) -> list[float]:
+def _direct_errors(plan: Plan, state: State, axis: int) -> list[float]:
     """Error in LSB, less the final 1/2, at every code."""
-    spare = plan.shape.output_shift - 32
     columns = [state.gain[:, axis, j] for j in range(3)]
     columns.append(state.offset[:, axis] - plan.shape.rounding_in_offset)
-    exact = [_exact_numerators(plan, codes, 4 * axis + j) for j in range(4)]
-    shift = max(s for _, s in exact)
-    lifts = [shift - s for _, s in exact]
+    exact, shift = _exact_values(plan, range(4 * axis, 4 * axis + 4))
     errors = [
         [
-            abs((found << shift) - (value << lift))
+            abs((found << shift) - value)
             for found, value in zip(column.tolist(), values, strict=True)
         ]
-        for column, (values, _), lift in zip(columns, exact, lifts, strict=True)
+        for column, values in zip(columns, exact, strict=True)
     ]
     box = plan.shape.raw_box
-    denominator = 1 << (shift + 32 + spare)
+    denominator = 1 << (shift + plan.shape.output_shift)
     return [
         ((e0 + e1 + e2) * box + (eb << 32)) / denominator
         for e0, e1, e2, eb in zip(*errors, strict=True)
     ]
 
 
-def _inverse_errors(plan: Plan, state: State, codes: IntArray, axis: int) -> list[float]:
+def _inverse_errors(plan: Plan, state: State, axis: int) -> list[float]:
     """Error in LSB, less the final 1/2, against the exact inverse at every code."""
-    functions = [_exact_numerators(plan, codes, f) for f in range(12)]
-    shift = max(s for _, s in functions)
-    exact = [[v << (shift - s) for v in values] for values, s in functions]
+    exact, shift = _exact_values(plan, range(12))
     shape = plan.shape
     assert shape.inverse is not None
     # K and its determinant are over 2^shift and 2^(3 shift); n = adj / det * 2^(shift + scale).
     scale = shape.inverse.scale_log2
     gain, offset = state.gain[:, axis].tolist(), state.offset[:, axis].tolist()
     errors = []
-    for t in range(len(codes)):
+    for t in range(len(gain)):
         adjugate, determinant = _exact_adjugate_row([exact[f][t] for f in range(12)], axis)
         lift = max(0, -scale)
         unit = determinant << lift

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from triaxcal.codegen.render import environment
 from triaxcal.codegen.tryout import BEFORE, MethodResult
 from triaxcal.delivery import Delivery
-from triaxcal.report.temperatures import by_temperature
+from triaxcal.report.temperatures import by_temperature, degrees
 
 WIDTH = 960.0
 LEFT, RIGHT, TOP, GAP = 64.0, 16.0, 84.0, 8.0
@@ -81,7 +81,7 @@ def _row(
         ],
         "panels": [
             {
-                "title": f"{temp:+.0f} degC",
+                "title": f"{degrees(temp)} degC",
                 "width": _r(width),
                 **_panel(LEFT + i * (width + GAP), width, indices, delivery, scale),
             }

@@ -8,7 +8,7 @@ from triaxcal.delivery import Delivery
 from triaxcal.fit.calibrate import Calibration
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
-from triaxcal.report.temperatures import by_temperature
+from triaxcal.report.temperatures import by_temperature, degrees
 
 _LABEL = 16
 
@@ -55,7 +55,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def _head(delivery: Delivery) -> str:
     calibration, plan = delivery.calibration, delivery.plan
-    temps = ", ".join(f"{p.temp_degc:+.0f}" for p in calibration.points)
+    temps = ", ".join(degrees(p.temp_degc) for p in calibration.points)
     checks = len(calibration.check_dwells)
     low, high = calibration.range_degc
     measured = f"{len(delivery.measurements.dwells)} dwells: six positions at {temps} degC"
@@ -132,7 +132,7 @@ def _residuals(delivery: Delivery) -> str:
     for kind, prefix in (("test", "TP"), ("check", "CP")):
         for temp, indices in by_temperature(methods[0], prefix):
             largest = [max(abs(m.residuals[i].error_g) for i in indices) for m in methods]
-            rows.append([f"  {temp:+.0f} degC, {kind}", *(f"{v * 1e3:.4f}" for v in largest)])
+            rows.append([f"  {degrees(temp)} degC, {kind}", *(f"{v * 1e3:.4f}" for v in largest)])
     names = [m.method.replace("additive-", "add.-") for m in methods]
     head = ["max | |a| - g |, mg", *names]
     lines = _table(head, rows)

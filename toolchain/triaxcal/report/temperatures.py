@@ -22,3 +22,9 @@ def by_temperature(result: MethodResult, prefix: str) -> list[tuple[float, list[
         else:
             groups.append([i])
     return [(sum(temps[i] for i in group) / len(group), group) for group in groups]
+
+
+def degrees(temp_degc: float) -> str:
+    """Temperature in whole degC with its sign; zero has none."""
+    whole = round(temp_degc)
+    return f"{whole:+d}" if whole else "0"
