@@ -21,6 +21,7 @@ worse conditioned than the weights are uneven.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -45,6 +46,27 @@ class TilterData:
     readings: GroupedReadings
     operators: FloatArray
     gravity_g: float
+
+    @cached_property
+    def design(self) -> FloatArray:
+        """Design matrix of the six positions, shape (6, 4)."""
+        return design_matrix(self.gravity_g)
+
+    @cached_property
+    def by_group(self) -> FloatArray:
+        """The operators as (E, 3, 4, G, 6)."""
+        return self.operators.transpose(0, 2, 3, 1, 4)
+
+    @cached_property
+    def point_variance(self) -> FloatArray:
+        """Relative variances of the constants at each temperature, shape (E, 3, 4, G)."""
+        squares = self.by_group**2
+        if self.readings.variance_v2 is None:
+            by_output = np.ones(1)
+        else:
+            by_output = self.readings.variance_v2.transpose(2, 0, 1)[:, None]
+        variance: FloatArray = np.sum(squares * by_output, axis=-1)
+        return variance
 
     def select(self, groups: list[int]) -> TilterData:
         """Only the groups with these indices."""
@@ -126,19 +148,17 @@ class _System:
 
     @staticmethod
     def of(data: TilterData, shape: ThermalShape) -> _System:
-        readings, operators = data.readings, data.operators
+        readings = data.readings
         Q, R = np.linalg.qr(shape.basis(readings.temps_degc))
         to_basis: FloatArray = np.linalg.inv(R)
-        thermal = _thermal_operators(Q, _point_variance(operators, readings.variance_v2))
+        thermal = _thermal_operators(Q, data.point_variance)
         P, G = shape.parameters, len(readings.temps_degc)
-        estimator = np.moveaxis(operators, 1, 3)  # (E, 3, 4, G, 6)
-        fit = thermal[..., None] * estimator[..., None, :, :]
+        fit = thermal[..., None] * data.by_group[..., None, :, :]
         fit = fit.reshape(*fit.shape[:2], 4 * P, 6 * G)
         change = _basis_change(readings, shape)
         if not change.any():
             return _System(fit, None, to_basis)
-        design = design_matrix(data.gravity_g)
-        shift = design[:, :, None] * (change @ to_basis)[:, :, None, :]
+        shift = data.design[:, :, None] * (change @ to_basis)[:, :, None, :]
         matrix = np.eye(4 * P) + fit @ shift.reshape(6 * G, 4 * P)
         return _System(fit, matrix, to_basis)
 
@@ -151,18 +171,8 @@ class _System:
     def parameters(self, theta: FloatArray) -> FloatArray:
         """Parameters (E, 12, P) in the shape's basis of theta (E, 3, 4 P, 1)."""
         P = self.to_basis.shape[0]
-        by_output = theta.reshape(*theta.shape[:-2], 4, P) @ self.to_basis.T
-        return np.moveaxis(pack_rows(np.moveaxis(by_output, -1, -3)), -1, -2)
-
-
-def _point_variance(operators: FloatArray, variance_v2: FloatArray | None) -> FloatArray:
-    """Relative variances of the points, shape (E, 3, 4, G)."""
-    if variance_v2 is None:
-        variance = np.sum(operators**2, axis=-1)
-    else:
-        by_output = np.swapaxes(variance_v2, -1, -2)[..., None]
-        variance = ((operators**2) @ by_output)[..., 0]
-    return np.moveaxis(variance, 1, 3)
+        rows = theta.reshape(-1, 3, 4, P) @ self.to_basis.T
+        return pack_rows(rows.transpose(0, 3, 1, 2)).swapaxes(-1, -2)
 
 
 def _thermal_operators(Q: FloatArray, variance: FloatArray) -> FloatArray:

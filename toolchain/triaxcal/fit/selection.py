@@ -32,7 +32,6 @@ from triaxcal.fit.thermal import (
     polynomial_shape,
     without_temperature,
 )
-from triaxcal.fit.tilter import design_matrix
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.types import FloatArray
 from triaxcal.records import Dwell
@@ -132,12 +131,11 @@ def select(
     """
     low, high = data.readings.temps_degc[0], data.readings.temps_degc[-1]
     scored = [d for d in checks if low - EDGE_DEGC <= d.temp_degc <= high + EDGE_DEGC]
-    rows = [row for shape in shapes for row in _score_shape(data, estimators, shape, scored)]
-    folds = max(len(data.readings.temps_degc) - 2, 0)
-    folds = folds if folds >= 2 else 0
-    values = 18 * folds + len(scored)
+    folds = _folds(data)
+    rows = [row for shape in shapes for row in _score_shape(data, estimators, shape, folds, scored)]
+    values = 18 * len(folds) + len(scored)
     best = _choose(rows, values)
-    reason = _reason(rows, best, folds, len(scored), len(data.readings.temps_degc))
+    reason = _reason(rows, best, len(folds), len(scored), len(data.readings.temps_degc))
     if asked_for:
         reason = f"{best.title}: thermal function from unit.toml; {reason}"
     else:
@@ -145,6 +143,14 @@ def select(
     shown = [r for r in rows if r.estimator == best.estimator or r.shape == best.shape]
     table = tuple(row.candidate(chosen=row is best) for row in shown)
     return Selection(best.estimator, best.shape, table, reason)
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """The readings without one temperature, and those of that temperature."""
+
+    remaining: TilterData
+    left_out: GroupedReadings
 
 
 @dataclass(frozen=True)
@@ -228,11 +234,13 @@ def _score_shape(
     data: TilterData,
     estimators: Sequence[str],
     shape: ThermalShape,
+    folds: Sequence[_Fold],
     checks: Sequence[Dwell],
 ) -> list[_Row]:
     parameters = fit_curves(data, shape)
-    fit_error = _vector_errors(data.readings, shape, parameters, data.gravity_g)
-    held_out = [_fold_errors(data, shape), check_errors(shape, parameters, checks, data.gravity_g)]
+    fit_error = _vector_errors(data.readings, shape, parameters, data.design)
+    held_out = [_fold_errors(fold, shape, data.design) for fold in folds]
+    held_out += [check_errors(shape, parameters, checks, data.gravity_g)]
     values = np.concatenate([part.reshape(len(estimators), -1) for part in held_out], axis=1)
     rows = []
     for e, estimator in enumerate(estimators):
@@ -241,30 +249,33 @@ def _score_shape(
     return rows
 
 
-def _fold_errors(data: TilterData, shape: ThermalShape) -> FloatArray:
-    """Errors (E, folds, 6, 3) in g at each inner temperature, of curves fitted without it."""
+def _folds(data: TilterData) -> list[_Fold]:
+    """Each inner temperature left out in turn; none with fewer than four temperatures."""
     count = len(data.readings.temps_degc)
-    errors = []
-    for left_out in range(1, count - 1) if count >= 4 else ():
-        remaining = data.select([g for g in range(count) if g != left_out])
-        temps = remaining.readings.temps_degc
-        reduced = without_temperature(shape, temps, data.readings.temps_degc[left_out])
-        parameters = fit_curves(remaining, reduced)
-        seen = data.readings.select([left_out])
-        errors.append(_vector_errors(seen, reduced, parameters, data.gravity_g))
-    if not errors:
-        return np.zeros((data.operators.shape[0], 0))
-    return np.concatenate(errors, axis=1)
+    return [
+        _Fold(
+            remaining=data.select([g for g in range(count) if g != left_out]),
+            left_out=data.readings.select([left_out]),
+        )
+        for left_out in (range(1, count - 1) if count >= 4 else ())
+    ]
+
+
+def _fold_errors(fold: _Fold, shape: ThermalShape, design: FloatArray) -> FloatArray:
+    """Errors (E, 1, 6, 3) in g at the temperature left out, of curves fitted without it."""
+    temps = fold.remaining.readings.temps_degc
+    reduced = without_temperature(shape, temps, float(fold.left_out.temps_degc[0]))
+    parameters = fit_curves(fold.remaining, reduced)
+    return _vector_errors(fold.left_out, reduced, parameters, design)
 
 
 def _vector_errors(
-    readings: GroupedReadings, shape: ThermalShape, parameters: FloatArray, gravity_g: float
+    readings: GroupedReadings, shape: ThermalShape, parameters: FloatArray, design: FloatArray
 ) -> FloatArray:
     """Computed minus known force, shape (E, G, 6, 3), g; each dwell at its own temperature."""
     basis = shape.basis(readings.dwell_temps_degc)
     constants = basis @ np.swapaxes(parameters, -1, -2)[:, None]
-    force = force_from_voltage(constants, readings.voltage_v)
-    return force - design_matrix(gravity_g)[:, :3]
+    return force_from_voltage(constants, readings.voltage_v) - design[:, :3]
 
 
 def check_errors(
