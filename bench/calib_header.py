@@ -1,9 +1,9 @@
 """How long a second `make calib-header` takes, as a multiple of the least it could.
 
-The floor is Python started with numpy, scipy and jinja2 imported, and then the generated C compiled
-by gcc with the project's flags: nothing read, fitted, proven or checked. Both are measured in turn in
-this run; the medians are compared, of the wall clock and of CPU time (which other work on the machine
-disturbs less).
+The floor is Python started with numpy, scipy and jinja2 imported, and then the generated C
+compiled by gcc with the project's flags: nothing read, fitted, proven or checked. Both are
+measured in turn in this run; the medians are compared, of the wall clock and of CPU time (which
+other work on the machine disturbs less).
 
     python bench/calib_header.py [UNIT ...]
 """

@@ -11,6 +11,7 @@ from triaxcal.errors import RefusedError
 from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
+OUTPUT_Q_RANGE = (8, 30)
 THERMAL_MODELS = ("polynomial", "piecewise-linear")
 METHODS = ("matrix", "inverse", "additive", "additive-simplified", "additive-first-order")
 
@@ -217,7 +218,9 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
         estimator=_choice(tables["fit"], "estimator", ("auto", *ESTIMATORS)),
         thermal=_thermal_choice(thermal),
         method=_choice(compensation, "method", METHODS),
-        output_q=compensation.integer("output_q", 8, 30) if "output_q" in compensation else 24,
+        output_q=compensation.integer("output_q", *OUTPUT_Q_RANGE)
+        if "output_q" in compensation
+        else 24,
         model_error_max_micro_g=_number(
             compensation, "model_error_max_micro_g", 1e-3, 1e6, default=1.0
         ),

@@ -169,11 +169,13 @@ def cross_check(
     largest = 0.0
     real = _columns(plan.real_rows())
     with ThreadPoolExecutor(2) as pool:
-        for vectors in sets:
-            from_c = pool.submit(generated.run, vectors.temp, vectors.raw)
-            from_reference = pool.submit(reference, vectors.temp, vectors.raw)
+        compiled = [
+            (pool.submit(generated.run, v.temp, v.raw), pool.submit(reference, v.temp, v.raw))
+            for v in sets
+        ]
+        for vectors, (from_generated, from_reference) in zip(sets, compiled, strict=True):
             expected = python(vectors.temp, vectors.raw)
-            _compare(vectors, "generated C", from_c.result(), expected)
+            _compare(vectors, "generated C", from_generated.result(), expected)
             _compare(vectors, "reference C", from_reference.result(), expected)
             if vectors.exhaustive:
                 largest = max(largest, _largest_error(plan, real, vectors, expected))

@@ -16,6 +16,7 @@ from triaxcal.fixedpoint.inversion import (
     reciprocal,
 )
 from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.unitfile import OUTPUT_Q_RANGE
 
 MAX_SPARE_BITS = 16
 MIN_SPARE_BITS = -4
@@ -64,9 +65,14 @@ def _stage_bounds(real: FloatArray) -> FloatArray:
 
 
 def _fits(stage: FloatArray, terms: int, spare: int) -> bool:
-    stage = stage + terms + 2.0  # at most 3/2 for each rounded coefficient and floor
+    stage = stage + _rounding(terms)
     rows = _row_sums(stage) + 2.0 ** (spare + 1)
     return bool(stage.max() <= INT32_MAX and rows.max() < ROW_LIMIT)
+
+
+def _rounding(terms: int) -> float:
+    """Most that rounded coefficients and floors add to a stage."""
+    return terms + 2.0
 
 
 def _row_sums(stage: FloatArray) -> FloatArray:
@@ -84,15 +90,48 @@ def _refusal(stage: FloatArray, output_q: int, fitting: int | None, where: str) 
         if k == 0
         else f"the temperature coefficient of order {k} of {name} is too steep for the range"
     )
-    remedy = "lower compensation.output_q or declare a narrower adc.code_min to adc.code_max"
-    if fitting is not None and output_q - (MIN_SPARE_BITS - fitting) > 0:
-        remedy = f"set compensation.output_q = {output_q - (MIN_SPARE_BITS - fitting)} or lower"
-        remedy += ", or declare a narrower adc.code_min to adc.code_max"
+    return _does_not_fit(culprit, output_q, fitting, where)
+
+
+def _does_not_fit(culprit: str, output_q: int, fitting: int | None, where: str) -> RefusedError:
+    """`fitting` is the number of spare bits, below `MIN_SPARE_BITS`, that would do."""
+    remedy = "declare a narrower adc.code_min to adc.code_max"
+    if fitting is not None:
+        highest_q = output_q - (MIN_SPARE_BITS - fitting)
+        if highest_q >= OUTPUT_Q_RANGE[0]:
+            remedy = f"set compensation.output_q = {highest_q} or lower, or {remedy}"
     return RefusedError(
         where,
         f"{culprit}, which does not fit int32 at compensation.output_q = {output_q}",
         remedy=remedy,
     )
+
+
+def choose_matrix_bits(real: FloatArray, where: str) -> int:
+    """Largest power of two on K with which the inverse form's Horner steps fit int32.
+
+    `real`, shape (segments, 12, order + 1), is K in raw LSB per g and U0 in raw LSB.
+
+    Raises
+    ------
+    RefusedError
+        When U0, which has no such power, does not fit.
+    """
+    room = INT32_MAX - _rounding(real.shape[2])
+    stage = _stage_bounds(real)
+    offset = stage[3::4]
+    if offset.max() > room:
+        row, k = np.unravel_index(int(offset.argmax()), offset.shape)
+        name = FUNCTION_NAMES["inverse"][4 * row + 3]
+        raise RefusedError(
+            where,
+            f"{name} lies beyond the declared raw range"
+            if k == 0
+            else f"the temperature coefficient of order {k} of {name} is too steep for the range",
+            remedy='check adc.full_scale_v, adc.code_min and adc.code_max, or choose "matrix"',
+        )
+    matrix = np.delete(stage, np.s_[3::4], axis=0)
+    return int(np.floor(np.log2(room / matrix.max())))
 
 
 def choose_inverse(
@@ -126,18 +165,21 @@ def choose_inverse(
     shifts = InverseShifts(adjugate_shift, determinant_shift, log2, 0)
     inverse = reciprocal(saturate_int32(quarter >> determinant_shift), shifts)
     product_max = int(np.abs(word * inverse[:, None, None]).max())
-    for spare in range(MAX_SPARE_BITS, MIN_SPARE_BITS - 1, -1):
+    for spare in range(MAX_SPARE_BITS, -40, -1):
         gain_shift = log2 + 2 + determinant_shift - k_bits - (output_q + 32 + spare)
         if gain_shift < 1 or product_max >> gain_shift >= INT32_MAX:
             continue
+        if gain_shift > 62:
+            break
         shifts = replace(shifts, gain_shift=gain_shift)
         preload = 1 << (spare - 1) if spare > 0 else 0
         gain, offset = invert(functions, shifts, preload)
         rows = np.abs(gain).sum(axis=2) + 2 * np.abs(offset)
-        if rows.max() < ROW_LIMIT and np.abs(offset).max() < INT32_MAX:
+        if rows.max() >= ROW_LIMIT or np.abs(offset).max() >= INT32_MAX:
+            continue
+        if spare >= MIN_SPARE_BITS:
             return shifts, spare
-    raise RefusedError(
-        where,
-        f"the declared raw range does not fit int32 at compensation.output_q = {output_q}",
-        remedy="lower compensation.output_q or declare a narrower adc.code_min to adc.code_max",
-    )
+        largest_g = float(rows.max()) / 2.0 ** (spare + 1 + output_q)
+        culprit = f"the declared raw range stands for {largest_g:.4g} g"
+        raise _does_not_fit(culprit, output_q, spare, where)
+    raise _does_not_fit("the declared raw range", output_q, None, where)

@@ -18,7 +18,7 @@ import numpy as np
 
 from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, round_half_up
-from triaxcal.fixedpoint.formats import choose_inverse, choose_spare_bits
+from triaxcal.fixedpoint.formats import choose_inverse, choose_matrix_bits, choose_spare_bits
 from triaxcal.fixedpoint.horner import Segment, horner, segment_of
 from triaxcal.fixedpoint.inversion import InverseShifts
 from triaxcal.model.compensation import INVERSE, Compensation
@@ -27,6 +27,9 @@ from triaxcal.unitfile import TemperatureSensor, UnitDescription
 
 MAX_TEMPERATURE_CODES = 2**20
 """The proof visits every temperature code; beyond this it would take minutes."""
+
+MAX_RAW_SHIFT = 30
+"""The C multiplies by 2^raw_shift in int32."""
 
 ROWS = tuple(3 * i + j if j < 3 else 9 + i for i in range(3) for j in range(4))
 """Where each function of the image's order (row by row: three of the matrix, then the offset)
@@ -148,7 +151,8 @@ def make_plan(compensation: Compensation, unit: UnitDescription) -> Plan:
     """
     where = f"unit {unit.name}"
     low, high = _temperature_codes(compensation, unit.temperature_sensor, where)
-    raw_shift = 31 - max(unit.adc.code_max.bit_length(), (-unit.adc.code_min - 1).bit_length())
+    bits = max(unit.adc.code_max.bit_length(), (-unit.adc.code_min - 1).bit_length())
+    raw_shift = min(31 - bits, MAX_RAW_SHIFT)
     volts_per_lsb = unit.adc.volts_per_code / 2.0**raw_shift
     real, frames = _device_polynomials(compensation, unit, low, high, volts_per_lsb)
     shape = Shape(
@@ -173,6 +177,13 @@ def _temperature_codes(
     # A range end that is a code but for rounding counts as that code.
     codes = [(t - sensor.degc_at_zero) / sensor.degc_per_code for t in (low, high)]
     first, last = int(np.ceil(codes[0] - 1e-6)), int(np.floor(codes[1] + 1e-6))
+    if last < first:
+        raise RefusedError(
+            where,
+            f"no temperature code lies in {low:g} to {high:g} degC: "
+            f"temperature_sensor.degc_per_code = {sensor.degc_per_code:g}",
+            remedy="check temperature_sensor, or widen thermal.range_degc",
+        )
     if last - first >= MAX_TEMPERATURE_CODES:
         raise RefusedError(
             where,
@@ -248,15 +259,9 @@ def _direct_plan(plan: Plan, where: str) -> Plan:
 
 
 def _inverse_plan(plan: Plan, where: str) -> Plan:
-    bits = int(np.floor(np.log2(INT32_MAX / _horner_bound(plan.real[:, _MATRIX]).max())))
+    bits = choose_matrix_bits(plan.real, where)
     real = plan.real.copy()
     real[:, _MATRIX] *= 2.0**bits
-    if _horner_bound(real[:, 3::4]).max() > INT32_MAX:
-        raise RefusedError(
-            where,
-            "U0 lies beyond the declared raw range",
-            remedy="check adc.full_scale_v, adc.code_min and adc.code_max",
-        )
     segments = _quantise(plan.segments, real, np.zeros(12))
     codes = plan.temp_codes
     functions = horner(segments, codes, segment_of(segments, codes)).reshape(-1, 3, 4)
@@ -266,12 +271,6 @@ def _inverse_plan(plan: Plan, where: str) -> Plan:
 
 
 _MATRIX = [f for f in range(12) if f % 4 < 3]
-
-
-def _horner_bound(real: FloatArray) -> FloatArray:
-    """Bound of |p_k| 2^-k over |x| <= 1 for every function, with one last place for rounding."""
-    bound: FloatArray = np.abs(real).sum(axis=-1) + 1
-    return bound
 
 
 def _quantise(
