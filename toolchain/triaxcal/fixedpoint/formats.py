@@ -123,12 +123,16 @@ def choose_matrix_bits(real: FloatArray, where: str) -> int:
     if offset.max() > room:
         row, k = np.unravel_index(int(offset.argmax()), offset.shape)
         name = FUNCTION_NAMES["inverse"][4 * row + 3]
+        if k == 0 or np.abs(real[:, 3::4, 0]).max() > room:
+            raise RefusedError(
+                where,
+                f"{name} lies beyond the declared raw range",
+                remedy="check adc.full_scale_v, adc.code_min and adc.code_max",
+            )
         raise RefusedError(
             where,
-            f"{name} lies beyond the declared raw range"
-            if k == 0
-            else f"the temperature coefficient of order {k} of {name} is too steep for the range",
-            remedy='check adc.full_scale_v, adc.code_min and adc.code_max, or choose "matrix"',
+            f"the temperature coefficient of order {k} of {name} is too steep for the range",
+            remedy='set compensation.method = "matrix", or a lower thermal.order',
         )
     matrix = np.delete(stage, np.s_[3::4], axis=0)
     return int(np.floor(np.log2(room / matrix.max())))
