@@ -11,7 +11,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* 64 segments of order 9 take 31 KB; a small target says less. */
+#ifndef TRIAX_REF_MAX_SEGMENTS
 #define TRIAX_REF_MAX_SEGMENTS 64
+#endif
 #define TRIAX_REF_MAX_ORDER 9
 #define TRIAX_REF_HEADER_WORDS 15
 
