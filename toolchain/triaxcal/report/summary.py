@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from triaxcal.delivery import Delivery
 from triaxcal.fit.calibrate import Calibration
+from triaxcal.fit.selection import Candidate
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.report.temperatures import by_temperature, degrees
@@ -109,7 +110,7 @@ def _constants(calibration: Calibration) -> str:
 def _candidates(calibration: Calibration) -> str:
     rows = [
         [
-            f"{'*' if c.chosen else ' '} {c.label}",
+            f"{'*' if c.chosen else ' '} {_short_label(c)}",
             c.estimator,
             str(c.parameters),
             _micro_g(c.fit_residual_g),
@@ -119,6 +120,11 @@ def _candidates(calibration: Calibration) -> str:
     ]
     head = ["candidates, rms micro-g", "bias estimator", "parameters", "fitted", "held out"]
     return "\n".join(_table(head, rows))
+
+
+def _short_label(candidate: Candidate) -> str:
+    knots = len(candidate.knots_degc)
+    return candidate.label if knots <= 3 else f"piecewise-linear, {knots} knots"
 
 
 def _micro_g(value_g: float) -> str:
