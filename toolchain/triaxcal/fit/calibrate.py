@@ -80,7 +80,10 @@ class CalibrationPoint:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """A check dwell and |a| - g there, P1 (13), in g."""
+    """A check dwell and |a| - g there, P1 (13), in g.
+
+    The curves are continued to a dwell beyond the calibrated temperatures; it is not scored.
+    """
 
     dwell: Dwell
     error_g: float
