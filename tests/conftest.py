@@ -1,0 +1,76 @@
+"""Fixtures that take time, made once a session, and the switch that writes golden files anew."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from plans import COVERING, GOLDEN, SENSOR, random_plan
+from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
+from triaxcal.codegen.routines import Generated, Reference, start_generated, start_reference
+from triaxcal.delivery import Delivery, deliver
+from triaxcal.fixedpoint.plan import Plan
+
+UNITS = Path(__file__).parent.parent / "units"
+PROVENANCE = Provenance("GOLDEN-001", "0123456789abcdef" * 4, ("fixed constants of the tests",))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--update-golden", action="store_true", help="write tests/golden/ anew instead of comparing"
+    )
+
+
+def write_generated(plan: Plan, folder: Path) -> None:
+    """Write what a delivery writes for the firmware."""
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = render_routine(plan)
+    texts[CONSTANTS_FILE] = render_constants(plan, SENSOR, PROVENANCE)
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Built:
+    """A plan, the folder with its generated C, and that C as a library."""
+
+    plan: Plan
+    folder: Path
+    generated: Generated
+
+    @property
+    def image(self) -> bytes:
+        return image_bytes(self.plan)
+
+
+@pytest.fixture(scope="session")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+    """The handwritten reference C."""
+    return Reference(start_reference(tmp_path_factory.mktemp("reference")).load())
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Built]:
+    """Every covering shape with random constants, and the golden plans, compiled."""
+    plans = {name: random_plan(Random(name), shape) for name, shape in COVERING.items()}
+    plans |= GOLDEN
+    top = tmp_path_factory.mktemp("generated")
+
+    def build(name: str) -> Built:
+        folder = top / name
+        write_generated(plans[name], folder)
+        return Built(plans[name], folder, Generated(start_generated(folder, folder).load()))
+
+    with ThreadPoolExecutor(2) as pool:
+        return dict(zip(plans, pool.map(build, plans), strict=True))
+
+
+@pytest.fixture(scope="session")
+def delivered() -> dict[str, Delivery]:
+    """Both shipped units, delivered."""
+    return {name: deliver(UNITS / name) for name in ("AT-CHERNIAK", "AT-SIM")}

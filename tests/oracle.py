@@ -1,0 +1,132 @@
+"""The routine of docs/fixed-point.md, written from that page alone in unbounded integers.
+
+Slow and obvious, and independent: nothing of triaxcal.fixedpoint is called, only a plan's fields
+are read. Floors are floors of Fractions; int32 is a matter of `sat32` where the page says so, and
+every other value is checked to fit the type in which the page promises it.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+from triaxcal.fixedpoint.plan import Plan
+
+TEMP_LOW, TEMP_HIGH, RAW_RANGE, SATURATED, BAD_IMAGE = 1, 2, 4, 8, 16
+INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
+
+Rows = list[list[int]]
+"""Three rows of the state: gains for x, y, z and the offset."""
+
+
+def sat32(value: int) -> int:
+    return min(max(value, INT32_MIN), INT32_MAX)
+
+
+def floor_of(value: int, power: int) -> int:
+    """floor(value / 2^power)."""
+    return math.floor(Fraction(value, 2**power))
+
+
+def trunc_of(value: int, divisor: int) -> int:
+    return math.trunc(Fraction(value, divisor))
+
+
+def int32(value: int) -> int:
+    assert INT32_MIN <= value <= INT32_MAX, f"{value} does not fit int32"
+    return value
+
+
+def int64(value: int) -> int:
+    assert -(2**63) <= value < 2**63, f"{value} does not fit int64"
+    return value
+
+
+def functions(plan: Plan, code: int) -> list[int]:
+    """Step H: twelve functions at a clamped code."""
+    segment = [s for s in plan.segments if s.first_code <= code][-1]
+    x = int32((code - segment.origin_code) * segment.gain)
+    values = []
+    for row in segment.coefficients.tolist():
+        p = int32(row[-1])
+        for c in reversed(row[:-1]):
+            p = int32(int32(c) + floor_of(int64(x * p), 32))
+        values.append(p)
+    return values
+
+
+def set_temperature(plan: Plan, temp_code: int) -> tuple[Rows, int]:
+    """Steps C, H, I: the state's rows and the status."""
+    status = 0
+    code = temp_code
+    if code < plan.temp_min_code:
+        code, status = plan.temp_min_code, TEMP_LOW
+    elif code > plan.temp_max_code:
+        code, status = plan.temp_max_code, TEMP_HIGH
+    values = functions(plan, code)
+    rows = [values[4 * i : 4 * i + 4] for i in range(3)]
+    if plan.shape.form == "inverse":
+        rows = inverted(plan, rows)
+        if any(sum(map(abs, r[:3])) + 2 * abs(r[3]) >= 2**32 - 8 for r in rows):
+            return [[0] * 4 for _ in range(3)], status | BAD_IMAGE
+    return rows, status
+
+
+def inverted(plan: Plan, rows: Rows) -> Rows:
+    """Step I."""
+    shifts = plan.shape.inverse
+    assert shifts is not None
+    k = [row[:3] for row in rows]
+    u0 = [row[3] for row in rows]
+    adj = [
+        [sat32(floor_of(int64(_cofactor(k, j, i)), shifts.adjugate_shift)) for j in range(3)]
+        for i in range(3)
+    ]
+    det = int64(sum(floor_of(int64(k[0][j] * adj[j][0]), 2) for j in range(3)))
+    det = sat32(floor_of(det, shifts.determinant_shift))
+    magnitude = max(abs(det), 2 ** (shifts.reciprocal_log2 - 31) + 1)
+    r = int32(trunc_of(2**shifts.reciprocal_log2, -magnitude if det < 0 else magnitude))
+    spare = plan.shape.output_shift - 32
+    preload = 2 ** (spare - 1) if spare >= 1 else 0
+    result = []
+    for i in range(3):
+        n = [
+            sat32(floor_of(int64(a * r + 2 ** (shifts.gain_shift - 1)), shifts.gain_shift))
+            for a in adj[i]
+        ]
+        total = sum(floor_of(int64(n[j] * u0[j]), 2) for j in range(3))
+        result.append([*n, sat32(preload - floor_of(int64(total + 2**29), 30))])
+    return result
+
+
+def _cofactor(k: Rows, i: int, j: int) -> int:
+    """Signed minor of element i, j: the row and the column struck out."""
+    a, b, c, d = (k[r][s] for r in range(3) if r != i for s in range(3) if s != j)
+    return (-1) ** (i + j) * (a * d - b * c)
+
+
+def apply(plan: Plan, rows: Rows, raw: list[int]) -> tuple[list[int], int]:
+    """Step A, with the one formula that the page gives for both ways."""
+    shape = plan.shape
+    u = [min(max(code, shape.raw_min), shape.raw_max) for code in raw]
+    status = 0 if u == raw else RAW_RANGE
+    u = [int32(code * 2**shape.raw_shift) for code in u]
+    accel = []
+    for n0, n1, n2, b in rows:
+        total = int64(int64(n0 * u[0] + n1 * u[1] + n2 * u[2]) + b * 2**32)
+        if shape.output_shift <= 32:
+            total = int64(total + 2 ** (shape.output_shift - 1))
+        wide = floor_of(total, shape.output_shift)
+        if shape.output_shift > 32:
+            int32(wide)
+        accel.append(sat32(wide))
+        if accel[-1] != wide:
+            status |= SATURATED
+    return accel, status
+
+
+def run(plan: Plan, temp_code: int, raw: list[int]) -> tuple[list[int], int]:
+    """Both calls, their status or-ed."""
+    rows, status = set_temperature(plan, temp_code)
+    accel, sample = apply(plan, rows, raw)
+    return accel, status | sample
