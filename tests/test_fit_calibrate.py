@@ -223,9 +223,9 @@ def test_interpolating_curves_carry_the_points_own_covariance():
 # Working range.
 
 
-def test_the_range_is_rounded_inward():
+def test_the_range_spans_the_dwells():
     data = readings(cubic_truth(), (-39.97, 20.0, 70.04))
-    assert calibrate(unit(), data).range_degc == (-39.9, 70.0)
+    assert calibrate(unit(), data).range_degc == (-40.0, 70.1)
     data = readings(cubic_truth(), (-40.3, 20.0, 70.7))  # not steps of 0.1 in binary
     assert calibrate(unit(), data).range_degc == (-40.3, 70.7)
     assert calibrate(unit(), readings(cubic_truth(), (20.03,))).range_degc == (19.53, 20.53)

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from triaxcal import __version__
+from triaxcal.cli.entry import INTERRUPTED
 from triaxcal.errors import RefusedError
 
 
@@ -51,7 +52,7 @@ def simulate(unit: Path, seed: int | None) -> None:
     click.echo(f"{write_simulated_unit(unit, seed)} written")
 
 
-def entry() -> None:
+def run() -> None:
     """Run the command line; one line and an exit code for whatever a user can cause."""
     try:
         main.main(standalone_mode=False)
@@ -62,12 +63,15 @@ def entry() -> None:
     except click.ClickException as wrong:
         wrong.show()
         sys.exit(2)
-    except (KeyboardInterrupt, click.Abort):
-        _leave("triaxcal: interrupted: nothing was written", 1)
+    except click.Abort:
+        _leave(INTERRUPTED, 1)
     except BrokenPipeError:
         # The reader of our output went away; what was to be written has been.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        _leave(f"triaxcal: {error.filename or 'output'}: {reason}", 1)
 
 
 def _leave(message: str, code: int) -> None:

@@ -52,7 +52,7 @@ from triaxcal.records import Dwell, MeasurementSet
 from triaxcal.unitfile import UnitDescription
 
 _STEP_DEGC = 0.1
-"""A working range taken from the calibrated temperatures is rounded inward to this."""
+"""A working range taken from the calibrated temperatures is rounded outward to this."""
 
 
 @dataclass(frozen=True)
@@ -277,16 +277,19 @@ def _refuse_singular(source: str, groups: tuple[TemperatureGroup, ...], gravity_
 def _working_range(
     unit: UnitDescription, groups: tuple[TemperatureGroup, ...]
 ) -> tuple[float, float]:
-    """Range of the description, or the calibrated one rounded inward to 0.1 degC.
+    """Range of the description, or that of the dwells at its ends, in steps of 0.1 degC.
 
-    One temperature alone is a range of +-0.5 degC.
+    The range spans every fitted dwell, so that none of them is clamped by the firmware, but ends
+    at most `EDGE_DEGC` from the outer groups' temperatures. One temperature alone is +-`EDGE_DEGC`.
     """
     low, high = groups[0].temp_degc, groups[-1].temp_degc
     if unit.range_degc is None:
         if len(groups) == 1:
             return low - EDGE_DEGC, high + EDGE_DEGC
+        coldest = max(low - EDGE_DEGC, min(d.temp_degc for d in groups[0].dwells))
+        hottest = min(high + EDGE_DEGC, max(d.temp_degc for d in groups[-1].dwells))
         # The 1e-6 forgives the rounding of decimal temperatures: 0.3 / 0.1 is 2.9999999999999996.
-        steps = math.ceil(low / _STEP_DEGC - 1e-6), math.floor(high / _STEP_DEGC + 1e-6)
+        steps = math.floor(coldest / _STEP_DEGC + 1e-6), math.ceil(hottest / _STEP_DEGC - 1e-6)
         return round(steps[0] * _STEP_DEGC, 1), round(steps[1] * _STEP_DEGC, 1)
     if unit.range_degc[0] < low - EDGE_DEGC or unit.range_degc[1] > high + EDGE_DEGC:
         raise RefusedError(
