@@ -29,6 +29,8 @@ from triaxcal.fit.calibrate import Calibration, calibrate
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.compensation import Compensation, compensate
+from triaxcal.model.metrological import unpack_constants
+from triaxcal.model.positions import AXES
 from triaxcal.records import MEASUREMENTS_FILE, MeasurementSet, read_measurements
 from triaxcal.unitfile import METHODS, UNIT_FILE, UnitDescription, read_unit
 
@@ -157,12 +159,21 @@ def _firmware_files(
         f"raw code: {unit.adc.bits} bits for {unit.adc.full_scale_v:g} V full scale",
         "code32 is a raw code left-justified to 32 bits",
     )
-    provenance = Provenance(unit.serial, inputs, summary)
+    provenance = Provenance(unit.serial, inputs, (*summary, *_constants_at_t0(calibration)))
     texts = render_routine(plan)
     texts[CONSTANTS_FILE] = render_constants(plan, unit.temperature_sensor, provenance)
     files = {name: text.encode() for name, text in texts.items()}
     files[IMAGE_FILE] = image_bytes(plan)
     return files
+
+
+def _constants_at_t0(calibration: Calibration) -> list[str]:
+    t0_degc = calibration.thermal.t0_degc
+    K, U0 = unpack_constants(calibration.thermal.constants_at(t0_degc))
+    return [f"at {t0_degc:g} degC, K x, y, z in V/g and U0 in V:"] + [
+        f"  {axis}  {K[i, 0]:+.9f} {K[i, 1]:+.9f} {K[i, 2]:+.9f}   {U0[i]:+.9f}"
+        for i, axis in enumerate(AXES)
+    ]
 
 
 def _other_routines(
