@@ -130,3 +130,91 @@ def run(plan: Plan, temp_code: int, raw: list[int]) -> tuple[list[int], int]:
     rows, status = set_temperature(plan, temp_code)
     accel, sample = apply(plan, rows, raw)
     return accel, status | sample
+
+
+# ---- step R and step E ----
+
+
+def keeps_step_r(
+    plan: Plan,
+) -> bool:
+    """Points 1 to 3 of step R, and segments that divide the range in rising order."""
+    firsts = [s.first_code for s in plan.segments]
+    if firsts[0] != plan.temp_min_code or sorted(set(firsts)) != firsts:
+        return False
+    lasts = [f - 1 for f in firsts[1:]] + [plan.temp_max_code]
+    for segment, first, last in zip(plan.segments, firsts, lasts, strict=True):
+        if first > last or segment.gain < 1:
+            return False
+        reach = max(abs(code - segment.origin_code) for code in (first, last))
+        if reach * segment.gain > INT32_MAX:
+            return False
+        bounds = []
+        for row in segment.coefficients.tolist():
+            bound = abs(row[-1])
+            largest = bound
+            for c in reversed(row[:-1]):
+                bound = abs(c) + math.floor(Fraction(bound, 2)) + 1
+                largest = max(largest, bound)
+            if largest > INT32_MAX:
+                return False
+            bounds.append(bound)
+        for n0, n1, n2, b in (bounds[i : i + 4] for i in (0, 4, 8)):
+            if plan.shape.form == "direct" and n0 + n1 + n2 + 2 * b >= 2**32 - 8:
+                return False
+    return True
+
+
+def real_rows(plan: Plan, code: int) -> list[list[Fraction]]:
+    """What the twelve functions stand for at a code of the range: exact, of the plan's floats."""
+    s = max(i for i, segment in enumerate(plan.segments) if segment.first_code <= code)
+    segment = plan.segments[s]
+    x = Fraction((code - segment.origin_code) * segment.gain, 2**31)
+    values = [
+        sum((Fraction(float(c)) * x**k for k, c in enumerate(row)), Fraction(0))
+        for row in plan.real[s]
+    ]
+    return [values[4 * i : 4 * i + 4] for i in range(3)]
+
+
+def real_gain_and_offset(plan: Plan, code: int) -> list[list[Fraction]]:
+    """n* and b* of step E: of the direct form as they are, of the inverse form K^-1 and -K^-1 U0.
+
+    With r = 2^log2 / det and det a quarter of det K over 2^(adjugate + determinant shifts), step I
+    makes the gain's integer 2^(log2 + 2 + determinant_shift - gain_shift) times K's inverse.
+    """
+    rows = real_rows(plan, code)
+    shifts = plan.shape.inverse
+    if shifts is None:
+        return rows
+    scale = Fraction(2) ** (
+        shifts.reciprocal_log2 + 2 + shifts.determinant_shift - shifts.gain_shift
+    )
+    k = [row[:3] for row in rows]
+    det = sum(k[0][j] * _cofactor(k, 0, j) for j in range(3))
+    inverse = [[scale * _cofactor(k, j, i) / det for j in range(3)] for i in range(3)]
+    return [[*n, -sum(n[j] * rows[j][3] for j in range(3)) / 2**32] for n in inverse]
+
+
+def real_accel(plan: Plan, rows: list[list[Fraction]], raw: list[int]) -> list[Fraction]:
+    """Exact acceleration in output LSB of raw codes within the declared range."""
+    u = [code * 2**plan.shape.raw_shift for code in raw]
+    return [
+        (sum((row[j] * u[j] for j in range(3)), Fraction(0)) / 2**32 + row[3])
+        / Fraction(2) ** (plan.shape.output_shift - 32)
+        for row in rows
+    ]
+
+
+def error_bound(plan: Plan, code: int) -> list[Fraction]:
+    """Step E's bound of each axis at one code, in output LSB."""
+    found, _ = set_temperature(plan, code)
+    spare = plan.shape.output_shift - 32
+    preload = 2 ** (spare - 1) if spare >= 1 else 0
+    u_max = max(abs(plan.shape.raw_min), abs(plan.shape.raw_max)) * 2**plan.shape.raw_shift
+    bounds = []
+    for n, exact in zip(found, real_gain_and_offset(plan, code), strict=True):
+        gain = sum(abs(n[j] - exact[j]) for j in range(3))
+        offset = abs(n[3] - preload - exact[3])
+        bounds.append((gain * u_max / 2**32 + offset) / Fraction(2) ** spare + Fraction(1, 2))
+    return bounds
