@@ -9,7 +9,7 @@ DEVELOPER := $(VENV)/.developer
 export UNIT
 
 .DEFAULT_GOAL := help
-.PHONY: help calib-header simulate test check lint types nightly bench golden clean
+.PHONY: help calib-header simulate test check lint types nightly bench golden clean test-targets
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -44,6 +44,9 @@ golden: $(DEVELOPER)  ## Write the golden files anew; look at the difference bef
 
 bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 	@$(BIN)/python bench/calib_header.py
+
+test-targets: $(INSTALLED)  ## The generated C on other cores under QEMU (all shapes, or UNIT=<name>)
+	@$(BIN)/triaxcal target test $${UNIT:+"units/$$UNIT"}
 
 clean:  ## Remove what make made
 	rm -rf build $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -10,6 +10,7 @@ import click
 
 from triaxcal import __version__
 from triaxcal.cli.entry import INTERRUPTED
+from triaxcal.cli.target import target
 from triaxcal.errors import RefusedError
 
 
@@ -50,6 +51,9 @@ def simulate(unit: Path, seed: int | None) -> None:
     from triaxcal.simulation.unit import write_simulated_unit  # noqa: PLC0415
 
     click.echo(f"{write_simulated_unit(unit, seed)} written")
+
+
+main.add_command(target)
 
 
 def run() -> None:

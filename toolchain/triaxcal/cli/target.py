@@ -1,0 +1,54 @@
+"""`triaxcal target`: the generated C on other cores."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+
+@click.group()
+def target() -> None:
+    """The generated C on Cortex-M, RISC-V and a big-endian core, under emulation."""
+
+
+@target.command()
+@click.argument("unit", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "--build",
+    type=click.Path(path_type=Path),
+    default=Path("build/targets"),
+    show_default=True,
+    help="Folder that receives targets.json.",
+)
+def test(unit: Path | None, build: Path) -> None:
+    """Compare every core, compiler and optimisation with Python, bit for bit.
+
+    UNIT is a folder with unit.toml and measurements.csv; without it, the shapes of the shipped
+    units in units/ are tried. Exit code 1 unless every build was done and passed.
+    """
+    from triaxcal.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
+    from triaxcal.targets.matrix import (  # noqa: PLC0415
+        PASSED,
+        Outcome,
+        run_builds,
+        shipped_builds,
+        unit_builds,
+    )
+    from triaxcal.targets.shapes import shipped_cases, unit_case  # noqa: PLC0415
+    from triaxcal.targets.table import counts, matrix_json, matrix_table  # noqa: PLC0415
+
+    builds = unit_builds(unit_case(unit)) if unit else shipped_builds(shipped_cases(Path("units")))
+
+    def progress(outcome: Outcome, done: int) -> None:
+        if outcome.status != PASSED or done % 10 == 0 or sys.stderr.isatty():
+            end = "\r" if sys.stderr.isatty() and outcome.status == PASSED else "\n"
+            line = f"{done}/{len(builds)} {outcome.status}: {outcome.build.label}"
+            click.echo(f"{line:100}"[:118] + end, nl=False, err=True)
+
+    outcomes = run_builds(builds, progress)
+    publish({"targets.json": matrix_json(outcomes).encode()}, build)
+    click.echo(matrix_table(outcomes))
+    if counts(outcomes)[PASSED] != len(outcomes):
+        sys.exit(1)

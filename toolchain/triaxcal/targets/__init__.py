@@ -1,0 +1,1 @@
+"""The generated C on other cores, under emulation: the same bits, and what they cost."""

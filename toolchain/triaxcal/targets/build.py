@@ -1,0 +1,130 @@
+"""Building a program for a core and running it under its emulator."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.codegen.compiler import FLAGS
+from triaxcal.resources import shipped
+from triaxcal.targets.cores import Core
+
+WARNINGS = tuple(f for f in FLAGS if not f.startswith("-O"))
+RUN_SECONDS = 600.0
+"""A program that runs longer hangs; the slowest of the matrix takes about 20 s."""
+
+
+class TargetError(Exception):
+    """A build or a run failed; the text is its first complaint."""
+
+
+@dataclass(frozen=True)
+class Toolset:
+    """A compiler with its flags for one core.
+
+    Attributes
+    ----------
+    compiler : str
+        "gcc" or "clang".
+    optimisation : str
+        As "-O2".
+    arithmetic : int
+        TRIAX_ARITHMETIC of the generated routine.
+    """
+
+    core: Core
+    compiler: str
+    optimisation: str
+    arithmetic: int = 0
+
+    def command(self) -> list[str]:
+        """Compile command without inputs and outputs."""
+        core = self.core
+        driver = (
+            [core.gcc] if self.compiler == "gcc" else ["clang", f"--target={core.clang_triple}"]
+        )
+        hosted = ["-DTARGET_HOSTED"] if core.hosted else ["-ffreestanding"]
+        return [
+            *driver, *core.flags, *WARNINGS, *hosted, self.optimisation,
+            "-ffunction-sections", "-fdata-sections",
+            f"-DTRIAX_ARITHMETIC={self.arithmetic}", "-DTRIAX_REF_MAX_SEGMENTS=8",
+        ]  # fmt: skip
+
+
+def build(
+    toolset: Toolset, sources: Sequence[Path], include: Sequence[Path], program: Path
+) -> None:
+    """Compile and link `sources` with the start-up code into `program`.
+
+    Raises
+    ------
+    TargetError
+        With the compiler's first complaint.
+    """
+    folder = program.parent
+    folder.mkdir(parents=True, exist_ok=True)
+    target = shipped("firmware_ref") / "target"
+    includes = [f"-I{path}" for path in (*include, target)]
+    objects = []
+    for source in (*sources, *_support(toolset.core)):
+        made = folder / f"{source.stem}.o"
+        run([*toolset.command(), *includes, "-c", str(source), "-o", str(made)])
+        objects.append(str(made))
+    run([*link_command(toolset.core), *objects, "-lgcc", "-o", str(program)])
+
+
+def _support(core: Core) -> list[Path]:
+    target = shipped("firmware_ref") / "target"
+    if core.hosted:
+        return [target / "target_io.c"]
+    start = "riscv_start.S" if "riscv" in core.gcc else "cortexm_start.c"
+    return [target / start, target / "target_io.c"]
+
+
+def link_command(core: Core) -> list[str]:
+    """Link command without inputs and outputs."""
+    if core.hosted:
+        return [core.gcc, "-static"]
+    script = "riscv.ld" if "riscv" in core.gcc else "cortexm.ld"
+    return [
+        core.gcc, *core.flags, "-nostdlib", "-nostartfiles", "-Wl,--gc-sections",
+        *(f"-Wl,--defsym={name}={value}" for name, value in core.memory.items()),
+        f"-Wl,-T,{shipped('firmware_ref') / 'target' / script}", "-Wl,--no-warn-rwx-segments",
+    ]  # fmt: skip
+
+
+def emulate(core: Core, program: Path, extra: Sequence[str] = ()) -> str:
+    """Run `program` and return what it printed.
+
+    Raises
+    ------
+    TargetError
+        When it ends with an error or does not end.
+    """
+    emulator, *options = core.emulator
+    return run([emulator, *extra, *options, str(program)])
+
+
+def run(command: Sequence[str]) -> str:
+    """Run a tool and return its standard output.
+
+    Raises
+    ------
+    TargetError
+        With its first complaint.
+    """
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=RUN_SECONDS,
+            stdin=subprocess.DEVNULL, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired as late:
+        raise TargetError(f"{command[0]} did not end within {RUN_SECONDS:g} s") from late
+    if done.returncode != 0:
+        lines = (done.stderr + done.stdout).splitlines()
+        errors = [line for line in lines if "error" in line.lower()] or lines
+        complaint = errors[0] if errors else f"exit code {done.returncode}"
+        raise TargetError(f"{Path(command[0]).name}: {complaint}")
+    return done.stdout

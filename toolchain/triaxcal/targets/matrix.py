@@ -1,0 +1,142 @@
+"""The matrix of builds: which, run in parallel, and what came of each."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.resources import shipped
+from triaxcal.targets.build import TargetError, Toolset, build, emulate
+from triaxcal.targets.cores import CORES, install_advice, missing_tools
+from triaxcal.targets.shapes import CUBIC, Case
+from triaxcal.targets.vectors import case_header, expected_lines
+
+PORTABLE, LIMBS, THUMB2 = 0, 1, 2
+ARITHMETIC_NAMES = ("portable", "limbs", "thumb2")
+"""Values of TRIAX_ARITHMETIC."""
+
+COMPILERS = ("gcc", "clang")
+OPTIMISATIONS = ("-O0", "-O1", "-O2", "-O3", "-Os")
+PASSED, FAILED, NOT_DONE = "passed", "failed", "not done"
+
+
+@dataclass(frozen=True)
+class Build:
+    """One build of one shape."""
+
+    case: Case
+    toolset: Toolset
+
+    @property
+    def label(self) -> str:
+        """For people."""
+        t = self.toolset
+        return (
+            f"{self.case.name}, {t.core.name}, {t.compiler} {t.optimisation}, "
+            f"{ARITHMETIC_NAMES[t.arithmetic]}"
+        )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a build: PASSED, FAILED or NOT_DONE, and why."""
+
+    build: Build
+    status: str
+    detail: str
+
+
+def shipped_builds(cases: Sequence[Case]) -> list[Build]:
+    """Every core, compiler and optimisation for the cubic; two of them for the other shapes."""
+    builds: list[Build] = []
+    for case in cases:
+        combinations = (
+            [(c, o) for c in COMPILERS for o in OPTIMISATIONS]
+            if case.name == CUBIC
+            else [("gcc", "-O2"), ("clang", "-Os")]
+        )
+        builds += _builds(case, combinations)
+    return builds
+
+
+def unit_builds(case: Case) -> list[Build]:
+    """Every core, compiler and optimisation for a unit's own shape."""
+    return list(_builds(case, [(c, o) for c in COMPILERS for o in OPTIMISATIONS]))
+
+
+def _builds(case: Case, combinations: Sequence[tuple[str, str]]) -> Iterator[Build]:
+    for core in CORES:
+        forms = (PORTABLE,)
+        for arithmetic in forms:
+            for compiler, optimisation in combinations:
+                yield Build(case, Toolset(core, compiler, optimisation, arithmetic))
+
+
+def run_builds(
+    builds: Sequence[Build], progress: Callable[[Outcome, int], None] = lambda _o, _n: None
+) -> list[Outcome]:
+    """Build, run and judge all, in the order given; `progress` hears of each as it ends."""
+    outcomes: dict[int, Outcome] = {}
+    with tempfile.TemporaryDirectory(prefix="triaxcal-targets-") as name:
+        work = Path(name)
+        sources = _write_cases(builds, work)
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            futures = {
+                pool.submit(_outcome, b, *sources[b.case.name], work / f"build-{i}"): i
+                for i, b in enumerate(builds)
+            }
+            for future in as_completed(futures):
+                outcomes[futures[future]] = future.result()
+                progress(future.result(), len(outcomes))
+    return [outcomes[i] for i in range(len(builds))]
+
+
+def _write_cases(builds: Sequence[Build], work: Path) -> dict[str, tuple[Path, dict[str, int]]]:
+    """Folder and expected output of each shape."""
+    written: dict[str, tuple[Path, dict[str, int]]] = {}
+    for case in {b.case.name: b.case for b in builds}.values():
+        folder = work / f"case-{len(written)}"
+        folder.mkdir()
+        for name, text in case.files.items():
+            (folder / name).write_text(text)
+        (folder / "target_case.h").write_text(case_header(case))
+        written[case.name] = folder, expected_lines(case)
+    return written
+
+
+def _outcome(planned: Build, folder: Path, expected: dict[str, int], place: Path) -> Outcome:
+    toolset = planned.toolset
+    missing = missing_tools(toolset.core.tools(toolset.compiler))
+    if missing:
+        detail = f"{', '.join(missing)} not found: {install_advice(missing)}"
+        return Outcome(planned, NOT_DONE, detail)
+    firmware = shipped("firmware_ref")
+    sources = [
+        folder / "triax_comp.c",
+        firmware / "triax_ref.c",
+        firmware / "triax_ref_image.c",
+        firmware / "target" / "test_main.c",
+    ]
+    program = place / "program.elf"
+    try:
+        build(toolset, sources, [folder, firmware], program)
+        complaint = compare(emulate(toolset.core, program), expected)
+    except TargetError as error:
+        complaint = str(error)
+    return Outcome(planned, FAILED if complaint else PASSED, complaint)
+
+
+def compare(printed: str, expected: dict[str, int]) -> str:
+    """First difference between what a target printed and what Python expects; "" for none."""
+    wanted = [f"{name} {value:08x}" for name, value in expected.items()]
+    found = printed.splitlines()
+    for line, want in zip(found, wanted, strict=False):
+        if line != want:
+            return f"printed '{line}', expected '{want}'"
+    if len(found) != len(wanted):
+        return f"printed {len(found)} lines, expected {len(wanted)}"
+    return ""

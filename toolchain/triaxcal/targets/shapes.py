@@ -1,0 +1,112 @@
+"""The shapes whose generated C is tried: plans of the shipped units and of variants of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
+from triaxcal.delivery import compensation_of, inputs_sha256
+from triaxcal.errors import RefusedError
+from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.fixedpoint.plan import Plan, make_plan
+from triaxcal.records import MEASUREMENTS_FILE, read_measurements
+from triaxcal.unitfile import UnitDescription, read_unit
+
+
+@dataclass(frozen=True)
+class Case:
+    """One shape: a plan, its generated files and its image.
+
+    Attributes
+    ----------
+    name : str
+        Of the shape.
+    note : str
+        What is particular about it.
+    files : dict
+        triax_comp.h, triax_comp.c and triax_calib.h.
+    """
+
+    name: str
+    note: str
+    plan: Plan
+    files: dict[str, str]
+    image: bytes
+
+
+Change = Callable[[UnitDescription], UnitDescription]
+CUBIC = "cubic"
+CUBIC_LEFT = "cubic, left-justified"
+
+
+def _order_3(unit: UnitDescription) -> UnitDescription:
+    return replace(unit, model_error_max_micro_g=10.0)
+
+
+def _left_justified(unit: UnitDescription) -> UnitDescription:
+    return replace(unit, adc=replace(unit.adc, bits=32, code_min=-(2**31), code_max=2**31 - 1))
+
+
+def _odd_range(unit: UnitDescription) -> UnitDescription:
+    return replace(unit, adc=replace(unit.adc, code_min=-8_000_000, code_max=8_000_000))
+
+
+_SHAPES: tuple[tuple[str, str, str, Change], ...] = (
+    (CUBIC, "AT-SIM", "N(T) of order 3", _order_3),
+    (CUBIC_LEFT, "AT-SIM", "raw codes that fill int32", lambda u: _left_justified(_order_3(u))),
+    ("AT-SIM", "AT-SIM", "as shipped", lambda u: u),
+    ("AT-CHERNIAK", "AT-CHERNIAK", "as shipped: piecewise", lambda u: u),
+    ("inverse", "AT-SIM", "K(T) inverted on the device", lambda u: replace(u, method="inverse")),
+    ("saturating", "AT-SIM", "output_q 28: no spare bits", lambda u: replace(u, output_q=28)),
+    ("no spare bit", "AT-SIM", "output_q 27", lambda u: replace(u, output_q=27)),
+    ("odd range", "AT-SIM", "raw codes -8000000 to 8000000", _odd_range),
+    ("16 bits", "AT-SIM", "16-bit raw codes", lambda u: replace(u, adc=replace(
+        u.adc, bits=16, code_min=-(2**15), code_max=2**15 - 1))),
+    ("fine thermometer", "AT-SIM", "366667 temperature codes", lambda u: replace(
+        u, temperature_sensor=replace(u.temperature_sensor, degc_per_code=0.0003))),
+)  # fmt: skip
+
+
+def shipped_cases(units: Path) -> tuple[Case, ...]:
+    """Every shape of the matrix, from the units AT-SIM and AT-CHERNIAK in folder `units`.
+
+    Raises
+    ------
+    RefusedError
+        When a unit is refused, or the cubic shapes are not of order 3.
+    """
+    cases = tuple(_case(units / unit, name, note, change) for name, unit, note, change in _SHAPES)
+    for case in cases[:2]:
+        if case.plan.shape.order != 3:
+            raise RefusedError(
+                f"shape {case.name}",
+                f"N(T) is of order {case.plan.shape.order}",
+                expected="order 3",
+                remedy="the measurements of AT-SIM have changed: choose another error limit",
+            )
+    return cases
+
+
+def unit_case(folder: Path) -> Case:
+    """The shape of the unit in `folder`."""
+    return _case(folder, folder.absolute().name, "as described", lambda u: u)
+
+
+@cache
+def _calibrated(folder: Path) -> tuple[UnitDescription, Calibration]:
+    unit = read_unit(folder)
+    return unit, calibrate(unit, read_measurements(folder / MEASUREMENTS_FILE, unit))
+
+
+def _case(folder: Path, name: str, note: str, change: Change) -> Case:
+    described, calibration = _calibrated(folder)
+    unit = change(described)
+    plan = make_plan(compensation_of(unit, calibration, unit.method), unit)
+    files = render_routine(plan)
+    provenance = Provenance(unit.serial, inputs_sha256(folder), (f"shape {name}: {note}",))
+    files[CONSTANTS_FILE] = render_constants(plan, unit.temperature_sensor, provenance)
+    return Case(name, note, plan, files, image_bytes(plan))
