@@ -11,6 +11,7 @@ import click
 from triaxcal import __version__
 from triaxcal.cli.entry import INTERRUPTED
 from triaxcal.cli.target import target
+from triaxcal.cli.verify import verify
 from triaxcal.errors import RefusedError
 
 
@@ -54,6 +55,7 @@ def simulate(unit: Path, seed: int | None) -> None:
 
 
 main.add_command(target)
+main.add_command(verify)
 
 
 def run() -> None:

@@ -1,0 +1,72 @@
+"""Every check of a delivered unit, on two cores; a missing tool is named and never counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from triaxcal.codegen.crosscheck import CrossCheck
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.proof import Bound
+from triaxcal.verify import analyzers, cppcheck, eva, gappa
+from triaxcal.verify.outcome import FAILED, NOT_DONE, Outcome, judged
+from triaxcal.verify.tools import BrokenToolError, MissingToolError
+from triaxcal.verify.workspace import Workspace
+
+Check = Callable[[Workspace], Outcome]
+
+CHECKS: tuple[tuple[str, str, Check], ...] = (
+    ("gappa", "Gappa: error bound", gappa.check),
+    ("eva_codes", "Eva: any int32 codes", eva.check_codes),
+    ("eva_image", "Eva: any image", eva.check_image),
+    ("cppcheck", "cppcheck: MISRA C:2012", cppcheck.check),
+    ("gcc_analyzer", "gcc -fanalyzer", analyzers.check_gcc_analyzer),
+    ("gcc_sanitizers", "gcc address, undefined", analyzers.check_gcc_sanitizers),
+    ("clang_sanitizers", "clang undefined, integer", analyzers.check_clang_sanitizers),
+)
+"""Key, title and function of each check with a tool, in the order of the table."""
+
+
+def verify_files(
+    folder: Path, files: Mapping[str, bytes], plan: Plan, bound: Bound
+) -> tuple[Outcome, ...]:
+    """Run every check on delivered files; `folder` is for the work and stays behind."""
+    work = Workspace.create(folder, files, plan, bound)
+    with ThreadPoolExecutor(2) as pool:
+        return tuple(pool.map(lambda check: _run(work, *check), CHECKS))
+
+
+def delivery_outcomes(bound: Bound, check: CrossCheck) -> tuple[Outcome, ...]:
+    """What the delivery itself has proven and compared: these run in every `calib`."""
+    return (
+        judged(
+            "exact_bound",
+            "exact bound, every code",
+            good=check.largest_error_lsb <= bound.lsb,
+            finding=f"{bound.lsb:.3f} LSB over {bound.codes} temperature codes; "
+            f"largest seen {check.largest_error_lsb:.3f}",
+            figures={},
+        ),
+        judged(
+            "cross_check",
+            "cross-check",
+            good=True,
+            finding=f"0 mismatches on {check.total} vectors, three implementations",
+            figures={},
+        ),
+    )
+
+
+def exit_code(outcomes: Sequence[Outcome]) -> int:
+    """1 when any check failed; what was not done is no failure and no success."""
+    return int(any(o.result == FAILED for o in outcomes))
+
+
+def _run(work: Workspace, key: str, title: str, check: Check) -> Outcome:
+    try:
+        return check(work)
+    except MissingToolError as missing:
+        return Outcome(key, title, NOT_DONE, str(missing))
+    except BrokenToolError as broken:
+        return Outcome(key, title, FAILED, str(broken))

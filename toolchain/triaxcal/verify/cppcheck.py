@@ -1,0 +1,123 @@
+"""cppcheck with its MISRA addon on the generated C: no finding but the deviations on file."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.verify.outcome import Outcome, judged
+from triaxcal.verify.tools import BrokenToolError, Tool, run
+from triaxcal.verify.workspace import CONSTANTS, ROUTINE, Workspace
+
+CPPCHECK = Tool("cppcheck", "cppcheck")
+DEVIATIONS = Path(__file__).with_name("misra_deviations.toml")
+USER = "verify_user.c"
+OPTIONS = (
+    "--std=c99", "--addon=misra", "--enable=warning,style,performance,portability", "--quiet",
+    "--template={file}\t{line}\t{id}\t{message}", "--error-exitcode=0",
+)  # fmt: skip
+
+_RULE = re.compile(r"misra-c2012-(\d+\.\d+)")
+_MACRO = re.compile(r"#define (\w+)")
+_FUNCTION = re.compile(r"[A-Za-z_][\w\s*]*?(\w+)\([^;]*$")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One complaint: file, line, MISRA rule ("" for cppcheck's own), function or macro, text."""
+
+    file: str
+    line: int
+    rule: str
+    place: str
+    text: str
+
+    def __str__(self) -> str:
+        rule = f"MISRA {self.rule}" if self.rule else self.text
+        return f"{self.file}:{self.line} ({self.place or 'file'}): {rule}"
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """A rule that is not kept in certain places, and why."""
+
+    rule: str
+    places: tuple[str, ...]
+    reason: str
+
+    def covers(self, finding: Finding) -> bool:
+        """Whether the finding is this deviation."""
+        return finding.rule == self.rule and finding.place in self.places
+
+
+def check(work: Workspace) -> Outcome:
+    """The routine, and a file that includes the constants as firmware does."""
+    findings = find_all(work)
+    deviations = read_deviations()
+    left = [f for f in findings if not any(d.covers(f) for d in deviations)]
+    deviated = sorted({f.rule for f in findings} - {f.rule for f in left})
+    finding = f"{len(left)} findings"
+    if deviated:
+        finding += f"; deviations from rule {' and '.join(deviated)}"
+    figures = {"version": CPPCHECK.version(), "findings": len(left), "deviations": deviated}
+    return judged(
+        "cppcheck",
+        "cppcheck: MISRA C:2012",
+        good=not left,
+        finding=finding,
+        figures=figures,
+        details=[str(f) for f in left],
+    )
+
+
+def read_deviations() -> tuple[Deviation, ...]:
+    """The deviations on file."""
+    entries = tomllib.loads(DEVIATIONS.read_text())["deviation"]
+    return tuple(
+        Deviation(e["rule"], tuple(e["places"]), " ".join(e["reason"].split())) for e in entries
+    )
+
+
+def find_all(work: Workspace) -> list[Finding]:
+    """Every complaint about the generated files, deviations included.
+
+    Raises
+    ------
+    MissingToolError, BrokenToolError
+    """
+    (work.folder / USER).write_text(f'#include "{CONSTANTS}"\n')
+    command = [CPPCHECK.find(), *OPTIONS, ROUTINE, USER]
+    answer = run(command, work.folder)
+    if answer.code:
+        raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
+    findings = []
+    for line in answer.text.splitlines():
+        file, number, identity, text = [*line.split("\t", 3), "", "", ""][:4]
+        if not number.isdigit():
+            raise BrokenToolError(f"cppcheck: {line[:200]}")
+        if file == USER:
+            continue
+        rule = _RULE.fullmatch(identity)
+        source = (work.folder / file).read_text().splitlines()
+        place = place_of(source, int(number))
+        findings.append(
+            Finding(file, int(number), rule.group(1) if rule else "", place, f"{identity}: {text}")
+        )
+    return findings
+
+
+def place_of(source: Sequence[str], line: int) -> str:
+    """Macro defined on a line (counted from 1), or the function that it lies in, or ""."""
+    macro = _MACRO.match(source[line - 1])
+    if macro:
+        return macro.group(1)
+    for text in reversed(source[:line]):
+        if text == "}" and text is not source[line - 1]:
+            return ""
+        head = _FUNCTION.match(text)
+        if head:
+            return head.group(1)
+    return ""

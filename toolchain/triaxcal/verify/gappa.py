@@ -1,0 +1,151 @@
+"""A second bound of the arithmetic error, by Gappa, that shares nothing with `fixedpoint.proof`.
+
+One script for each axis and segment: the integers are those of the delivered image, the reals
+those that the plan stands for; temperature and raw codes are intervals. Gappa propagates the
+errors of the floors by interval arithmetic, which is coarser than visiting every code: its bound
+lies above the exact one or one of the two is wrong. docs/verification.md has the script explained.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+
+from triaxcal.verify.image_reader import Image, read_image
+from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
+from triaxcal.verify.tools import BrokenToolError, Tool, run
+from triaxcal.verify.workspace import Workspace
+
+GAPPA = Tool("gappa", "gappa")
+SLICES = 16
+"""Temperature intervals of a segment; more do not tighten the bound."""
+TIGHT = 1.2
+"""A bound within this ratio of the exact one is called tight."""
+
+_KEY, _TITLE = "gappa", "Gappa: error bound"
+_NAMES = "ABCD"
+_NUMBER = r"(-?\d+)(?:b(-?\d+))?"
+_APPROXIMATION = r"(?: \{[^}]*\})?"
+_INTERVAL = re.compile(rf" in \[{_NUMBER}{_APPROXIMATION}, {_NUMBER}{_APPROXIMATION}\]")
+
+
+def check(work: Workspace) -> Outcome:
+    """Bound every axis on every segment and compare with the exact bound.
+
+    Raises
+    ------
+    MissingToolError, BrokenToolError
+    """
+    GAPPA.find()
+    image = read_image(work.image)
+    if image.inverse_form:
+        return Outcome(
+            _KEY, _TITLE, NOT_DONE,
+            "not done for the inverse form: intervals lose how the errors of adjugate and "
+            "determinant cancel; the exact bound over every code stands alone",
+        )  # fmt: skip
+    jobs = [(axis, s) for axis in range(3) for s in range(len(image.segments))]
+    with ThreadPoolExecutor(2) as pool:
+        bounds = list(pool.map(lambda job: _bound(work, image, *job), jobs))
+    per_axis = [max(b for (a, _), b in zip(jobs, bounds, strict=True) if a == i) for i in range(3)]
+    exact = work.bound.per_axis_lsb
+    good = all(found >= e for found, e in zip(per_axis, exact, strict=True))
+    ratio = max(per_axis) / work.bound.lsb
+    finding = (
+        f"{max(per_axis):.3f} LSB, {100 * (ratio - 1):.1f} % above the exact {work.bound.lsb:.3f}"
+    )
+    if not good:
+        finding = f"{max(per_axis):.3f} LSB lies below the exact {work.bound.lsb:.3f}: one is wrong"
+    elif ratio > TIGHT:
+        finding += " (loose)"
+    figures = {
+        "version": GAPPA.version(),
+        "per_axis_lsb": per_axis,
+        "exact_per_axis_lsb": list(exact),
+        "ratio_to_exact": ratio,
+    }
+    return judged(_KEY, _TITLE, good=good, finding=finding, figures=figures)
+
+
+def _bound(work: Workspace, image: Image, axis: int, s: int) -> float:
+    """Gappa's bound of |a - a*| in LSB, rounded up."""
+    script = work.render(
+        f"verify_{axis}_{s}.g", "verify_gappa.g.j2", script_context(work, image, axis, s)
+    )
+    answer = run([GAPPA.find(), script.name], work.folder)
+    if answer.code or "arning" in answer.text:
+        # A hint that Gappa cannot check itself comes as a warning: then nothing is proven.
+        raise BrokenToolError(f"gappa: {' '.join(answer.text.split())[:200]}")
+    return largest_magnitude(answer.text)
+
+
+def largest_magnitude(text: str) -> float:
+    """Larger magnitude of the ends of the interval that Gappa printed, rounded up.
+
+    Raises
+    ------
+    BrokenToolError
+        When it printed none.
+    """
+    found = _INTERVAL.search(text)
+    if found is None:
+        raise BrokenToolError(f"gappa gave no interval: {' '.join(text.split())[:200]}")
+    ends = [
+        abs(Fraction(int(m)) * Fraction(2) ** int(e or 0))
+        for m, e in (found.group(1, 2), found.group(3, 4))
+    ]
+    largest = max(ends)
+    value = float(largest)
+    # Shortest step upwards that a float can hold: the stated bound never lies below the proven.
+    return value if Fraction(value) >= largest else value * (1 + 2.0**-52)
+
+
+def script_context(work: Workspace, image: Image, axis: int, s: int) -> dict[str, object]:
+    """What the template of the script shows; numbers are exact, as integers over powers of two."""
+    segment = image.segments[s]
+    spare = image.output_shift - 32
+    preload = 1 << (spare - 1) if spare > 0 else 0
+    box = max(abs(image.raw_min), abs(image.raw_max)) << image.raw_shift
+    return {
+        "axis": "xyz"[axis],
+        "segment": s,
+        "functions": [
+            _function(name, segment.coefficients[4 * axis + j], work.plan.real[s, 4 * axis + j])
+            for j, name in enumerate(_NAMES)
+        ],
+        "order": image.order,
+        "preload": preload,
+        "rounding": "" if preload else " + 1b-1",
+        "spare": spare,
+        "x_low": _dyadic(
+            Fraction((segment.first_code - segment.origin_code) * segment.gain, 2**32)
+        ),
+        "x_high": _dyadic(
+            Fraction((segment.last_code - segment.origin_code) * segment.gain, 2**32)
+        ),
+        "x_is_a_point": segment.first_code == segment.last_code,
+        "box": _dyadic(Fraction(box, 2**32)),
+        "slices": SLICES,
+    }
+
+
+def _function(name: str, integers: Sequence[int], reals: Iterable[float]) -> dict[str, object]:
+    """Integer and real coefficient of each order, highest first.
+
+    The real one of order k carries the k bits that Horner's halving adds.
+    """
+    terms = [
+        {"k": k, "integer": integer, "real": _dyadic(Fraction(float(real)) * 2**k)}
+        for k, (integer, real) in enumerate(zip(integers, reals, strict=True))
+    ]
+    return {"name": name, "highest": terms[-1], "lower": terms[-2::-1]}
+
+
+def _dyadic(value: Fraction) -> str:
+    """Gappa's literal of an integer over a power of two."""
+    shift = value.denominator.bit_length() - 1
+    if value.denominator != 1 << shift:
+        raise ValueError(f"{value} is no integer over a power of two")
+    return f"{value.numerator}b-{shift}" if shift else str(value.numerator)

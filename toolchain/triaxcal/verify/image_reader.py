@@ -1,0 +1,73 @@
+"""The delivered image read back: the integers that the checks reason about.
+
+Written from the layout in docs/fixed-point.md and not from the writer, so that a mistake of the
+writer shows.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+
+from triaxcal.errors import RefusedError
+
+HEADER_WORDS = 15
+FUNCTIONS = 12
+
+
+@dataclass(frozen=True)
+class ImageSegment:
+    """A segment: codes first_code to last_code, x = (code - origin_code) * gain."""
+
+    first_code: int
+    last_code: int
+    origin_code: int
+    gain: int
+    coefficients: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class Image:
+    """What an image says; shifts of the inverse form are left out."""
+
+    inverse_form: bool
+    order: int
+    output_shift: int
+    raw_min: int
+    raw_max: int
+    raw_shift: int
+    segments: tuple[ImageSegment, ...]
+
+
+def read_image(image: bytes) -> Image:
+    """Read an image.
+
+    Raises
+    ------
+    RefusedError
+        When its size or its CRC is wrong.
+    """
+    if len(image) % 4 or len(image) < 4 * (HEADER_WORDS + 3):
+        raise RefusedError(
+            "image", f"{len(image)} bytes", expected="whole words, a header at least"
+        )
+    words = struct.unpack(f"<{len(image) // 4}i", image)
+    if words[2] != len(image) or words[-1] % 2**32 != zlib.crc32(image[:-4]):
+        raise RefusedError("image", "size or CRC is wrong", remedy="write it again")
+    form, segments, order, _, output_shift, raw_min, raw_max, raw_shift = words[3:11]
+    step = 3 + FUNCTIONS * (order + 1)
+    starts = [HEADER_WORDS + 2 + s * step for s in range(segments)]
+    lasts = [words[start] - 1 for start in starts[1:]] + [words[HEADER_WORDS + 1]]
+    return Image(
+        bool(form), order, output_shift, raw_min, raw_max, raw_shift,
+        tuple(_segment(words[at : at + step], last, order)
+              for at, last in zip(starts, lasts, strict=True)),
+    )  # fmt: skip
+
+
+def _segment(words: tuple[int, ...], last_code: int, order: int) -> ImageSegment:
+    first_code, origin_code, gain = words[:3]
+    terms = order + 1
+    rows = tuple(words[3 + f * terms : 3 + (f + 1) * terms] for f in range(FUNCTIONS))
+    return ImageSegment(first_code, last_code, origin_code, gain, rows)

@@ -1,0 +1,73 @@
+"""The outcomes in verification.json, beside what the delivery wrote there."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from triaxcal.errors import RefusedError
+from triaxcal.verify.outcome import Outcome
+
+FILE = "verification.json"
+SECTION = "tools"
+
+
+def is_delivered(target: Path, files: Mapping[str, bytes]) -> bool:
+    """Whether `target` holds these files; in verification.json sections may have been added."""
+    for name, content in files.items():
+        path = target / name
+        if not path.is_file():
+            return False
+        found = path.read_bytes()
+        if name == FILE:
+            base, present = json.loads(content), _load(found, path)
+            if any(present.get(key) != value for key, value in base.items()):
+                return False
+        elif found != content:
+            return False
+    return True
+
+
+def record(target: Path, outcomes: Sequence[Outcome]) -> None:
+    """Set the section of the tools in verification.json; everything else keeps its bytes.
+
+    The new file is written beside the old one and takes its place when it is complete.
+
+    Raises
+    ------
+    RefusedError
+        When the file cannot be read or written.
+    """
+    path = target / FILE
+    document = _load(path.read_bytes(), path)
+    document[SECTION] = {outcome.key: outcome.json() for outcome in outcomes}
+    content = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{FILE}.", dir=target)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content.encode())
+            Path(name).chmod(path.stat().st_mode)
+            Path(name).replace(path)
+        finally:
+            Path(name).unlink(missing_ok=True)
+    except OSError as error:
+        raise RefusedError(
+            str(path),
+            f"cannot be written: {(error.strerror or str(error)).lower()}",
+            remedy="free some space or name another folder",
+        ) from error
+
+
+def _load(content: bytes, path: Path) -> dict[str, Any]:
+    try:
+        document = json.loads(content)
+    except ValueError:
+        document = None
+    if not isinstance(document, dict):
+        raise RefusedError(str(path), "is no JSON object", remedy="run triaxcal calib again")
+    return document

@@ -1,0 +1,34 @@
+"""The outcomes as a table for people."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
+
+WIDTH = 100
+SHOWN_DETAILS = 10
+
+
+def table(outcomes: Sequence[Outcome]) -> str:
+    """Title, result and finding of each check, complaints of those that failed, and the count."""
+    left = max(len(o.title) for o in outcomes) + 2
+    lines: list[str] = []
+    for outcome in outcomes:
+        head = f"{outcome.title:<{left}}{outcome.result:<10}"
+        lines += textwrap.wrap(
+            outcome.finding, WIDTH, initial_indent=head, subsequent_indent=" " * len(head)
+        )
+        if outcome.result == FAILED:
+            lines += [f"  {detail}" for detail in outcome.details[:SHOWN_DETAILS]]
+            if len(outcome.details) > SHOWN_DETAILS:
+                lines.append(f"  and {len(outcome.details) - SHOWN_DETAILS} more")
+    return "\n".join([*lines, "", _count(outcomes)])
+
+
+def _count(outcomes: Sequence[Outcome]) -> str:
+    counts = {r: sum(o.result == r for o in outcomes) for r in (PASSED, FAILED, NOT_DONE)}
+    text = f"{counts[PASSED]} passed, {counts[FAILED]} failed, {counts[NOT_DONE]} not done"
+    names = [o.title for o in outcomes if o.result == NOT_DONE]
+    return f"{text}: {', '.join(names)}" if names else text

@@ -1,0 +1,53 @@
+"""The delivered files in a folder of their own, and what the checks need to know of the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from triaxcal.codegen.render import environment
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.proof import Bound
+
+ROUTINE = "triax_comp.c"
+CONSTANTS = "triax_calib.h"
+IMAGE = "triax_calib.bin"
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Delivered files on disk.
+
+    Attributes
+    ----------
+    folder : Path
+        Holds the delivered files; a check may add its own beside them, under its own names.
+    plan, bound : of the delivery
+    """
+
+    folder: Path
+    plan: Plan
+    bound: Bound
+
+    @classmethod
+    def create(
+        cls, folder: Path, files: Mapping[str, bytes], plan: Plan, bound: Bound
+    ) -> Workspace:
+        """Write the delivered files into `folder`."""
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            (folder / name).write_bytes(content)
+        return cls(folder, plan, bound)
+
+    @property
+    def image(self) -> bytes:
+        """The delivered image."""
+        return (self.folder / IMAGE).read_bytes()
+
+    def render(self, name: str, template: str, context: dict[str, Any]) -> Path:
+        """Write a template's text under `name` and return its path."""
+        path = self.folder / name
+        path.write_text(environment().get_template(template).render(**context))
+        return path
