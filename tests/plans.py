@@ -8,6 +8,7 @@ tests/golden/.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from random import Random
 
 import numpy as np
@@ -169,6 +170,53 @@ def random_plan(rng: Random, shape: Shape, *, full: bool = False) -> Plan:
     high = low + rng.choice([shape.segments, 14080, rng.randint(shape.segments, 2**29)])
     firsts = sorted(rng.sample(range(low + 1, high + 1), shape.segments - 1))
     return integer_plan(shape, rows, (low, high), firsts)
+
+
+def vectors(plan: Plan, rng: Random, count: int) -> tuple[list[int], list[list[int]]]:
+    """Temperatures at every limit and `count` more, each with raw codes at limits or anywhere."""
+    limits = {INT32_MIN, INT32_MAX, plan.temp_min_code - 1, plan.temp_max_code + 1}
+    limits |= {plan.temp_min_code, plan.temp_max_code}
+    for s in plan.segments:
+        limits |= {s.first_code + d for d in (-1, 0, 1)} | {s.origin_code}
+    temps = sorted(limits)
+    temps += [rng.randint(plan.temp_min_code, plan.temp_max_code) for _ in range(count)]
+    low, high = plan.shape.raw_min, plan.shape.raw_max
+    ends = [low, low, high, high, low - 1, low + 1, high - 1, high + 1, 0, INT32_MIN, INT32_MAX]
+
+    def code() -> int:
+        kind = rng.randrange(4)
+        value = rng.choice(ends) if kind < 2 else rng.randint(low, high)
+        value = rng.randint(INT32_MIN, INT32_MAX) if kind == 3 else value
+        return min(max(value, INT32_MIN), INT32_MAX)
+
+    return temps, [[code() for _ in range(3)] for _ in temps]
+
+
+def disturbed(rng: Random, plan: Plan, over: int) -> Plan:
+    """Take a plan and move one word of its constants away from zero by `over`."""
+    s, f = rng.randrange(plan.shape.segments), rng.randrange(12)
+    k = rng.randrange(plan.shape.order + 1)
+    segment = plan.segments[s]
+
+    def moved(value: int) -> int:
+        away = over if value >= 0 else -over
+        return min(max(value + away, INT32_MIN), INT32_MAX)
+
+    field = rng.choice(
+        ["coefficient"] * 4
+        + ["first_code", "origin_code", "gain", "temp_min_code", "temp_max_code"]
+    )
+    if field.startswith("temp_"):
+        return replace(plan, **{field: moved(getattr(plan, field))})
+    if field == "coefficient":
+        coefficients = segment.coefficients.copy()
+        coefficients[f, k] = moved(int(coefficients[f, k]))
+        segment = replace(segment, coefficients=coefficients)
+    else:
+        segment = replace(segment, **{field: moved(getattr(segment, field))})
+    segments = list(plan.segments)
+    segments[s] = segment
+    return replace(plan, segments=tuple(segments))
 
 
 # ---- shapes that touch every branch of the templates ----
@@ -352,8 +400,8 @@ GOLDEN: dict[str, Plan] = {
         integer_shape(
             form=INVERSE,
             order=2,
-            output_q=28,
-            output_shift=31,
+            output_q=30,
+            output_shift=29,
             raw=(-7_000_000, 7_500_000),
             shifts=(31, 29, 61, 31),
         ),

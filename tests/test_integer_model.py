@@ -19,6 +19,7 @@ from plans import (
     integer_plan,
     integer_shape,
     random_plan,
+    vectors,
 )
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.routines import Reference
@@ -62,26 +63,6 @@ def plans(draw: st.DrawFn, form: str) -> Plan:
         shifts=draw(shifts),
     )
     return random_plan(Random(draw(st.integers(0, 2**32))), shape, full=draw(st.booleans()))
-
-
-def vectors(plan: Plan, rng: Random, count: int) -> tuple[list[int], list[list[int]]]:
-    """Temperatures at every limit and anywhere, each with raw codes at limits or anywhere."""
-    limits = {INT32_MIN, INT32_MAX, plan.temp_min_code - 1, plan.temp_max_code + 1}
-    limits |= {plan.temp_min_code, plan.temp_max_code}
-    for s in plan.segments:
-        limits |= {s.first_code + d for d in (-1, 0, 1)} | {s.origin_code}
-    temps = sorted(limits)
-    temps += [rng.randint(plan.temp_min_code, plan.temp_max_code) for _ in range(count)]
-    low, high = plan.shape.raw_min, plan.shape.raw_max
-    ends = [low, low, high, high, low - 1, low + 1, high - 1, high + 1, 0, INT32_MIN, INT32_MAX]
-
-    def code() -> int:
-        kind = rng.randrange(4)
-        value = rng.choice(ends) if kind < 2 else rng.randint(low, high)
-        value = rng.randint(INT32_MIN, INT32_MAX) if kind == 3 else value
-        return min(max(value, INT32_MIN), INT32_MAX)
-
-    return temps, [[code() for _ in range(3)] for _ in temps]
 
 
 def model_run(plan: Plan, temps: list[int], raws: list[list[int]]) -> list[tuple[list[int], int]]:

@@ -1,0 +1,123 @@
+"""One-line faults in the generated routine, by golden plan, that the vectors must notice."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Mutant(NamedTuple):
+    """What is wrong, a text of triax_comp.c, and what replaces its first occurrence."""
+
+    what: str
+    old: str
+    new: str
+
+
+MUTANTS: dict[str, list[Mutant]] = {
+    "direct-checked": [
+        Mutant(
+            "high word truncated", "(-1 - (int32_t)(~value >> 32))", "(int32_t)(value / 4294967296)"
+        ),
+        Mutant("high word of the other half", "(int32_t)(value >> 32)", "(int32_t)(value >> 31)"),
+        Mutant("final shift truncated", "(~(~value >> shift))", "(-(-value >> shift))"),
+        Mutant("final shift one less", "row[0][3], 3u)", "row[0][3], 2u)"),
+        Mutant("final shift one more", "row[2][3], 3u)", "row[2][3], 4u)"),
+        Mutant("rounding left out", "+ state->row[1][3],", "+ state->row[1][3] - 4,"),
+        Mutant("lower end flagged", "code < calib->temp_min_code", "code <= calib->temp_min_code"),
+        Mutant("upper end flagged", "code > calib->temp_max_code", "code >= calib->temp_max_code"),
+        Mutant("lower clamp dropped", "code = calib->temp_min_code;", ";"),
+        Mutant("upper clamp dropped", "code = calib->temp_max_code;", ";"),
+        Mutant("wrong flag", "status = TRIAX_STATUS_TEMP_HIGH", "status = TRIAX_STATUS_TEMP_LOW"),
+        Mutant("no raw flag", "status = TRIAX_STATUS_RAW_RANGE;", ";"),
+        Mutant("raw clamp of y dropped", "uy = clamp_raw(uy);", ";"),
+        Mutant("raw clamp to one less", "result = TRIAX_RAW_MAX;", "result = TRIAX_RAW_MAX - 1;"),
+        Mutant("raw clamp to one more", "result = TRIAX_RAW_MIN;", "result = TRIAX_RAW_MIN + 1;"),
+        Mutant("raw range one narrower", "> 16777215u", "> 16777214u"),
+        Mutant("raw range one wider", "> 16777215u", "> 16777216u"),
+        Mutant("z not looked at", "((uint32_t)uz - (uint32_t)TRIAX_RAW_MIN)", "0u"),
+        Mutant("swapped row and column", "state->row[0][1] * uy", "state->row[1][0] * uy"),
+        Mutant("swapped axis", "state->row[2][0] * ux", "state->row[2][0] * uy"),
+        Mutant(
+            "offset of another axis",
+            "high_word(sum_y) + state->row[1]",
+            "high_word(sum_y) + state->row[2]",
+        ),
+        Mutant("results swapped", "accel[1] = y;", "accel[1] = x;"),
+        Mutant("half the left shift", "uz *= 256;", "uz *= 128;"),
+        Mutant("sign of a product", "+ ((int64_t)state->row[0][1]", "- ((int64_t)state->row[0][1]"),
+        Mutant("wrong coefficient", "horner_step(c[1], x_q31, p)", "horner_step(c[0], x_q31, p)"),
+        Mutant("Horner started low", "int32_t p = c[2];", "int32_t p = c[1];"),
+        Mutant(
+            "wrong function", "coefficient[(4u * i) + j], x_q31", "coefficient[(3u * i) + j], x_q31"
+        ),
+        Mutant("origin forgotten", "code - segment->origin_code", "code - segment->first_code"),
+        Mutant("gain halved", "* segment->gain;", "* (segment->gain / 2);"),
+    ],
+    "direct-left-justified-piecewise": [
+        Mutant("segment starts one late", "code >= calib->segment[i]", "code > calib->segment[i]"),
+        Mutant(
+            "segment before", "segment = &calib->segment[i];", "segment = &calib->segment[i - 1u];"
+        ),
+        Mutant(
+            "last segment left out",
+            "(uint32_t)TRIAX_SEGMENTS; i++",
+            "(uint32_t)TRIAX_SEGMENTS - 1u; i++",
+        ),
+        Mutant(
+            "Horner rounds",
+            "high_word((int64_t)x_q31 * p)",
+            "high_word((int64_t)x_q31 * p + 2147483648)",
+        ),
+        Mutant(
+            "32-bit product",
+            "((int64_t)state->row[1][1] * uy)",
+            "(int64_t)(int32_t)((uint32_t)state->row[1][1] * (uint32_t)uy)",
+        ),
+    ],
+    "inverse-saturating": [
+        Mutant("shift truncated", "(~(~value >> shift))", "(-(-value >> shift))"),
+        Mutant("saturation upwards dropped", "result = (int64_t)INT32_MAX;", ";"),
+        Mutant(
+            "saturation one low", "result = (int64_t)INT32_MIN;", "result = (int64_t)INT32_MIN + 1;"
+        ),
+        Mutant("not flagged", "status |= TRIAX_STATUS_SATURATED;", ";"),
+        Mutant(
+            "rounding of z left out",
+            " + INT64_C(268435456);\n    sum_z = asr64",
+            ";\n    sum_z = asr64",
+        ),
+        Mutant("shift of y one more", "sum_y = asr64(sum_y, 29u)", "sum_y = asr64(sum_y, 30u)"),
+        Mutant(
+            "minor's sign",
+            "((int64_t)a * d) - ((int64_t)b * c)",
+            "((int64_t)b * c) - ((int64_t)a * d)",
+        ),
+        Mutant("minor not transposed", "row[(j + 1u) % 3u]", "row[(j + 2u) % 3u]"),
+        Mutant("reciprocal's sign", "(determinant < 0) ? -quotient : quotient", "quotient"),
+        Mutant(
+            "reciprocal halved",
+            "INT64_C(2305843009213693952) / divisor",
+            "INT64_C(1152921504606846976) / divisor",
+        ),
+        Mutant("gain not rounded", " + INT64_C(1073741824);", ";"),
+        Mutant("offset not rounded", "product + INT64_C(536870912)", "product"),
+        Mutant("offset's sign", "saturate32(-asr64(product", "saturate32(asr64(product"),
+        Mutant("bias of another axis", "row[i][j] * u0[j]", "row[i][j] * u0[i]"),
+        Mutant(
+            "determinant by the wrong row",
+            "row[0][j] * adjugate[j][0]",
+            "row[1][j] * adjugate[j][0]",
+        ),
+        Mutant(
+            "determinant shift",
+            "saturate32(asr64(determinant, 29u))",
+            "saturate32(asr64(determinant, 28u))",
+        ),
+        Mutant("range test one narrow", "> 14500000u", "> 14499999u"),
+        Mutant(
+            "one axis tested twice",
+            "((uint32_t)uy - (uint32_t)TRIAX_RAW_MIN) > ",
+            "((uint32_t)ux - (uint32_t)TRIAX_RAW_MIN) > ",
+        ),
+    ],
+}

@@ -1,0 +1,212 @@
+"""The generated C as programs: every shape, every optimisation, under sanitizers; and mutants."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+import oracle
+from conftest import Built
+from mutants import MUTANTS, Mutant
+from plans import (
+    COVERING,
+    GOLDEN,
+    INT32_MAX,
+    disturbed,
+    integer_plan,
+    random_plan,
+    vectors,
+)
+from triaxcal.codegen.compiler import FLAGS
+from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
+from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.routines import Answers, Generated
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.resources import shipped
+
+MAIN = Path(__file__).parent / "run_vectors.c"
+STRICT = [flag for flag in FLAGS if flag != "-O2"]
+SANITIZERS = ["-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+BUILDS = {"O0": ["-O0"], "O2": ["-O2"], "Os": ["-Os"], "sanitized": SANITIZERS}
+JOBS = [
+    (shape, build)
+    for shape in (*COVERING, *GOLDEN)
+    for build in BUILDS
+    if build != "Os" or shape in GOLDEN  # -Os of all shapes would take seconds more
+]
+
+
+# ---- vectors and images for the program ----
+
+
+def adversarial_images(plan: Plan, rng: Random) -> list[tuple[bytes, int]]:
+    """Images and the status that each must have: right, damaged, and at the limit of step R."""
+    good = image_bytes(plan)
+    images = [(good, 0), (b"", 16), (good[:-1], 16), (good + b"\0", 16), (bytes(len(good)), 16)]
+    images += [(good[:size], 16) for size in (1, 3, 4, 60, len(good) - 4)]
+    for _ in range(20):
+        damaged = bytearray(good)
+        damaged[rng.randrange(len(good))] ^= 1 << rng.randrange(8)
+        images.append((bytes(damaged), 16))
+    for _ in range(60):
+        limit = random_plan(rng, plan.shape, full=True)
+        over = rng.choice([-2, -1, 0, 0, 1, 2, 9, 2**20, -(2**31), 2**31])
+        other = disturbed(rng, limit, over)
+        images.append((image_bytes(other), 0 if oracle.keeps_step_r(other) else 16))
+    return images
+
+
+def input_file(plan: Plan, rng: Random) -> bytes:
+    temps, raws = vectors(plan, rng, 150)
+    words = [len(temps)]
+    for temp, raw in zip(temps, raws, strict=True):
+        accel, status = oracle.run(plan, temp, raw)
+        words += [temp, *raw, *accel, status]
+    images = adversarial_images(plan, rng)
+    words.append(len(images))
+    for image, status in images:
+        words += [len(image), status, *image]
+    return np.array(words, dtype=np.int32).tobytes()
+
+
+def compile_program(folder: Path, name: str, flags: Sequence[str]) -> Path:
+    program = folder / f"run-{name}"
+    command = ["gcc", *STRICT, *flags, f"-I{folder}", str(folder / "triax_comp.c"), str(MAIN)]
+    done = subprocess.run(
+        [*command, "-o", str(program)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return program
+
+
+@pytest.fixture(scope="module")
+def programs(built: dict[str, Built]) -> dict[tuple[str, str], Path]:
+    """Every shape in every build, with its input file beside it."""
+    for name, b in built.items():
+        (b.folder / "vectors.bin").write_bytes(input_file(b.plan, Random(name)))
+    with ThreadPoolExecutor(2) as pool:
+        made = pool.map(lambda j: compile_program(built[j[0]].folder, j[1], BUILDS[j[1]]), JOBS)
+        return dict(zip(JOBS, made, strict=True))
+
+
+def run_program(program: Path, vectors_file: Path) -> subprocess.CompletedProcess[str]:
+    command = [str(program), str(vectors_file)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(("name", "build"), JOBS)
+def test_every_shape_runs_right_in_every_build(
+    programs: dict[tuple[str, str], Path], name: str, build: str
+) -> None:
+    program = programs[name, build]
+    done = run_program(program, program.parent / "vectors.bin")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_the_program_notices_a_wrong_vector(
+    programs: dict[tuple[str, str], Path], tmp_path: Path
+) -> None:
+    program = programs["direct-checked", "sanitized"]
+    words = np.frombuffer((program.parent / "vectors.bin").read_bytes(), dtype=np.int32).copy()
+    words[1 + 8 * 7 + 5] += 1  # accel[1] of the eighth vector
+    (tmp_path / "vectors.bin").write_bytes(words.tobytes())
+    done = run_program(program, tmp_path / "vectors.bin")
+    assert done.returncode == 1
+    assert done.stdout.startswith(f"temp_code {words[1 + 8 * 7]} raw_code ")
+
+
+def test_the_sanitizers_are_awake(built: dict[str, Built], tmp_path: Path) -> None:
+    """Without the loader's range proof, constants that overflow are loaded, and caught at work."""
+    b = built["direct-order-0"]
+    row = "        if (row_sum >= ROW_LIMIT) {\n            fits = 0u;"
+    text = (b.folder / "triax_comp.c").read_text(encoding="utf-8")
+    assert text.count(row) == 1
+    for file in b.folder.glob("triax_*.h"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    (tmp_path / "triax_comp.c").write_text(text.replace(row, row.replace("0u", "1u")))
+    program = compile_program(tmp_path, "awake", SANITIZERS)
+    raw = [b.plan.shape.raw_min] * 3
+    accel, status = oracle.run(b.plan, 0, raw)
+    n = -INT32_MAX  # three products of 2^62
+    image = image_bytes(integer_plan(b.plan.shape, [[[n], [n], [n], [0]] * 3]))
+    words = [1, 0, *raw, *accel, status, 1, len(image), 0, *image]
+    (tmp_path / "vectors.bin").write_bytes(np.array(words, dtype=np.int32).tobytes())
+    done = run_program(program, tmp_path / "vectors.bin")
+    assert (done.returncode != 0, done.stdout) == (True, "")
+    assert "signed integer overflow" in done.stderr
+
+
+# ---- mutants ----
+
+
+@pytest.fixture(scope="module")
+def shipped_vectors() -> dict[str, list[tuple[VectorSet, Answers]]]:
+    """The vector sets of a delivery and what the Python model answers."""
+    return {
+        name: [(v, python_routine(plan)(v.temp, v.raw)) for v in vector_sets(plan)]
+        for name, plan in GOLDEN.items()
+    }
+
+
+def gcc(source: Path, include: Path, *flags: str) -> None:
+    """Compile without the strict flags: what a mutant does is tested, not how it looks."""
+    common = ["gcc", "-std=c99", "-O1", "-fwrapv", "-w", "-fPIC", f"-I{include}"]
+    command = [*common, f"-I{shipped('firmware_ref')}", str(source), *flags]
+    subprocess.run(command, check=True)
+
+
+@pytest.fixture(scope="module")
+def batch_object(built: dict[str, Built]) -> dict[str, Path]:
+    """The batch entry with each golden plan's constants, which no mutant changes."""
+    objects = {name: built[name].folder / "batch.o" for name in GOLDEN}
+    for name, made in objects.items():
+        source = shipped("firmware_ref") / "triax_batch.c"
+        gcc(source, built[name].folder, "-c", "-o", str(made))
+    return objects
+
+
+def mutant_library(folder: Path, batch: Path, mutant: Mutant) -> ctypes.CDLL:
+    text = (batch.parent / "triax_comp.c").read_text(encoding="utf-8")
+    assert mutant.old in text, "this text is no longer in the routine: write the mutant anew"
+    source = folder / "triax_comp.c"
+    source.write_text(text.replace(mutant.old, mutant.new, 1), encoding="utf-8")
+    gcc(source, batch.parent, str(batch), "-shared", "-o", str(folder / "mutant.so"))
+    return ctypes.CDLL(str(folder / "mutant.so"))
+
+
+def killed_by(library: ctypes.CDLL, sets: list[tuple[VectorSet, Answers]]) -> str:
+    """Name of the first vector set that tells the library from the model, or nothing."""
+    for v, (accel, status) in sets:
+        found = Generated(library).run(v.temp, v.raw)
+        if (found[0] != accel).any() or (found[1] != status).any():
+            return v.name
+    return ""
+
+
+@pytest.mark.parametrize(
+    ("name", "mutant"),
+    [pytest.param(name, m, id=f"{name}: {m.what}") for name, ms in MUTANTS.items() for m in ms],
+)
+def test_the_vectors_kill_the_mutant(
+    batch_object: dict[str, Path],
+    shipped_vectors: dict[str, list[tuple[VectorSet, Answers]]],
+    tmp_path: Path,
+    name: str,
+    mutant: Mutant,
+) -> None:
+    library = mutant_library(tmp_path, batch_object[name], mutant)
+    assert killed_by(library, shipped_vectors[name]), f"{mutant.what}: no vector sees it"
+
+
+def test_the_unchanged_routine_survives(
+    built: dict[str, Built], shipped_vectors: dict[str, list[tuple[VectorSet, Answers]]]
+) -> None:
+    for name, sets in shipped_vectors.items():
+        assert killed_by(built[name].generated.library, sets) == ""
