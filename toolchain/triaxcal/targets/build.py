@@ -32,12 +32,15 @@ class Toolset:
         As "-O2".
     arithmetic : int
         TRIAX_ARITHMETIC of the generated routine.
+    defines : tuple of str
+        More macros, as "-DNAME=value".
     """
 
     core: Core
     compiler: str
     optimisation: str
     arithmetic: int = 0
+    defines: tuple[str, ...] = ()
 
     def command(self) -> list[str]:
         """Compile command without inputs and outputs."""
@@ -50,6 +53,7 @@ class Toolset:
             *driver, *core.flags, *WARNINGS, *hosted, self.optimisation,
             "-ffunction-sections", "-fdata-sections",
             f"-DTRIAX_ARITHMETIC={self.arithmetic}", "-DTRIAX_REF_MAX_SEGMENTS=8",
+            *self.defines,
         ]  # fmt: skip
 
 

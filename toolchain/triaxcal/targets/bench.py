@@ -1,0 +1,133 @@
+"""What a call costs: instructions, flash, RAM and stack, beside what one would write instead."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.resources import shipped
+from triaxcal.targets.bench_case import case_header, floating_tables
+from triaxcal.targets.build import TargetError, Toolset, build
+from triaxcal.targets.cores import CORES, Core, install_advice, missing_tools
+from triaxcal.targets.counting import Counts, build_plugin, measure
+from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB2
+from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, Case
+from triaxcal.targets.sizes import Flash, flash_of
+
+OPTIMISATION = "-O2"
+"""gcc -O1 does not fuse the multiply-accumulates."""
+
+SIZE_OPTIMISATION = "-Os"
+DOUBLE, FLOAT = "double", "float"
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is measured: the generated routine of a shape, or a floating baseline of the same.
+
+    `real` is "" for the generated routine, else "double" or "float".
+    """
+
+    case: Case
+    arithmetic: int
+    real: str
+
+    @property
+    def label(self) -> str:
+        """For people."""
+        kind = self.real or ARITHMETIC_NAMES[self.arithmetic]
+        return f"{self.case.name}, {kind}"
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a subject costs on a core, or why it was not measured."""
+
+    subject: Subject
+    core: Core
+    counts: Counts | None
+    flash: Flash | None
+    failure: str
+
+
+def subjects(cases: Sequence[Case]) -> list[Subject]:
+    """Every shape in every arithmetic, and the baselines of the cubic."""
+    result = [Subject(case, a, "") for case in cases for a in (PORTABLE, LIMBS, THUMB2)]
+    cubic = next(c for c in cases if c.name == CUBIC)
+    return [*result, Subject(cubic, PORTABLE, DOUBLE), Subject(cubic, PORTABLE, FLOAT)]
+
+
+BENCH_SHAPES = (CUBIC, CUBIC_LEFT, "AT-SIM", "AT-CHERNIAK", "inverse")
+
+
+def run_bench(
+    cases: Sequence[Case], progress: Callable[[Cost], None] = lambda _c: None
+) -> list[Cost]:
+    """Measure every subject on every bare-metal core.
+
+    Raises
+    ------
+    TargetError
+        When the plugin cannot be built.
+    """
+    wanted = [c for c in cases if c.name in BENCH_SHAPES]
+    plan = [
+        (subject, core)
+        for subject in subjects(wanted)
+        for core in CORES
+        if not core.hosted and (subject.arithmetic != THUMB2 or core.thumb2_multiply)
+    ]
+    with tempfile.TemporaryDirectory(prefix="triaxcal-bench-") as name:
+        work = Path(name)
+        plugin = build_plugin(work)
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            futures = {
+                pool.submit(_cost, subject, core, work / str(i), plugin): i
+                for i, (subject, core) in enumerate(plan)
+            }
+            costs: dict[int, Cost] = {}
+            for future in as_completed(futures):
+                costs[futures[future]] = future.result()
+                progress(future.result())
+    return [costs[i] for i in range(len(plan))]
+
+
+def _cost(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
+    missing = missing_tools(core.tools("gcc"))
+    if missing:
+        advice = f"not done: {', '.join(missing)} not found: {install_advice(missing)}"
+        return Cost(subject, core, None, None, advice)
+    try:
+        sources, include, defines = _write_subject(subject, work)
+        toolset = Toolset(core, "gcc", OPTIMISATION, subject.arithmetic, defines)
+        target = shipped("firmware_ref") / "target"
+        harness = [target / f"bench_{n}" for n in ("main.c", "call.c", "known.S")]
+        program = work / "fast" / "program.elf"
+        build(toolset, [*sources, *harness], include, program)
+        counts = measure(core, program, plugin)
+        small = Toolset(core, "gcc", SIZE_OPTIMISATION, subject.arithmetic, defines)
+        flash = flash_of(small, sources, include, work / "small", floating=bool(subject.real))
+    except TargetError as error:
+        return Cost(subject, core, None, None, str(error))
+    return Cost(subject, core, counts, flash, "")
+
+
+def _write_subject(
+    subject: Subject, work: Path
+) -> tuple[list[Path], list[Path], tuple[str, ...]]:
+    """Sources, include folders and macros of a subject."""
+    target = shipped("firmware_ref") / "target"
+    case = subject.case
+    work.mkdir(parents=True)
+    (work / "bench_case.h").write_text(case_header(case.plan))
+    if subject.real:
+        (work / "floating_tables.c").write_text(floating_tables(case.plan, subject.real))
+        defines = (f"-DBENCH_REAL={subject.real}", f"-DBENCH_ORDER={case.plan.shape.order}")
+        return [target / "bench_floating.c", work / "floating_tables.c"], [work], defines
+    for name, text in case.files.items():
+        (work / name).write_text(text)
+    return [work / "triax_comp.c", target / "bench_tables.c"], [work], ()

@@ -1,0 +1,87 @@
+"""Bytes of flash: the routine's own code, its tables, and the helpers it pulls from libgcc."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.resources import shipped
+from triaxcal.targets.build import Toolset, link_command, run
+
+
+@dataclass(frozen=True)
+class Flash:
+    """Bytes of flash of set_temperature and apply with everything they need.
+
+    Attributes
+    ----------
+    code, tables, helpers : int
+        The routine's own instructions and literals; its constants; what libgcc adds.
+    loader : int
+        Code that triax_calib_load adds to that; 0 for a baseline.
+    """
+
+    code: int
+    tables: int
+    helpers: int
+    loader: int
+
+    @property
+    def total(self) -> int:
+        """Code, tables and helpers."""
+        return self.code + self.tables + self.helpers
+
+
+def flash_of(
+    toolset: Toolset,
+    sources: Sequence[Path],
+    include: Sequence[Path],
+    work: Path,
+    *,
+    floating: bool,
+) -> Flash:
+    """Link the routine alone, without start-up code, and take its sections apart."""
+    work.mkdir(parents=True)
+    objects = []
+    for source in sources:
+        made = work / f"{source.stem}.o"
+        includes = [f"-I{path}" for path in (*include, shipped("firmware_ref") / "target")]
+        run([*toolset.command(), *includes, "-c", str(source), "-o", str(made)])
+        objects.append(made)
+    prefix = "floating" if floating else "triax"
+    roots = [f"{prefix}_set_temperature", f"{prefix}_apply"]
+    tables_root = "FLOATING_CALIB" if floating else "TRIAX_CALIB"
+    code, helpers = _text(toolset, objects, roots, work / "routine.elf")
+    _, tables = _text(toolset, objects, [tables_root], work / "tables.elf")
+    loader = 0
+    if not floating:
+        whole = _text(toolset, objects, [*roots, "triax_calib_load"], work / "whole.elf")
+        loader = sum(whole) - code - helpers
+    return Flash(code, tables, helpers, loader)
+
+
+def _text(
+    toolset: Toolset, objects: Sequence[Path], roots: Sequence[str], program: Path
+) -> tuple[int, int]:
+    """Bytes of code of the first object, and of everything else, that `roots` keep."""
+    core = toolset.core
+    link = [*link_command(core), f"-Wl,-e,{roots[0]}", *(f"-Wl,-u,{r}" for r in roots)]
+    run([*link, "-Wl,-z,noexecstack", *map(str, objects), "-lgcc", "-o", str(program)])
+    prefix = core.gcc.removesuffix("gcc")
+    own = {
+        line.split()[-1]
+        for line in run([f"{prefix}nm", str(objects[0])]).splitlines()
+        if line.split()[-2] in "tTrR"
+    }
+    total = 0
+    for line in run([f"{prefix}size", "-A", "-d", str(program)]).splitlines():
+        parts = line.split()
+        if len(parts) == 3 and parts[0] in (".text", ".data"):
+            total += int(parts[1])
+    code = 0
+    for line in run([f"{prefix}nm", "-S", str(program)]).splitlines():
+        parts = line.split()
+        if len(parts) == 4 and parts[3] in own:
+            code += int(parts[1], 16)
+    return code, total - code
