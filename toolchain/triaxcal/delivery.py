@@ -9,12 +9,13 @@ import hashlib
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from triaxcal.codegen.compiler import Compilation
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.image_cases import check_images
 from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
 from triaxcal.codegen.routines import (
     Generated,
@@ -99,6 +100,7 @@ def deliver(folder: Path) -> Delivery:
         reference, generated = Reference(started[0].load()), Generated(started[1].load())
         image = files[IMAGE_FILE]
         check = cross_check(plan, sets, generated, reference.routine(image), image)
+        check = replace(check, images=check_images(plan, image, generated, reference))
         _refuse_wrong_bound(unit, bound, check)
         routines = {unit.method: generated.run, **_other_routines(unit, calibration, reference)}
         thermal, range_degc = calibration.thermal, calibration.range_degc

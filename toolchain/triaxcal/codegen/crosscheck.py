@@ -58,10 +58,13 @@ class CrossCheck:
         Number of vectors by set.
     largest_error_lsb : float
         Largest error seen against the real-valued plan over the exhaustive sets, in output LSB.
+    images : int
+        Images that the loader rightly accepted or refused.
     """
 
     vectors: dict[str, int]
     largest_error_lsb: float
+    images: int = 0
 
     @property
     def total(self) -> int:
