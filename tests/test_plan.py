@@ -126,7 +126,7 @@ def test_codes_are_those_within_the_range(
 )
 @pytest.mark.parametrize("method", ["additive", "inverse"])
 def test_segments_cover_the_range_and_x_fills_q31(breaks: tuple[float, ...], method: str) -> None:
-    unit = unit_of(method=method)
+    unit = unit_of(method=method, sensor=TemperatureSensor(0.0625, 0.0))
     compensation, plan = planned(unit, cut(breaks))
     firsts = [s.first_code for s in plan.segments]
     assert firsts[0] == plan.temp_min_code
