@@ -9,7 +9,7 @@ DEVELOPER := $(VENV)/.developer
 export UNIT
 
 .DEFAULT_GOAL := help
-.PHONY: help calib-header verify simulate test check lint types nightly bench golden clean test-targets
+.PHONY: help calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -25,6 +25,9 @@ verify: $(INSTALLED)  ## UNIT=<name>: Gappa, Frama-C, cppcheck, gcc and clang on
 	@if [ -z "$$UNIT" ]; then \
 	    echo "make: UNIT is missing; say make verify UNIT=<name>, one of:" $$(ls units) >&2; exit 1; fi
 	@$(BIN)/triaxcal verify "units/$$UNIT"
+
+fuzz: $(DEVELOPER)  ## Images against the loaders, text against the parsers, for a minute
+	@$(BIN)/python fuzz/run.py
 
 simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated unit again
 	@$(BIN)/triaxcal simulate "units/$$UNIT"
