@@ -14,6 +14,19 @@
 
 #define TRIAX_ACCEL_Q 30 /* acceleration LSB = 2^-30 g = 0.0009313 micro-g */
 
+/*
+ * How products are formed; every choice gives the same bits. TRIAX_PORTABLE multiplies in int64_t
+ * and suits every core. TRIAX_LIMBS multiplies halves of words, for cores without a 32x32->64
+ * multiplication (Cortex-M0, M0+, M1). TRIAX_THUMB2 has triax_apply in assembly for Cortex-M3, M4,
+ * M7, M33 and GNU-compatible compilers. To choose, say -DTRIAX_ARITHMETIC=1.
+ */
+#define TRIAX_PORTABLE 0
+#define TRIAX_LIMBS 1
+#define TRIAX_THUMB2 2
+#ifndef TRIAX_ARITHMETIC
+#define TRIAX_ARITHMETIC TRIAX_PORTABLE
+#endif
+
 /* Status bits. */
 #define TRIAX_STATUS_OK 0u
 #define TRIAX_STATUS_TEMP_LOW 1u   /* below the calibrated range: its lower end was used */

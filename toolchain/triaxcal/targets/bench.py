@@ -116,9 +116,7 @@ def _cost(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
     return Cost(subject, core, counts, flash, "")
 
 
-def _write_subject(
-    subject: Subject, work: Path
-) -> tuple[list[Path], list[Path], tuple[str, ...]]:
+def _write_subject(subject: Subject, work: Path) -> tuple[list[Path], list[Path], tuple[str, ...]]:
     """Sources, include folders and macros of a subject."""
     target = shipped("firmware_ref") / "target"
     case = subject.case
