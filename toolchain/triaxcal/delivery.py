@@ -26,6 +26,7 @@ from triaxcal.codegen.routines import (
 )
 from triaxcal.codegen.tryout import MethodResult, model_error_g, run_on_dwells
 from triaxcal.errors import RefusedError
+from triaxcal.fit.acceptance import dwells_in_range, refuse_unacceptable
 from triaxcal.fit.calibrate import Calibration, calibrate
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
@@ -85,12 +86,18 @@ def deliver(folder: Path) -> Delivery:
     with tempfile.TemporaryDirectory(prefix="triaxcal-") as name, _compilations() as started:
         work = Path(name)
         unit = read_unit(folder)
+        inputs = inputs_sha256(folder)
         started.append(start_reference(work))
         measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
         calibration = calibrate(unit, measurements)
+        refuse_unacceptable(unit, calibration, measurements)
+        dwells = dwells_in_range(unit, calibration.range_degc, measurements)
         compensation = compensation_of(unit, calibration, unit.method)
         plan = make_plan(compensation, unit)
-        inputs = inputs_sha256(folder)
+        model_error = model_error_g(unit, calibration.thermal, plan)
+        _refuse_model_error(unit, plan, model_error)
+        if inputs_sha256(folder) != inputs:
+            raise RefusedError(str(folder), "changed while it was read", remedy="run it again")
         files = _firmware_files(unit, calibration, compensation, plan, inputs)
         for file, content in files.items():
             (work / file).write_bytes(content)
@@ -103,12 +110,12 @@ def deliver(folder: Path) -> Delivery:
         check = replace(check, images=check_images(plan, image, generated, reference))
         _refuse_wrong_bound(unit, bound, check)
         routines = {unit.method: generated.run, **_other_routines(unit, calibration, reference)}
-        thermal, range_degc = calibration.thermal, calibration.range_degc
-        methods = run_on_dwells(unit, thermal, range_degc, measurements, routines)
+        thermal = calibration.thermal
+        methods = run_on_dwells(unit, thermal, measurements.source, dwells, routines)
         compiler = generated.compiler
     delivery = Delivery(
         unit, measurements, inputs, calibration, compensation, plan,
-        model_error_g(unit, thermal, plan), bound, check, methods, compiler, files,
+        model_error, bound, check, methods, compiler, files,
     )  # fmt: skip
     _refuse_beyond_limits(delivery)
     return delivery
@@ -195,6 +202,18 @@ def _other_routines(
     return routines
 
 
+def _refuse_model_error(unit: UnitDescription, plan: Plan, error_g: float) -> None:
+    """The order of N(T) is chosen on a grid; what counts is every temperature code."""
+    limit_g = unit.model_error_max_micro_g * 1e-6
+    if unit.method == "matrix" and error_g > limit_g:
+        raise RefusedError(
+            f"{unit.name}/unit.toml, [compensation] model_error_max_micro_g",
+            f"N(T) of order {plan.shape.order} is {error_g * 1e6:.4g} micro-g off the fitted model",
+            expected=f"at most {limit_g * 1e6:g} micro-g",
+            remedy='choose method = "inverse", or allow more',
+        )
+
+
 def _refuse_wrong_bound(unit: UnitDescription, bound: Bound, check: CrossCheck) -> None:
     if check.largest_error_lsb > bound.lsb:
         raise RefusedError(
@@ -206,21 +225,22 @@ def _refuse_wrong_bound(unit: UnitDescription, bound: Bound, check: CrossCheck) 
 
 
 def _refuse_beyond_limits(delivery: Delivery) -> None:
-    """P1 (13): the residual of the unit's own method against its limits."""
-    chosen = next(m for m in delivery.methods if m.method == delivery.unit.method)
-    limits = delivery.unit.limits
+    """P1 (13) for the compiled C; the fitted model passed, so it is the method or the formats."""
+    unit = delivery.unit
+    chosen = next(m for m in delivery.methods if m.method == unit.method)
     for residual in chosen.residuals:
-        at_t0 = residual.at_t0
-        limit, key = (
-            (limits.at_t0_g, "limits.at_t0_g")
-            if at_t0
-            else (limits.over_range_g, "limits.over_range_g")
-        )
+        dwell = residual.dwell
+        limit, key = unit.limits.at(dwell.temp_degc, unit.t0_degc)
         if abs(residual.error_g) > limit:
             raise RefusedError(
-                f"{delivery.measurements.source}, row {residual.dwell.row}",
-                f"| |a| - g | = {abs(residual.error_g) * 1e3:.3f} mg in {residual.dwell.position} "
-                f"at {residual.dwell.temp_degc:.1f} degC after compensation",
+                f"{delivery.measurements.source}, row {dwell.row}",
+                f"| |a| - g | = {abs(residual.error_g) * 1e3:.3f} mg in {dwell.position} at "
+                f"{dwell.temp_degc:.4g} degC by the compiled C, while the fitted model is within "
+                "the limit",
                 expected=f"at most {limit * 1e3:g} mg ({key})",
-                remedy="measure that dwell again, or choose a better thermal model",
+                remedy=(
+                    f"method {unit.method} is within {delivery.model_error_g * 1e3:.3g} mg of the "
+                    f"model, its LSB is {1e3 / 2**unit.output_q:.3g} mg: choose another "
+                    "compensation.method, a higher output_q or more adc.bits"
+                ),
             )

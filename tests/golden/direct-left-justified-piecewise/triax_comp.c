@@ -175,27 +175,28 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
     const int32_t *row = state->row[0];
     __asm__ volatile(
         "ldmia %[row]!, {r4, r5, r6, r8}\n\t"
-        "smull r9, r12, r4, %[ux]\n\t"
-        "smlal r9, r12, r5, %[uy]\n\t"
-        "smlal r9, r12, r6, %[uz]\n\t"
+        "smull r4, r12, r4, %[ux]\n\t"
+        "smlal r4, r12, r5, %[uy]\n\t"
+        "smlal r4, r12, r6, %[uz]\n\t"
         "add r10, r8, r12\n\t"
         "asr r10, r10, #3\n\t"
         "ldmia %[row]!, {r4, r5, r6, r8}\n\t"
-        "smull r9, r12, r4, %[ux]\n\t"
-        "smlal r9, r12, r5, %[uy]\n\t"
-        "smlal r9, r12, r6, %[uz]\n\t"
-        "add r11, r8, r12\n\t"
-        "asr r11, r11, #3\n\t"
-        "ldmia %[row]!, {r4, r5, r6, r8}\n\t"
-        "smull r9, r12, r4, %[ux]\n\t"
-        "smlal r9, r12, r5, %[uy]\n\t"
-        "smlal r9, r12, r6, %[uz]\n\t"
+        "smull r4, r12, r4, %[ux]\n\t"
+        "smlal r4, r12, r5, %[uy]\n\t"
+        "smlal r4, r12, r6, %[uz]\n\t"
         "add r12, r8, r12\n\t"
         "asr r12, r12, #3\n\t"
-        "stmia %[accel], {r10, r11, r12}"
+        "strd r10, r12, [%[accel]]\n\t"
+        "ldmia %[row]!, {r4, r5, r6, r8}\n\t"
+        "smull r4, r12, r4, %[ux]\n\t"
+        "smlal r4, r12, r5, %[uy]\n\t"
+        "smlal r4, r12, r6, %[uz]\n\t"
+        "add r12, r8, r12\n\t"
+        "asr r12, r12, #3\n\t"
+        "str r12, [%[accel], #8]"
         : [row] "+&r"(row)
         : [ux] "r"(ux), [uy] "r"(uy), [uz] "r"(uz), [accel] "r"(accel)
-        : "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "memory");
+        : "r4", "r5", "r6", "r8", "r10", "r12", "memory");
 }
 #endif
 
@@ -256,8 +257,9 @@ static uint32_t x_fits(const triax_segment_t *segment, int32_t first, int32_t la
     const int64_t above = (int64_t)last - segment->origin_code;
     const int64_t reach = (below > above) ? below : above;
     uint32_t fits = 0u;
+    /* reach < 2^32 and gain < 2^31: the product fits. */
     if ((segment->gain > 0) && (first <= last)) {
-        if (reach <= ((int64_t)INT32_MAX / segment->gain)) {
+        if ((reach * segment->gain) <= (int64_t)INT32_MAX) {
             fits = 1u;
         }
     }

@@ -345,8 +345,9 @@ static uint32_t x_fits(const triax_segment_t *segment, int32_t first, int32_t la
     const int64_t above = (int64_t)last - segment->origin_code;
     const int64_t reach = (below > above) ? below : above;
     uint32_t fits = 0u;
+    /* reach < 2^32 and gain < 2^31: the product fits. */
     if ((segment->gain > 0) && (first <= last)) {
-        if (reach <= ((int64_t)INT32_MAX / segment->gain)) {
+        if ((reach * segment->gain) <= (int64_t)INT32_MAX) {
             fits = 1u;
         }
     }

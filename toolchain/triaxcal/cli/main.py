@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import traceback
 from pathlib import Path
 
 import click
@@ -77,7 +78,16 @@ def run() -> None:
         sys.exit(0)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        _leave(f"triaxcal: {error.filename or 'output'}: {reason}", 1)
+        _leave(f"triaxcal: {error.filename or 'output or temporary folder'}: {reason}", 1)
+    except Exception as fault:
+        # Nothing a user does should come here. One line all the same, with the place for a report.
+        frame = traceback.extract_tb(fault.__traceback__)[-1]
+        place = f"{Path(frame.filename).name}:{frame.lineno}"
+        _leave(
+            f"triaxcal: fault in triaxcal {__version__} at {place}: "
+            f"{type(fault).__name__}: {fault}; please report it with the unit's folder",
+            1,
+        )
 
 
 def _leave(message: str, code: int) -> None:

@@ -43,7 +43,7 @@ class Provenance:
 @cache
 def environment() -> jinja2.Environment:
     """Jinja environment of every template: undefined names are errors, blocks leave no trace."""
-    environment = jinja2.Environment(
+    return jinja2.Environment(
         loader=jinja2.FileSystemLoader(shipped("templates")),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -51,13 +51,16 @@ def environment() -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    environment.filters["int32"] = int32_literal
-    return environment
 
 
 def int32_literal(value: int) -> str:
     """C literal of an int32; INT32_MIN has none of its own."""
     return "(-2147483647 - 1)" if value == -(2**31) else str(value)
+
+
+def macro_literal(value: int) -> str:
+    """The same for a macro's body."""
+    return f"({value})" if -(2**31) < value < 0 else int32_literal(value)
 
 
 def shape_id(plan: Plan) -> str:
@@ -105,8 +108,8 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "checked": span != 2**32 - 1,
         "raw_span": span,
         "raw_span_is_mask": span & (span + 1) == 0,
-        "raw_min": int32_literal(shape.raw_min),
-        "raw_max": int32_literal(shape.raw_max),
+        "raw_min": macro_literal(shape.raw_min),
+        "raw_max": macro_literal(shape.raw_max),
         "raw_scale": 1 << shape.raw_shift,
         "limb_split": limb_split(shape),
         "limb_mask": (1 << limb_split(shape)) - 1,
