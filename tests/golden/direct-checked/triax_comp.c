@@ -41,9 +41,15 @@ static int32_t high_half(int32_t value)
     return asr32(value, 16u);
 }
 
+static int32_t low_bits(int32_t value, uint32_t mask)
+{
+    const uint32_t bits = (uint32_t)value & mask;
+    return (int32_t)bits;
+}
+
 static int32_t low_half(int32_t value)
 {
-    return (int32_t)((uint32_t)value & 0xFFFFu);
+    return low_bits(value, 0xFFFFu);
 }
 #endif
 
@@ -187,9 +193,9 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
  */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
 {
-    const int32_t x_low = (int32_t)((uint32_t)ux & 2047u);
-    const int32_t y_low = (int32_t)((uint32_t)uy & 2047u);
-    const int32_t z_low = (int32_t)((uint32_t)uz & 2047u);
+    const int32_t x_low = low_bits(ux, 2047u);
+    const int32_t y_low = low_bits(uy, 2047u);
+    const int32_t z_low = low_bits(uz, 2047u);
     const int32_t x_high = asr32(ux, 11u);
     const int32_t y_high = asr32(uy, 11u);
     const int32_t z_high = asr32(uz, 11u);
@@ -222,34 +228,33 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
     }
 }
 #else
-/* The sums of the portable form, in registers; r7 is left to compilers that keep a frame in it. */
+/* The portable form in registers. r0 to r4 are left to the operands, r7 to a frame pointer. */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
 {
     const int32_t *row = state->row[0];
     __asm__ volatile(
-        "ldmia %[row]!, {r4, r5, r6, r8}\n\t"
-        "smull r4, r12, r4, %[ux]\n\t"
-        "smlal r4, r12, r5, %[uy]\n\t"
-        "smlal r4, r12, r6, %[uz]\n\t"
-        "add r10, r8, r12\n\t"
-        "asr r10, r10, #3\n\t"
-        "ldmia %[row]!, {r4, r5, r6, r8}\n\t"
-        "smull r4, r12, r4, %[ux]\n\t"
-        "smlal r4, r12, r5, %[uy]\n\t"
-        "smlal r4, r12, r6, %[uz]\n\t"
-        "add r12, r8, r12\n\t"
+        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
+        "smull r8, r12, r8, %[ux]\n\t"
+        "smlal r8, r12, r9, %[uy]\n\t"
+        "smlal r8, r12, r10, %[uz]\n\t"
+        "add r5, r11, r12\n\t"
+        "asr r5, r5, #3\n\t"
+        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
+        "smull r8, r12, r8, %[ux]\n\t"
+        "smlal r8, r12, r9, %[uy]\n\t"
+        "smlal r8, r12, r10, %[uz]\n\t"
+        "add r6, r11, r12\n\t"
+        "asr r6, r6, #3\n\t"
+        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
+        "smull r8, r12, r8, %[ux]\n\t"
+        "smlal r8, r12, r9, %[uy]\n\t"
+        "smlal r8, r12, r10, %[uz]\n\t"
+        "add r12, r11, r12\n\t"
         "asr r12, r12, #3\n\t"
-        "strd r10, r12, [%[accel]]\n\t"
-        "ldmia %[row]!, {r4, r5, r6, r8}\n\t"
-        "smull r4, r12, r4, %[ux]\n\t"
-        "smlal r4, r12, r5, %[uy]\n\t"
-        "smlal r4, r12, r6, %[uz]\n\t"
-        "add r12, r8, r12\n\t"
-        "asr r12, r12, #3\n\t"
-        "str r12, [%[accel], #8]"
+        "stmia %[accel], {r5, r6, r12}"
         : [row] "+&r"(row)
         : [ux] "r"(ux), [uy] "r"(uy), [uz] "r"(uz), [accel] "r"(accel)
-        : "r4", "r5", "r6", "r8", "r10", "r12", "memory");
+        : "r5", "r6", "r8", "r9", "r10", "r11", "r12", "memory");
 }
 #endif
 

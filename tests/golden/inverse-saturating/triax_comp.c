@@ -57,9 +57,15 @@ static int32_t high_half(int32_t value)
     return asr32(value, 16u);
 }
 
+static int32_t low_bits(int32_t value, uint32_t mask)
+{
+    const uint32_t bits = (uint32_t)value & mask;
+    return (int32_t)bits;
+}
+
 static int32_t low_half(int32_t value)
 {
-    return (int32_t)((uint32_t)value & 0xFFFFu);
+    return low_bits(value, 0xFFFFu);
 }
 #endif
 
