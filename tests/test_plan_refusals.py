@@ -141,6 +141,6 @@ def test_too_many_temperature_codes_are_refused() -> None:
     with pytest.raises(RefusedError, match=r"degc_per_code = 0.0001 makes 1100001 codes"):
         planned(unit, polynomial_model(TABLE_T0, TABLE_SLOPES))
     far = unit_of(sensor=TemperatureSensor(1e-6, -2000.0))
-    comp = compensate(polynomial_model(TABLE_T0, TABLE_SLOPES), "matrix", (20.0, 20.5), 2.5, 1e-6)
+    comp = compensate(polynomial_model(TABLE_T0, TABLE_SLOPES), "matrix", (20.0, 20.1), 2.5, 1e-6)
     with pytest.raises(RefusedError, match="do not fit int32 with a bit to spare"):
         make_plan(comp, far)
