@@ -233,8 +233,6 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
-    uint32_t i;
-    uint32_t j;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -246,9 +244,11 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     }
     evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
     if (invert(state->row) == 0u) {
-        for (i = 0u; i < 3u; i++) {
-            for (j = 0u; j < 4u; j++) {
-                state->row[i][j] = 0;
+        uint32_t axis;
+        uint32_t column;
+        for (axis = 0u; axis < 3u; axis++) {
+            for (column = 0u; column < 4u; column++) {
+                state->row[axis][column] = 0;
             }
         }
         status |= TRIAX_STATUS_BAD_IMAGE;
