@@ -1,17 +1,23 @@
-"""All files of a delivery: the firmware's, the results, the picture."""
+"""All files of a delivery: the firmware's, the results, the picture, the passport."""
 
 from __future__ import annotations
 
 from triaxcal.delivery import Delivery
+from triaxcal.report.passport.content import passport
+from triaxcal.report.passport.document import passport_json
+from triaxcal.report.passport.page import passport_html
 from triaxcal.report.residual_plot import residuals_svg
 from triaxcal.report.results import calibration_json, verification_json
 
 
 def all_files(delivery: Delivery) -> dict[str, bytes]:
     """Name and content of everything that build/<UNIT>/ receives."""
+    unit_passport = passport(delivery, {})
     return {
         **delivery.files,
         "calibration.json": calibration_json(delivery),
         "verification.json": verification_json(delivery),
         "residuals.svg": residuals_svg(delivery),
+        "passport.html": passport_html(unit_passport),
+        "passport.json": passport_json(unit_passport),
     }

@@ -47,7 +47,8 @@ class Propagation:
     @cached_property
     def parameter_operator(self) -> FloatArray:
         """Shape (3, 4, P, 6 G)."""
-        return parameter_operator(self.data, self.calibration.shape)[0]
+        operator: FloatArray = parameter_operator(self.data, self.calibration.shape)[0]
+        return operator
 
     def constants_operator(self, temps_degc: FloatArray) -> FloatArray:
         """C at temperatures (m,), shape (m, 3, 4, 6 G)."""
@@ -91,7 +92,8 @@ class Propagation:
     def dwell_gain(self) -> FloatArray:
         """K at the dwells, shape (6 G, 3, 3), V/g."""
         temps = self.data.readings.dwell_temps_degc.reshape(-1)
-        return unpack_constants(self.calibration.thermal.constants_at(temps))[0]
+        K: FloatArray = unpack_constants(self.calibration.thermal.constants_at(temps))[0]
+        return K
 
     @cached_property
     def tilt_effect(self) -> FloatArray:

@@ -1,0 +1,61 @@
+"""Numbers as people read them: as many digits as the uncertainty allows, and no more."""
+
+from __future__ import annotations
+
+import math
+
+MINUS = "\u2212"
+
+
+def with_uncertainty(value: float, expanded: float, scale: float = 1.0) -> tuple[str, str]:
+    """Value and its expanded uncertainty, times `scale`, the latter with two digits.
+
+    GUM 7.2.6: the value is rounded to the uncertainty's last digit.
+    """
+    value, expanded = value * scale, expanded * scale
+    places = 9 if expanded <= 0.0 else max(0, 1 - math.floor(math.log10(expanded)))
+    places = min(places, 12)
+    return signed(f"{value:+.{places}f}"), f"{expanded:.{places}f}"
+
+
+def signed(text: str) -> str:
+    """Number with a true minus sign."""
+    return text.replace("-", MINUS)
+
+
+def significant(value: float, digits: int = 2) -> str:
+    """Positive number with so many significant digits, without an exponent where it is short."""
+    if value == 0.0:
+        return "0"
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    if places > 6:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa}·10<sup>{signed(str(int(exponent)))}</sup>"
+    return signed(f"{round(value, places):.{max(places, 0)}f}")
+
+
+def g_in_words(value_g: float) -> str:
+    """Acceleration in mg, µg or ng, whichever gives a short number."""
+    for scale, unit in ((1e3, "mg"), (1e6, "µg"), (1e9, "ng")):
+        if abs(value_g) * scale >= 0.995:
+            return f"{significant(value_g * scale, 3)} {unit}"
+    return "0 µg" if value_g == 0.0 else f"{significant(value_g * 1e9, 2)} ng"
+
+
+def in_unit(value: float, unit: str) -> str:
+    """Quantity of a budget in a unit of handy size."""
+    if unit == "g":
+        return g_in_words(value)
+    if unit in ("V", "V/g"):
+        return f"{significant(value * 1e6)} µ{unit}"
+    return f"{significant(value)} {unit}"
+
+
+def thousands(number: int) -> str:
+    """Whole number in groups of three."""
+    return f"{number:,}".replace(",", "\u202f")
+
+
+def percent(share: float) -> str:
+    """Share of a whole, in whole percent; what is below a half is told apart from nothing."""
+    return "<\u202f1" if 0.0 < share < 0.005 else f"{100 * share:.0f}"
