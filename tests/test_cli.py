@@ -17,6 +17,8 @@ ROOT = Path(__file__).resolve().parents[1]
 TRIAXCAL = [sys.executable, "-m", "triaxcal"]
 FILES = [
     "calibration.json",
+    "passport.html",
+    "passport.json",
     "residuals.svg",
     "triax_calib.bin",
     "triax_calib.h",

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from triaxcal.codegen.compiler import Compilation
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
@@ -23,14 +25,15 @@ from triaxcal.codegen.routines import (
     start_generated,
     start_reference,
 )
-from triaxcal.codegen.tryout import MethodResult, model_error_g, run_on_dwells
+from triaxcal.codegen.tryout import MethodResult, Residual, model_error_g, run_on_dwells
 from triaxcal.errors import RefusedError
 from triaxcal.fit.calibrate import Calibration, calibrate
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.compensation import Compensation, compensate
-from triaxcal.model.metrological import unpack_constants
-from triaxcal.model.positions import AXES
+from triaxcal.model.metrological import force_from_voltage, unpack_constants
+from triaxcal.model.positions import AXES, TEST_POSITIONS
+from triaxcal.model.types import FloatArray
 from triaxcal.records import MEASUREMENTS_FILE, MeasurementSet, read_measurements
 from triaxcal.unitfile import METHODS, UNIT_FILE, UnitDescription, read_unit
 
@@ -218,7 +221,40 @@ def _refuse_beyond_limits(delivery: Delivery) -> None:
             raise RefusedError(
                 f"{delivery.measurements.source}, row {residual.dwell.row}",
                 f"| |a| - g | = {abs(residual.error_g) * 1e3:.3f} mg in {residual.dwell.position} "
-                f"at {residual.dwell.temp_degc:.1f} degC after compensation",
+                f"at {residual.dwell.temp_degc:.1f} degC after compensation, "
+                f"{abs(residual.error_g) / limit:.3g} times the limit",
                 expected=f"at most {limit * 1e3:g} mg ({key})",
-                remedy="measure that dwell again, or choose a better thermal model",
+                remedy=_why(delivery, residual),
             )
+
+
+def _why(delivery: Delivery, residual: Residual) -> str:
+    """What the residual comes from, and what to do about it.
+
+    The same dwell is compensated with the constants of its own temperature alone, then with the
+    fitted curves and no error of the method: the first step that leaves most of it is to blame.
+    """
+    calibration, dwell = delivery.calibration, residual.dwell
+    gravity_g, error_g = delivery.unit.gravity_g, abs(residual.error_g)
+
+    def length_error_g(constants: FloatArray) -> float:
+        force = force_from_voltage(constants, dwell.voltage_v)
+        return abs(float(np.linalg.norm(force)) - gravity_g)
+
+    point = min(calibration.points, key=lambda p: abs(p.temp_degc - dwell.temp_degc))
+    own_g = length_error_g(point.constants)
+    curve_g = length_error_g(calibration.thermal.constants_at(dwell.temp_degc))
+    if dwell.position in TEST_POSITIONS and own_g > 0.5 * error_g:
+        return (
+            f"noise or placement: the constants of this temperature alone leave "
+            f"{own_g * 1e3:.3g} mg; measure that dwell again"
+        )
+    if curve_g > 0.5 * error_g:
+        return (
+            f"the thermal function: the fitted curves ({calibration.shape.label}) leave "
+            f"{curve_g * 1e3:.3g} mg; choose a better one, or measure at more temperatures"
+        )
+    return (
+        f"the method {delivery.unit.method}: the fitted curves alone leave {curve_g * 1e3:.3g} mg; "
+        'choose method = "matrix", or lower model_error_max_micro_g'
+    )

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from triaxcal.delivery import Delivery
-from triaxcal.report.passport.content import passport
+from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.passport.document import passport_json
 from triaxcal.report.passport.page import passport_html
 from triaxcal.report.residual_plot import residuals_svg
 from triaxcal.report.results import calibration_json, verification_json
 
 
-def all_files(delivery: Delivery) -> dict[str, bytes]:
-    """Name and content of everything that build/<UNIT>/ receives."""
-    unit_passport = passport(delivery, {})
+def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, bytes]:
+    """Name and content of everything that build/<UNIT>/ receives.
+
+    `made` is the delivery's passport, where there is one already.
+    """
+    unit_passport = made or passport(delivery, {})
     return {
         **delivery.files,
         "calibration.json": calibration_json(delivery),

@@ -38,7 +38,7 @@ def raw_code(p: Propagation) -> Source:
     sd = p.unit.adc.volts_per_code / _ROOT_12
     return Source(
         key="raw_code",
-        name="rounding to raw codes",
+        name="the rounding to raw codes",
         sd=sd,
         unit="V",
         distribution=RECTANGULAR,
@@ -55,7 +55,7 @@ def temperature_code(p: Propagation) -> Source:
     sd = p.unit.temperature_sensor.degc_per_code / _ROOT_12
     return Source(
         key="temperature_code",
-        name="rounding to temperature codes",
+        name="the rounding to temperature codes",
         sd=sd,
         unit="°C",
         distribution=RECTANGULAR,
@@ -72,7 +72,7 @@ def output_lsb(p: Propagation, device: Device) -> Source:
     sd = 2.0**-device.output_q / _ROOT_12
     return Source(
         key="output_lsb",
-        name="rounding of the result",
+        name="the rounding of the result",
         sd=sd,
         unit="g",
         distribution=RECTANGULAR,

@@ -26,7 +26,7 @@ from triaxcal.uncertainty.source import (
     from_factor,
 )
 
-KEY, NAME = "thermal_model", "the thermal model between the calibrated temperatures"
+KEY, NAME = "thermal_model", "the thermal model"
 _ADVICE = "measure at one more temperature, or check positions at temperatures in between"
 
 

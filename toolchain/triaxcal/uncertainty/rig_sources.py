@@ -33,7 +33,7 @@ def noise(p: Propagation, s: Scatter) -> Source:
             origin = "scatter of the residuals; one temperature cannot tell it from placement"
     return Source(
         key="noise",
-        name="noise of the calibration readings",
+        name="the noise of the calibration readings",
         sd=sd_v,
         unit="V",
         distribution=STUDENT,
@@ -62,7 +62,7 @@ def repeatability(p: Propagation, s: Scatter) -> Source:
     constants, force = from_factor(p, factor.reshape(len(p.temps_degc), 12, -1))
     return Source(
         key="repeatability",
-        name="the repeatability of the dwells",
+        name="the dwells' repeatability",
         sd=rad / RADIANS_PER_ARCSEC,
         unit="arcsec",
         distribution=NORMAL if stated is not None else STUDENT,
@@ -90,7 +90,7 @@ def squareness(p: Propagation, s: Scatter) -> Source:
     constants, force = from_factor(p, factor)
     return Source(
         key="squareness",
-        name="the squareness of the tilter",
+        name="the tilter's squareness",
         sd=rad / RADIANS_PER_ARCSEC,
         unit="arcsec",
         distribution=NORMAL if stated is not None else STUDENT,
@@ -110,7 +110,7 @@ def level(p: Propagation) -> Source:
     constants, force = from_factor(p, factor)
     return Source(
         key="level",
-        name="the alignment of tilter and unit (level, mounting)",
+        name="the tilter's alignment (level, mounting)",
         sd=arcsec,
         unit="arcsec",
         distribution=NORMAL,
@@ -173,7 +173,7 @@ def thermometer_drift(p: Propagation) -> Source:
     factor = p.slopes.reshape(-1, 12, 1) * sd
     return Source(
         key="thermometer_drift",
-        name="the thermometer's change since calibration",
+        name="the thermometer's drift since calibration",
         sd=sd,
         unit="°C",
         distribution=NORMAL,

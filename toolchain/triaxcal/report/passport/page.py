@@ -14,6 +14,7 @@ from triaxcal.report.passport.curves import HEIGHT, LEFT, WIDTH, curve_panels, u
 from triaxcal.report.passport.residuals import residual_panels
 from triaxcal.report.passport.words import (
     g_in_words,
+    handy,
     in_unit,
     percent,
     signed,
@@ -102,7 +103,7 @@ def _acceptance(a: Acceptance) -> dict[str, Any]:
         )
     scale = max(a.limit_g, a.largest_g + a.uncertainty_g)
     return {
-        "where": a.where,
+        "where": a.where[0].upper() + a.where[1:],
         "limit": g_in_words(a.limit_g),
         "largest": g_in_words(a.largest_g),
         "uncertainty": g_in_words(a.uncertainty_g),
@@ -175,10 +176,12 @@ def _line(line: Line, unit: str) -> dict[str, Any]:
 
 
 def _sensitivity(line: Line, unit: str) -> str:
-    value = line.sensitivity or 0.0
-    if unit == "g" and line.unit != "g":
-        return f"{significant(value * 1e6)} µg/{line.unit}"
-    return significant(value) if unit == line.unit else f"{significant(value)} {unit}/({line.unit})"
+    above, below = handy(unit), handy(line.unit)
+    value = significant((line.sensitivity or 0.0) * above[1] / below[1])
+    if unit == line.unit:
+        return value
+    divisor = f"({below[0]})" if "/" in below[0] else below[0]
+    return f"{value} {above[0]}/{divisor}"
 
 
 def _dof(value: float) -> str:
@@ -205,20 +208,18 @@ def _verification(p: Passport) -> list[tuple[str, str]]:
     d = p.delivery
     lsb_g = 2.0**-d.plan.shape.output_q
     sets = "; ".join(f"{thousands(count)} {name}" for name, count in d.check.vectors.items())
+    proven = (
+        f"≤ {d.bound.lsb:.3f} LSB = {g_in_words(d.bound.lsb * lsb_g)} at every one of "
+        f"{thousands(d.bound.codes)} temperature codes and any raw code; "
+        f"largest seen {d.check.largest_error_lsb:.3f} LSB"
+    )
+    checked = (
+        f"{thousands(d.check.total)} vectors ({sets}): Python = reference C = generated C, "
+        "bit for bit, no mismatch"
+    )
+    method = f"≤ {g_in_words(d.model_error_g)} at every temperature code and any raw code"
     return [
-        (
-            "Proven arithmetic error",
-            f"≤ {d.bound.lsb:.3f} LSB = {g_in_words(d.bound.lsb * lsb_g)} at every one of "
-            f"{thousands(d.bound.codes)} temperature codes and any raw code; "
-            f"largest seen {d.check.largest_error_lsb:.3f} LSB",
-        ),
-        (
-            "Method against the fitted model",
-            f"≤ {g_in_words(d.model_error_g)} at every temperature code and any raw code",
-        ),
-        (
-            "Cross-check",
-            f"{thousands(d.check.total)} vectors ({sets}): Python = reference C = generated C, "
-            "bit for bit, no mismatch",
-        ),
+        ("Proven arithmetic error", proven),
+        ("Method against the fitted model", method),
+        ("Cross-check", checked),
     ]

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from triaxcal.codegen.tryout import BEFORE
+from triaxcal.codegen.tryout import BEFORE, Residual
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.passport.words import signed
 from triaxcal.report.temperatures import by_temperature, degrees
@@ -43,7 +43,7 @@ def residual_panels(p: Passport) -> list[dict[str, Any]]:
 
 
 def _row(
-    p: Passport, before: Any, groups: list[tuple[float, list[int]]], axis: _Axis
+    p: Passport, before: tuple[Residual, ...], groups: list[tuple[float, list[int]]], axis: _Axis
 ) -> dict[str, Any]:
     limits = p.delivery.unit.limits
     span = (WIDTH - LEFT - RIGHT) / len(groups)

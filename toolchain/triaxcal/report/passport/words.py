@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 MINUS = "\u2212"
+_HANDY = {"g": ("µg", 1e6), "V": ("µV", 1e6), "V/g": ("µV/g", 1e6), "m/s²": ("mm/s²", 1e3)}
 
 
 def with_uncertainty(value: float, expanded: float, scale: float = 1.0) -> tuple[str, str]:
@@ -42,13 +43,15 @@ def g_in_words(value_g: float) -> str:
     return "0 µg" if value_g == 0.0 else f"{significant(value_g * 1e9, 2)} ng"
 
 
+def handy(unit: str) -> tuple[str, float]:
+    """Unit in which a budget shows quantities of `unit`, and how many of it are one."""
+    return _HANDY.get(unit, (unit, 1.0))
+
+
 def in_unit(value: float, unit: str) -> str:
     """Quantity of a budget in a unit of handy size."""
-    if unit == "g":
-        return g_in_words(value)
-    if unit in ("V", "V/g"):
-        return f"{significant(value * 1e6)} µ{unit}"
-    return f"{significant(value)} {unit}"
+    name, scale = handy(unit)
+    return f"{significant(value * scale)} {name}"
 
 
 def thousands(number: int) -> str:
