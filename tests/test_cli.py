@@ -20,6 +20,7 @@ FILES = [
     "passport.html",
     "passport.json",
     "residuals.svg",
+    "triax_calib.a2l",
     "triax_calib.bin",
     "triax_calib.h",
     "triax_comp.c",

@@ -14,6 +14,7 @@ PACKAGE = Path(__file__).parent.parent / "toolchain" / "triaxcal"
 ROOM_OF_MODULE = {
     "records": "records",
     "records_csv": "records",
+    "certificate": "records",
     "tomltable": "records",
     "unitfile": "records",
     "errors": "ground",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certificate_details
 from triaxcal.errors import RefusedError
 from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
 
@@ -48,6 +49,7 @@ _LAYOUT: Layout = {
     "compensation": {"method": False, "output_q": False, "model_error_max_micro_g": False},
     "limits": {"at_t0_g": False, "over_range_g": False},
     "uncertainty": dict.fromkeys(UNCERTAINTY_MAX, False),
+    "certificate": dict.fromkeys(CERTIFICATE_KEYS, False),
 }
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
 _NAME_RULE = "1 to 64 of A-Z a-z 0-9 - _, the first a letter or digit"
@@ -157,6 +159,7 @@ class UnitDescription:
     model_error_max_micro_g: float
     limits: Limits
     stated: StatedUncertainty = StatedUncertainty()
+    certificate: CertificateDetails | None = None
 
 
 def read_unit(folder: Path) -> UnitDescription:
@@ -263,6 +266,7 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
             over_range_g=_number(limits, "over_range_g", 1e-9, 1.0, default=10e-4),
         ),
         stated=_stated(tables["uncertainty"]),
+        certificate=certificate_details(tables["certificate"]),
     )
 
 

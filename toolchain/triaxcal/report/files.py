@@ -1,13 +1,17 @@
-"""All files of a delivery: the firmware's, the results, the picture, the passport."""
+"""All files of a delivery: the firmware's, the results, the picture, the passport, the certificate."""
 
 from __future__ import annotations
 
 from triaxcal.delivery import Delivery
+from triaxcal.report.a2l import calib_a2l
+from triaxcal.report.dcc import certificate_xml
 from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.passport.document import passport_json
 from triaxcal.report.passport.page import passport_html
 from triaxcal.report.residual_plot import residuals_svg
 from triaxcal.report.results import calibration_json, verification_json
+
+CERTIFICATE = "certificate.dcc.xml"
 
 
 def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, bytes]:
@@ -16,6 +20,8 @@ def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, byt
     `made` is the delivery's passport, where there is one already.
     """
     unit_passport = made or passport(delivery, {})
+    details = delivery.unit.certificate
+    certificate = {CERTIFICATE: certificate_xml(unit_passport, details)} if details else {}
     return {
         **delivery.files,
         "calibration.json": calibration_json(delivery),
@@ -23,4 +29,6 @@ def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, byt
         "residuals.svg": residuals_svg(delivery),
         "passport.html": passport_html(unit_passport),
         "passport.json": passport_json(unit_passport),
+        "triax_calib.a2l": calib_a2l(delivery),
+        **certificate,
     }

@@ -152,19 +152,23 @@ def _residuals(delivery: Delivery) -> str:
 def _uncertainty(made: Passport) -> str:
     """Expanded uncertainty of the acceleration, what it comes from, and limits it does not keep."""
     components, length = made.component_budget, made.length_budget
-    lines = [
-        f"95 %, worst orientation at 1 g: {components.expanded * 1e6:.3g} micro-g a component, "
-        f"{length.expanded * 1e6:.3g} micro-g of |a|. {components.verdict}",
-        *(
-            f"The limit {a.where} is not shown to hold: residual and uncertainty of |a| reach "
-            f"{a.factor:.2g} times {a.limit_g * 1e3:g} mg, mostly by {a.cause}."
-            for a in made.acceptance
-            if not a.shown
-        ),
-        *made.uncertainty.warnings,
+    reached = (
+        f"95 %, worst orientation at 1 g: {_small_g(components.expanded)} a component, "
+        f"{_small_g(length.expanded)} of |a|. {components.verdict}"
+    )
+    missed = [
+        f"The limit {a.where} is not shown to hold: residual and uncertainty of |a| reach "
+        f"{a.factor:.2g} times {a.limit_g * 1e3:g} mg, mostly by {a.cause}."
+        for a in made.acceptance
+        if not a.shown
     ]
+    lines = [reached, *missed, *made.uncertainty.warnings]
     text = " ".join(lines).replace("°C", "degC").replace("µ", "micro-")
     return _entry("uncertainty", *_wrap(text))
+
+
+def _small_g(value_g: float) -> str:
+    return f"{value_g * 1e3:.3g} mg" if value_g >= 1e-3 else f"{value_g * 1e6:.3g} micro-g"
 
 
 def _verdict(delivery: Delivery) -> str:

@@ -110,13 +110,13 @@ def level(p: Propagation) -> Source:
     constants, force = from_factor(p, factor)
     return Source(
         key="level",
-        name="the tilter's alignment (level, mounting)",
+        name="the tilter's alignment",
         sd=arcsec,
         unit="arcsec",
         distribution=NORMAL,
         dof=dof,
         origin=origin,
-        advice="level the tilter and seat the unit better, or state how well it is known",
+        advice="level the tilter and seat the unit better, or state how well that is done",
         constants=constants,
         force=force,
     )

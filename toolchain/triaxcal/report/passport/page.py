@@ -42,10 +42,8 @@ def passport_html(p: Passport) -> bytes:
         "after": _largest(p, p.delivery.unit.method),
         "over_temperature": uncertainty_panel(p),
         "budgets": [
-            _budget(
-                p.component_budget, "Worst component of the acceleration", p.component_orientation
-            ),
-            _budget(p.length_budget, "Worst length of the acceleration", p.length_orientation),
+            _budget(p.component_budget, "A component", p.component_orientation),
+            _budget(p.length_budget, "The length |a|", p.length_orientation),
         ],
         "candidates": _candidates(p),
         "selection_reason": p.delivery.calibration.selection_reason,
@@ -82,8 +80,8 @@ def _identity(p: Passport) -> dict[str, Any]:
             ("Thermal model", f"{signed(d.calibration.shape.label.replace('degC', '°C'))}"),
             ("Bias estimator", d.calibration.estimator),
             ("Compensation", f"{d.unit.method}, LSB 2⁻{_superscript(d.plan.shape.output_q)} g"),
-            ("Made by", f"triaxcal {__version__}, compiler {d.compiler}"),
-            ("Inputs", f"sha256 {d.inputs_sha256[:32]}…"),
+            ("Made by", f"triaxcal {__version__}, gcc {d.compiler}"),
+            ("Inputs", f"sha256 {d.inputs_sha256[:16]}…"),
         ],
     }
 
@@ -131,7 +129,7 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
                 "expanded": expanded,
                 "unit": unit,
                 "factor": f"{budget.factor:.2f}",
-                "cause": worst.name if worst else "",
+                "cause": worst.name.removeprefix("the ") if worst else "",
                 "share": percent(worst.share) if worst else "",
                 "group_end": c in (2, 5, 8),
             }
@@ -147,13 +145,13 @@ def _largest(p: Passport, method: str) -> str:
 def _budget(b: Budget, title: str, orientation: str) -> dict[str, Any]:
     return {
         "title": title,
-        "quantity": b.quantity,
+        "quantity": signed(b.quantity),
         "orientation": orientation,
         "combined": in_unit(b.combined, b.unit),
         "expanded": in_unit(b.expanded, b.unit),
         "factor": f"{b.factor:.2f}",
         "dof": _dof(b.dof),
-        "verdict": b.verdict,
+        "verdict": b.verdict.replace(" at -", " at \u2212"),
         "lines": [_line(line, b.unit) for line in b.lines],
     }
 
@@ -162,7 +160,7 @@ def _line(line: Line, unit: str) -> dict[str, Any]:
     known = line.contribution is not None
     sensitivity = "" if not line.sensitivity else _sensitivity(line, unit)
     return {
-        "name": line.name,
+        "name": line.name.removeprefix("the "),
         "origin": line.origin,
         "sd": in_unit(line.sd, line.unit) if line.sd is not None else "unknown",
         "distribution": line.distribution,

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 
+_NOTHING_G = 1e-12
+"""Residuals below this are the rounding of floating point."""
+_NOTHING = 0.001
+"""Contributions below this, in the unit shown, are not worth digits."""
 MINUS = "\u2212"
 _HANDY = {"g": ("µg", 1e6), "V": ("µV", 1e6), "V/g": ("µV/g", 1e6), "m/s²": ("mm/s²", 1e3)}
 
@@ -40,7 +44,7 @@ def g_in_words(value_g: float) -> str:
     for scale, unit in ((1e3, "mg"), (1e6, "µg"), (1e9, "ng")):
         if abs(value_g) * scale >= 0.995:
             return f"{significant(value_g * scale, 3)} {unit}"
-    return "0 µg" if value_g == 0.0 else f"{significant(value_g * 1e9, 2)} ng"
+    return f"{significant(value_g * 1e9)} ng" if abs(value_g) >= _NOTHING_G else "0 ng"
 
 
 def handy(unit: str) -> tuple[str, float]:
@@ -51,6 +55,8 @@ def handy(unit: str) -> tuple[str, float]:
 def in_unit(value: float, unit: str) -> str:
     """Quantity of a budget in a unit of handy size."""
     name, scale = handy(unit)
+    if 0.0 < abs(value * scale) < _NOTHING:
+        return f"<\u202f{_NOTHING:g} {name}"
     return f"{significant(value * scale)} {name}"
 
 
