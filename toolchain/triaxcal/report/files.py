@@ -1,4 +1,4 @@
-"""All files of a delivery: the firmware's, the results, the picture, the passport, the certificate."""
+"""All files of a delivery: the firmware's, the results, passport and certificate."""
 
 from __future__ import annotations
 
