@@ -32,9 +32,9 @@ def significant(value: float, digits: int = 2) -> str:
     """Positive number with so many significant digits, without an exponent where it is short."""
     if value == 0.0:
         return "0"
-    places = digits - 1 - math.floor(math.log10(abs(value)))
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    places = digits - 1 - int(exponent)
     if places > 6:
-        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return f"{mantissa}·10<sup>{signed(str(int(exponent)))}</sup>"
     return signed(f"{round(value, places):.{max(places, 0)}f}")
 
