@@ -17,7 +17,10 @@ ROOT = Path(__file__).resolve().parents[1]
 TRIAXCAL = [sys.executable, "-m", "triaxcal"]
 FILES = [
     "calibration.json",
+    "passport.html",
+    "passport.json",
     "residuals.svg",
+    "triax_calib.a2l",
     "triax_calib.bin",
     "triax_calib.h",
     "triax_comp.c",

@@ -234,9 +234,9 @@ def _refuse_beyond_limits(delivery: Delivery) -> None:
         if abs(residual.error_g) > limit:
             raise RefusedError(
                 f"{delivery.measurements.source}, row {dwell.row}",
-                f"| |a| - g | = {abs(residual.error_g) * 1e3:.3f} mg in {dwell.position} at "
-                f"{dwell.temp_degc:.4g} degC by the compiled C, while the fitted model is within "
-                "the limit",
+                f"| |a| - g | = {abs(residual.error_g) * 1e3:.4g} mg in {dwell.position} at "
+                f"{dwell.temp_degc:.4g} degC by the compiled C, {abs(residual.error_g) / limit:.3g} "
+                "times the limit, which the fitted model keeps",
                 expected=f"at most {limit * 1e3:g} mg ({key})",
                 remedy=(
                     f"method {unit.method} is within {delivery.model_error_g * 1e3:.3g} mg of the "

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certificate_details
 from triaxcal.errors import RefusedError
 from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
 
@@ -22,6 +23,16 @@ T0_TOLERANCE_DEGC = 2.0
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
 PLAUSIBLE_DEGC = (-200.0, 400.0)
 """Temperatures outside these are mistakes: no electronic accelerometer works there."""
+
+UNCERTAINTY_MAX = {
+    "squareness_arcsec": 36000.0,
+    "repeatability_arcsec": 36000.0,
+    "level_arcsec": 36000.0,
+    "gravity_m_per_s2": 0.1,
+    "thermometer_degc": 10.0,
+    "thermometer_drift_degc": 10.0,
+}
+"""Keys of [uncertainty], each a standard uncertainty, and the largest value of each."""
 
 _LAYOUT: Layout = {
     "": {"format": True, "serial": True, "description": False},
@@ -39,6 +50,8 @@ _LAYOUT: Layout = {
     "sensor": {"polarity": False},
     "compensation": {"method": False, "output_q": False, "model_error_max_micro_g": False},
     "limits": {"at_t0_g": False, "over_range_g": False},
+    "uncertainty": dict.fromkeys(UNCERTAINTY_MAX, False),
+    "certificate": dict.fromkeys(CERTIFICATE_KEYS, False),
 }
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
 _NAME_RULE = "1 to 64 of A-Z a-z 0-9 - _, the first a letter or digit"
@@ -102,6 +115,28 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class StatedUncertainty:
+    """Standard uncertainties that the user knows; None where the file does not say.
+
+    Attributes
+    ----------
+    squareness_arcsec : of each test position about each axis, the same at all temperatures
+    repeatability_arcsec : of each dwell about each axis
+    level_arcsec : of the tilter as a whole against the unit's axes, about each axis
+    gravity_m_per_s2 : of local gravity
+    thermometer_degc : of the unit's thermometer, the same at calibration and in use
+    thermometer_drift_degc : of its change between calibration and use
+    """
+
+    squareness_arcsec: float | None = None
+    repeatability_arcsec: float | None = None
+    level_arcsec: float | None = None
+    gravity_m_per_s2: float | None = None
+    thermometer_degc: float | None = None
+    thermometer_drift_degc: float | None = None
+
+
+@dataclass(frozen=True)
 class UnitDescription:
     """One unit, validated.
 
@@ -131,6 +166,8 @@ class UnitDescription:
     output_q: int
     model_error_max_micro_g: float
     limits: Limits
+    stated: StatedUncertainty = StatedUncertainty()
+    certificate: CertificateDetails | None = None
 
 
 def read_unit(folder: Path) -> UnitDescription:
@@ -236,6 +273,8 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
             at_t0_g=_number(limits, "at_t0_g", 1e-9, 1.0, default=3e-4),
             over_range_g=_number(limits, "over_range_g", 1e-9, 1.0, default=10e-4),
         ),
+        stated=_stated(tables["uncertainty"]),
+        certificate=certificate_details(tables["certificate"]),
     )
 
 
@@ -285,6 +324,11 @@ def _thermal_choice(table: Table) -> ThermalChoice:
             else None
         ),
     )
+
+
+def _stated(table: Table) -> StatedUncertainty:
+    found = {k: table.number(k, 0.0, high) for k, high in UNCERTAINTY_MAX.items() if k in table}
+    return StatedUncertainty(**found)
 
 
 def _polarity(table: Table) -> tuple[int, int, int] | None:

@@ -36,13 +36,15 @@ def calib(unit: Path, build: Path) -> None:
     from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.publish import publish  # noqa: PLC0415
     from triaxcal.report.files import all_files  # noqa: PLC0415
+    from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415
 
     delivery = deliver(unit)
-    files = all_files(delivery)
+    made = passport(delivery, {})
+    files = all_files(delivery, made)
     target = build / delivery.unit.name
     publish(files, target)
-    click.echo(summary(delivery, files, str(target)))
+    click.echo(summary(made, files, str(target)))
 
 
 @main.command()

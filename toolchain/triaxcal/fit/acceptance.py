@@ -70,7 +70,7 @@ def refuse_unacceptable(
         return
     blame = _largest_disagreement(unit, calibration, measurements)
     if blame.error_g > _SUSPICIOUS * limits[worst]:
-        raise _contradiction(measurements.source, blame)
+        raise _contradiction(unit, measurements.source, blame, dwells[worst], float(errors[worst]))
     raise _too_simple(unit, calibration, measurements.source, dwells[worst], float(errors[worst]))
 
 
@@ -123,29 +123,44 @@ def _residual_g(dwell: Dwell, constants: FloatArray, gravity_g: float) -> FloatA
     return (dwell.voltage_v - model) / np.abs(constants[[0, 4, 8]])
 
 
-def _contradiction(source: str, blame: _Disagreement) -> RefusedError:
+def _contradiction(
+    unit: UnitDescription, source: str, blame: _Disagreement, dwell: Dwell, error_g: float
+) -> RefusedError:
+    residual, limit = _residual_and_limit(unit, dwell, error_g)
     row = {d.position: d.row for d in blame.group.dwells}
     first, second = sorted(blame.positions)
     return RefusedError(
         f"{source}, rows {row[first]} and {row[second]}",
-        f"at {blame.group.temp_degc:.4g} degC the mean of {first} and {second} differs from that "
-        f"of the other four positions by {blame.error_g * 1e3:.3f} mg in output {blame.axis}",
-        expected="means that agree: opposite positions cancel but for the bias",
-        remedy="one of the two is wrong, or the unit was not square: measure both again",
+        f"{residual}; at {blame.group.temp_degc:.4g} degC the mean of {first} and {second} differs "
+        f"from that of the other four positions by {blame.error_g * 1e3:.4g} mg in output "
+        f"{blame.axis}",
+        expected=limit,
+        remedy=(
+            "opposite positions cancel but for the bias, so one of the two is wrong, or noise and "
+            "placement are too large for this limit: measure both again"
+        ),
     )
 
 
 def _too_simple(
     unit: UnitDescription, calibration: Calibration, source: str, dwell: Dwell, error_g: float
 ) -> RefusedError:
-    limit, key = unit.limits.at(dwell.temp_degc, unit.t0_degc)
+    residual, limit = _residual_and_limit(unit, dwell, error_g)
     return RefusedError(
         f"{source}, row {dwell.row}",
-        f"| |a| - g | = {error_g * 1e3:.3f} mg in {dwell.position} at {dwell.temp_degc:.4g} degC "
-        f"with {calibration.shape.label}",
-        expected=f"at most {limit * 1e3:g} mg ({key})",
+        f"{residual}, with {calibration.shape.label}",
+        expected=limit,
         remedy=(
             "the thermal function does not follow the unit: choose a better one in [thermal], "
             "or measure at more temperatures"
         ),
     )
+
+
+def _residual_and_limit(unit: UnitDescription, dwell: Dwell, error_g: float) -> tuple[str, str]:
+    limit_g, key = unit.limits.at(dwell.temp_degc, unit.t0_degc)
+    residual = (
+        f"| |a| - g | = {error_g * 1e3:.4g} mg in {dwell.position} at {dwell.temp_degc:.4g} degC, "
+        f"{error_g / limit_g:.3g} times the limit"
+    )
+    return residual, f"at most {limit_g * 1e3:g} mg ({key})"

@@ -104,6 +104,18 @@ def parameter_covariance(
     return result
 
 
+def parameter_operator(data: TilterData, shape: ThermalShape) -> FloatArray:
+    """L of theta = L U, shape (E, 3, 4, P, 6 G): an output's parameters are linear in its readings.
+
+    Axes: estimator, output, constant of the output, parameter, reading (position within group).
+    """
+    system = _System.of(data, shape)
+    operator = system.solve(system.fit)
+    blocks = operator.reshape(*operator.shape[:2], 4, shape.parameters, -1)
+    result: FloatArray = system.to_basis @ blocks
+    return result
+
+
 def curve_covariance(
     shape: ThermalShape, covariance: FloatArray, temp_degc: FloatArray | float
 ) -> FloatArray:

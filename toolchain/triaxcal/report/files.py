@@ -1,17 +1,34 @@
-"""All files of a delivery: the firmware's, the results, the picture."""
+"""All files of a delivery: the firmware's, the results, passport and certificate."""
 
 from __future__ import annotations
 
 from triaxcal.delivery import Delivery
+from triaxcal.report.a2l import calib_a2l
+from triaxcal.report.dcc import certificate_xml
+from triaxcal.report.passport.content import Passport, passport
+from triaxcal.report.passport.document import passport_json
+from triaxcal.report.passport.page import passport_html
 from triaxcal.report.residual_plot import residuals_svg
 from triaxcal.report.results import calibration_json, verification_json
 
+CERTIFICATE = "certificate.dcc.xml"
 
-def all_files(delivery: Delivery) -> dict[str, bytes]:
-    """Name and content of everything that build/<UNIT>/ receives."""
+
+def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, bytes]:
+    """Name and content of everything that build/<UNIT>/ receives.
+
+    `made` is the delivery's passport, where there is one already.
+    """
+    unit_passport = made or passport(delivery, {})
+    details = delivery.unit.certificate
+    certificate = {CERTIFICATE: certificate_xml(unit_passport, details)} if details else {}
     return {
         **delivery.files,
         "calibration.json": calibration_json(delivery),
         "verification.json": verification_json(delivery),
         "residuals.svg": residuals_svg(delivery),
+        "passport.html": passport_html(unit_passport),
+        "passport.json": passport_json(unit_passport),
+        "triax_calib.a2l": calib_a2l(delivery),
+        **certificate,
     }

@@ -9,18 +9,21 @@ from triaxcal.fit.calibrate import Calibration
 from triaxcal.fit.selection import Candidate
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
+from triaxcal.report.passport.content import Passport
 from triaxcal.report.temperatures import by_temperature, degrees
 
 _LABEL = 16
 
 
-def summary(delivery: Delivery, files: Iterable[str], where: str) -> str:
+def summary(made: Passport, files: Iterable[str], where: str) -> str:
     """Text of the summary; `files` lie in the folder `where`."""
+    delivery = made.delivery
     blocks = [
         _head(delivery),
         _constants(delivery.calibration),
         _candidates(delivery.calibration),
         _residuals(delivery),
+        _uncertainty(made),
         _verdict(delivery),
         _entry("files", f"{where}/", *_wrap("  ".join(sorted(files)))),
     ]
@@ -147,6 +150,28 @@ def _residuals(delivery: Delivery) -> str:
     lines = _table(head, rows)
     lines += [f"  {m.method}: {m.refusal}" for m in delivery.methods if m.refusal]
     return "\n".join(lines)
+
+
+def _uncertainty(made: Passport) -> str:
+    """Expanded uncertainty of the acceleration, what it comes from, and limits it does not keep."""
+    components, length = made.component_budget, made.length_budget
+    reached = (
+        f"95 %, worst orientation at 1 g: {_small_g(components.expanded)} a component, "
+        f"{_small_g(length.expanded)} of |a|. {components.verdict}"
+    )
+    missed = [
+        f"The limit {a.where} is not shown to hold: residual and uncertainty of |a| reach "
+        f"{a.factor:.2g} times {a.limit_g * 1e3:g} mg, mostly by {a.cause}."
+        for a in made.acceptance
+        if not a.shown
+    ]
+    lines = [reached, *missed, *made.uncertainty.warnings]
+    text = " ".join(lines).replace("°C", "degC").replace("µ", "micro-")
+    return _entry("uncertainty", *_wrap(text))
+
+
+def _small_g(value_g: float) -> str:
+    return f"{value_g * 1e3:.3g} mg" if value_g >= 1e-3 else f"{value_g * 1e6:.3g} micro-g"
 
 
 def _verdict(delivery: Delivery) -> str:

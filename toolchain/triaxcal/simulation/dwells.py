@@ -2,7 +2,8 @@
 
 Every reading is simulated and rounded to a code. The noise is far above one code, so the mean of
 the codes is finer than a code and its error is that of the noise alone. The dwell's true
-temperature enters the physics; its record is the mean of the thermometer's codes.
+temperature enters the physics; its record is the mean of the thermometer's codes. The rig is
+perfect unless truth.toml says otherwise (`triaxcal.simulation.rig`).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from triaxcal.errors import RefusedError
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.records import Dwell, MeasurementSet, volts
-from triaxcal.simulation.tilts import truth_force_g
+from triaxcal.simulation.rig import Rig
 from triaxcal.simulation.truth import Plan, Truth, codes_of_voltage
 from triaxcal.unitfile import UnitDescription
 
@@ -79,8 +80,9 @@ def simulate_codes(unit: UnitDescription, truth: Truth, plan: Plan) -> tuple[Cod
     steps = [(temp, position) for temp in plan.temperatures_degc for position in TEST_POSITIONS]
     steps += [(temp, cp) for temp in plan.check_temperatures_degc for cp in CHECK_POSITIONS]
     steps.sort(key=lambda step: step[0])  # stable: positions keep their order
+    rig = Rig(truth.imperfections, unit.gravity_g, plan.seed)
     return tuple(
-        _dwell(unit, truth, rng, plan.readings_per_dwell, position=position, nominal_degc=temp)
+        _dwell(unit, truth, rig, rng, plan.readings_per_dwell, position=position, nominal_degc=temp)
         for temp, position in steps
     )
 
@@ -88,6 +90,7 @@ def simulate_codes(unit: UnitDescription, truth: Truth, plan: Plan) -> tuple[Cod
 def _dwell(
     unit: UnitDescription,
     truth: Truth,
+    rig: Rig,
     rng: np.random.Generator,
     count: int,
     *,
@@ -96,9 +99,13 @@ def _dwell(
 ) -> CodeDwell:
     temp_degc = nominal_degc + truth.dwell_temp_sd_degc * float(rng.standard_normal())
     sensor = unit.temperature_sensor
-    shown_degc = temp_degc + truth.thermometer_sd_degc * rng.standard_normal(count)
+    shown_degc = (
+        temp_degc
+        + rig.thermometer_offset_degc
+        + truth.thermometer_sd_degc * rng.standard_normal(count)
+    )
     temp_codes = np.rint((shown_degc - sensor.degc_at_zero) / sensor.degc_per_code)
-    exact_v = truth.voltage_v(truth_force_g(position, unit.gravity_g), temp_degc)
+    exact_v = truth.voltage_v(rig.force_g(position), temp_degc)
     readings_v: FloatArray = exact_v + truth.reading_sd_v * rng.standard_normal((count, 3))
     codes = codes_of_voltage(unit.adc, readings_v)
     if np.any(codes == unit.adc.code_min) or np.any(codes == unit.adc.code_max):

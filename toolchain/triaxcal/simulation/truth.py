@@ -17,6 +17,14 @@ from triaxcal.unitfile import PLAUSIBLE_DEGC, Adc
 FORMAT = 1
 TRUTH_FILE = "truth.toml"
 SEED_MAX = 2**63 - 1
+IMPERFECTIONS = {
+    "squareness_sd_arcsec": 36000.0,
+    "repeatability_sd_arcsec": 36000.0,
+    "level_sd_arcsec": 36000.0,
+    "gravity_sd_m_per_s2": 0.1,
+    "thermometer_offset_sd_degc": 10.0,
+}
+"""Keys of [imperfections] and the largest value of each."""
 
 _LAYOUT: Layout = {
     "": {"format": True},
@@ -28,7 +36,33 @@ _LAYOUT: Layout = {
         "temperatures_degc": True,
         "check_temperatures_degc": True,
     },
+    "imperfections": dict.fromkeys(IMPERFECTIONS, False),
 }
+
+
+@dataclass(frozen=True)
+class Imperfections:
+    """Standard deviations of what is wrong with the rig; one draw a seed unless said otherwise.
+
+    Attributes
+    ----------
+    squareness_sd_arcsec : float
+        Tilt of each test position, about each axis; the same at all temperatures.
+    repeatability_sd_arcsec : float
+        Tilt of each dwell, about each axis.
+    level_sd_arcsec : float
+        Rotation of the whole rig against the unit's axes, about each axis.
+    gravity_sd_m_per_s2 : float
+        Gravity at the rig against the one in unit.toml.
+    thermometer_offset_sd_degc : float
+        What the thermometer shows too much, at all temperatures.
+    """
+
+    squareness_sd_arcsec: float = 0.0
+    repeatability_sd_arcsec: float = 0.0
+    level_sd_arcsec: float = 0.0
+    gravity_sd_m_per_s2: float = 0.0
+    thermometer_offset_sd_degc: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -45,12 +79,15 @@ class Truth:
         Noise of one reading of the thermometer.
     dwell_temp_sd_degc : float
         Spread of the dwells' true temperatures about the nominal ones.
+    imperfections : Imperfections
+        Of the rig; none by default.
     """
 
     constants: ThermalModel
     reading_sd_v: float
     thermometer_sd_degc: float
     dwell_temp_sd_degc: float
+    imperfections: Imperfections = Imperfections()
 
     def voltage_v(self, force_g: FloatArray, temp_degc: FloatArray | float) -> FloatArray:
         """Outputs without noise in V, P1 (9).
@@ -99,12 +136,19 @@ def read_truth(folder: Path) -> tuple[Truth, Plan]:
         When the file cannot be read or breaks a rule of docs/file-formats.md.
     """
     tables = read_tables(folder / TRUTH_FILE, _LAYOUT, FORMAT)
-    noise = tables["noise"]
+    noise, wrong = tables["noise"], tables["imperfections"]
     truth = Truth(
         constants=_curves(tables["curves"]),
         reading_sd_v=noise.number("reading_sd_v", 0.0, 1.0),
         thermometer_sd_degc=noise.number("thermometer_sd_degc", 0.0, 10.0),
         dwell_temp_sd_degc=noise.number("dwell_temp_sd_degc", 0.0, 10.0),
+        imperfections=Imperfections(
+            **{
+                key: wrong.number(key, 0.0, high)
+                for key, high in IMPERFECTIONS.items()
+                if key in wrong
+            }
+        ),
     )
     return truth, _plan(tables["plan"])
 

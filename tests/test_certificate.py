@@ -1,0 +1,262 @@
+"""certificate.dcc.xml against the documented order of elements; triax_calib.a2l against the plan."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from triaxcal.certificate import CertificateDetails
+from triaxcal.codegen.render import function_format
+from triaxcal.delivery import Delivery
+from triaxcal.errors import RefusedError
+from triaxcal.report.a2l import calib_a2l, calib_words
+from triaxcal.report.dcc import DCC, SI, certificate_xml
+from triaxcal.report.files import CERTIFICATE, all_files
+from triaxcal.report.passport.content import passport
+from triaxcal.unitfile import read_unit
+
+UNITS = Path(__file__).parent.parent / "units"
+DETAILS = CertificateDetails(
+    "C-17", "Laboratory <A & B>", "Kyiv", "UA", "Customer", "N. N.", "Maker",
+    date(2026, 3, 30), date(2026, 3, 31),
+)  # fmt: skip
+
+ORDER = {
+    "digitalCalibrationCertificate": "administrativeData measurementResults comment? document?",
+    "administrativeData": "dccSoftware refTypeDefinitions? coreData items calibrationLaboratory "
+    "respPersons customer statements?",
+    "dccSoftware": "software+",
+    "usedSoftware": "software+",
+    "software": "name release type? description?",
+    "coreData": "countryCodeISO3166_1 usedLangCodeISO639_1+ mandatoryLangCodeISO639_1+ "
+    "uniqueIdentifier identifications? receiptDate? beginPerformanceDate endPerformanceDate "
+    "performanceLocation issueDate? previousReport?",
+    "items": "name? equipmentClass* description? owner? identifications? item+",
+    "item": "name equipmentClass* description? installedSoftwares? manufacturer model? "
+    "identifications itemQuantities?",
+    "identifications": "identification+",
+    "identification": "issuer value name?",
+    "calibrationLaboratory": "calibrationLaboratoryCode? contact cryptElectronicSeal?",
+    "contact": "name eMail? phone? fax? location descriptionData?",
+    "customer": "name eMail? phone? fax? location descriptionData?",
+    "manufacturer": "name eMail? phone? fax? location? descriptionData?",
+    "person": "name eMail? phone? fax? location? descriptionData?",
+    "respPersons": "respPerson+",
+    "respPerson": "person description? role? mainSigner?",
+    "statements": "statement+",
+    "statement": "name? description? countryCodeISO3166_1* convention? traceable? norm* reference* "
+    "declaration? valid? date? period? respAuthority? conformity? data?",
+    "measurementResults": "measurementResult+",
+    "measurementResult": "name description? usedMethods? usedSoftware? measuringEquipments? "
+    "influenceConditions? results measurementMetaData?",
+    "usedMethods": "usedMethod+",
+    "usedMethod": "name description? norm* reference*",
+    "influenceConditions": "influenceCondition+",
+    "influenceCondition": "name description? status? certificate? data",
+    "results": "result+",
+    "result": "name description? data",
+    "data": "quantity+",
+    "quantity": "name? description? (real|realListXMLList) relativeUncertainty?",
+    "real": "label? value unit",
+    "realListXMLList": "labelXMLList? valueXMLList unitXMLList dateTimeXMLList? "
+    "expandedUncXMLList?",
+    "expandedUncXMLList": "uncertaintyXMLList coverageFactorXMLList coverageProbabilityXMLList "
+    "distributionXMLList?",
+    "location": "(city|countryCode|further)+",
+    **dict.fromkeys(("name", "description", "declaration", "further"), "content+"),
+}
+"""Children in the order of DCC 3.2.0 and D-SI 2.1 as documented; unlisted elements have none."""
+
+
+def wrong_children(element: ET.Element) -> list[str]:
+    """Elements whose children are not those of `ORDER`."""
+    name = element.tag.split("}")[1]
+    children = [child.tag.split("}")[1] for child in element]
+    pattern = "".join(
+        f"(?:{word.rstrip('?*+').strip('()')} ){word[-1] if word[-1] in '?*+' else ''}"
+        if "(" not in word
+        else f"(?:(?:{word.rstrip('+').strip('()')}) ){'+' if word.endswith('+') else ''}"
+        for word in ORDER.get(name, "").split()
+    )
+    good = re.fullmatch(pattern, "".join(f"{child} " for child in children))
+    wrong = [] if good else [f"{name}: {children}"]
+    return wrong + [found for child in element for found in wrong_children(child)]
+
+
+@pytest.fixture(scope="session")
+def certificate(delivered: dict[str, Delivery]) -> ET.Element:
+    return ET.fromstring(certificate_xml(passport(delivered["AT-SIM"], {}), DETAILS))
+
+
+def test_elements_stand_in_the_documented_order(certificate: ET.Element) -> None:
+    assert wrong_children(certificate) == []
+    assert certificate.get("schemaVersion") == "3.2.0"
+
+
+def test_the_order_is_really_checked(certificate: ET.Element) -> None:
+    broken = ET.fromstring(ET.tostring(certificate))
+    core = broken.find(f".//{{{DCC}}}coreData")
+    assert core is not None
+    core[:] = core[::-1]
+    (wrong,) = wrong_children(broken)
+    assert wrong.startswith("coreData: ['performanceLocation'")
+
+
+def test_certificate_has_si_values_and_uncertainties(
+    certificate: ET.Element, delivered: dict[str, Delivery]
+) -> None:
+    p = passport(delivered["AT-SIM"], {})
+    numbers = certificate.find(f".//{{{SI}}}realListXMLList")
+    assert numbers is not None
+    at_t0 = p.delivery.calibration.thermal.constants_at(20.0)
+    scale = np.array([1 / 9.80665] * 9 + [1.0] * 3)
+
+    def column(name: str) -> list[float]:
+        text = numbers.findtext(f".//{{{SI}}}{name}")
+        assert text is not None
+        return [float(word) for word in text.split()]
+
+    # Written with twelve digits.
+    np.testing.assert_allclose(column("valueXMLList"), at_t0 * scale, rtol=1e-11)
+    expanded = [b.expanded for b in p.constant_budgets]
+    np.testing.assert_allclose(column("uncertaintyXMLList"), expanded * scale, rtol=1e-11)
+    assert column("coverageProbabilityXMLList") == [0.95]
+    names = certificate.findall(f".//{{{DCC}}}calibrationLaboratory//{{{DCC}}}content")
+    assert [n.text for n in names] == ["Laboratory <A & B>"]
+
+
+def test_certificate_is_delivered_only_when_people_said_who_they_are(
+    delivered: dict[str, Delivery],
+) -> None:
+    delivery = delivered["AT-SIM"]
+    assert CERTIFICATE not in all_files(delivery)
+    signed = replace(delivery, unit=replace(delivery.unit, certificate=DETAILS))
+    assert b"C-17" in all_files(signed)[CERTIFICATE]
+
+
+TABLE = """
+[certificate]
+identifier = "C-17"
+laboratory = "Laboratory"
+city = "Kyiv"
+country = "UA"
+customer = "Customer"
+signer = "N. N."
+manufacturer = "Maker"
+begin = 2026-03-30
+end = 2026-03-31
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('city = "Kyiv"\n', "", "[certificate] city: missing; expected all of [certificate]"),
+        ('"UA"', '"Ukraine"', "[certificate] country: found 'Ukraine'; expected two capitals"),
+        ("end = 2026-03-31", "end = 2026-03-29", "expected 2026-03-30 (begin) or later"),
+        ("begin = 2026-03-30", 'begin = "2026-03-30"', "[certificate] begin: found '2026-03-30'"),
+        ('"Maker"', '" "', "[certificate] manufacturer: found ' '; expected one line of text"),
+        ('"Maker"', '"a\\nb"', "expected one line of text"),
+    ],
+)
+def test_certificate_table_is_checked(tmp_path: Path, old: str, new: str, message: str) -> None:
+    folder = tmp_path / "units" / "AT-SIM"
+    shutil.copytree(UNITS / "AT-SIM", folder)
+    path = folder / "unit.toml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text + TABLE, encoding="utf-8")
+    details = read_unit(folder).certificate
+    assert details is not None
+    assert details.end == date(2026, 3, 31)
+    path.write_text(text + TABLE.replace(old, new), encoding="utf-8")
+    with pytest.raises(RefusedError, match=re.escape(message)):
+        read_unit(folder)
+
+
+# ---- A2L ----
+
+
+def struct_words(delivery: Delivery) -> list[int]:
+    """`triax_calib_t` as the words of its memory, every one an int32."""
+    plan = delivery.plan
+    words = [plan.temp_min_code, plan.temp_max_code]
+    for segment in plan.segments:
+        words += [segment.first_code, segment.origin_code, segment.gain]
+        words += [int(c) for c in segment.coefficients.reshape(-1)]
+    return words
+
+
+@pytest.mark.parametrize("name", ["AT-CHERNIAK", "AT-SIM"])
+def test_each_characteristic_gives_the_planned_value(
+    delivered: dict[str, Delivery], name: str
+) -> None:
+    delivery = delivered[name]
+    plan, sensor = delivery.plan, delivery.unit.temperature_sensor
+    memory = struct_words(delivery)
+    words = calib_words(delivery)
+    found = {w.name: w.method.slope * memory[w.offset // 4] + w.method.intercept for w in words}
+    assert found["TRIAX_temp_min"] == sensor.degc(plan.temp_min_code)
+    assert found["TRIAX_s0_origin"] == sensor.degc(plan.segments[0].origin_code)
+    coefficients = [w for w in words if re.search(r"_\d+$", w.name)]
+    assert len(coefficients) == plan.real.size
+    flat = plan.real.reshape(-1, plan.shape.order + 1)
+    for k, w in enumerate(coefficients):
+        function, power = divmod(k, plan.shape.order + 1)
+        exact = flat[function, power] * function_format(plan, function % 12)[1]
+        # Rounded to the nearest integer: half a slope, and the rounding of the floats.
+        assert abs(found[w.name] - exact) <= 0.5000001 * w.method.slope + 1e-12 * abs(exact)
+    assert len({w.offset for w in words}) == len(words)
+
+
+A2L_TOKEN = re.compile(r'"[^"]*"|/\*.*?\*/|/begin|/end|[^\s"]+', re.DOTALL)
+
+
+def test_a2l_blocks_nest_and_refer_to_each_other(delivered: dict[str, Delivery]) -> None:
+    delivery = delivered["AT-SIM"]
+    text = calib_a2l(delivery).decode()
+    assert text.isascii()
+    tokens = [t for t in A2L_TOKEN.findall(text) if not t.startswith("/*")]
+    stack, methods, used, symbols = [], set(), set(), []
+    for i, token in enumerate(tokens):
+        if token == "/begin":
+            stack.append(tokens[i + 1])
+            if tokens[i + 1] == "COMPU_METHOD":
+                methods.add(tokens[i + 2])
+            if tokens[i + 1] == "CHARACTERISTIC":
+                kind, address, layout, _, method, low, high = tokens[i + 4 : i + 11]
+                assert (kind, address, layout) == ("VALUE", "0x0", "TRIAX_INT32")
+                assert float(low) < float(high)
+                used.add(method)
+                assert tokens[i + 11] == "SYMBOL_LINK"
+                symbols.append((tokens[i + 12], int(tokens[i + 13])))
+        if token == "/end":
+            assert stack.pop() == tokens[i + 1]
+    assert stack == []
+    assert used == methods
+    assert {name for name, _ in symbols} == {'"TRIAX_CALIB"'}
+    assert [offset for _, offset in symbols] == [w.offset for w in calib_words(delivery)]
+
+
+def test_another_parser_reads_the_a2l(delivered: dict[str, Delivery], tmp_path: Path) -> None:
+    pya2l = pytest.importorskip("pya2l", reason="the a2l extra is not installed")
+    from pya2l import model
+
+    delivery = delivered["AT-SIM"]
+    path = tmp_path / "triax_calib.a2l"
+    path.write_bytes(calib_a2l(delivery))
+    session = pya2l.import_a2l(str(path), in_memory=True, loglevel="ERROR")
+    found = {c.name: c for c in session.query(model.Characteristic).all()}
+    words = calib_words(delivery)
+    assert set(found) == {w.name for w in words}
+    for w in words:
+        assert found[w.name].symbol_link.offset == w.offset
+        assert found[w.name].conversion == w.method.name
+    slopes = {m.name: m.coeffs_linear.a for m in session.query(model.CompuMethod).all()}
+    assert slopes == {w.method.name: w.method.slope for w in words}

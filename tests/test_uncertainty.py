@@ -1,0 +1,364 @@
+"""Sources of uncertainty one by one: against exact formulas, finite differences and Monte Carlo."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import fit_cases
+from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.model.positions import TEST_POSITIONS
+from triaxcal.records import Dwell, MeasurementSet, read_measurements
+from triaxcal.simulation.dwells import simulate
+from triaxcal.simulation.rig import Rig, rotation
+from triaxcal.simulation.truth import Imperfections, Truth, read_truth
+from triaxcal.uncertainty.budget import Line, budget
+from triaxcal.uncertainty.coverage import coverage_factor, effective_dof, student_within
+from triaxcal.uncertainty.device_sources import Device
+from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
+from triaxcal.uncertainty.heldout import held_out, thermal_error
+from triaxcal.uncertainty.orientation import DIRECTIONS, weights
+from triaxcal.uncertainty.propagation import ROWS, propagation, rows_of
+from triaxcal.uncertainty.scatter import scatter
+from triaxcal.unitfile import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
+
+UNITS = Path(__file__).parent.parent / "units"
+DEVICE = Device(24, (0.75, 0.75, 0.75), 5e-7)
+ZERO = StatedUncertainty(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+CUBIC = ThermalChoice("polynomial", 3, None)
+TEMPS = np.array([-35.0, -5.0, 20.0, 48.0, 66.0])
+
+
+def sim_unit(stated: StatedUncertainty = ZERO) -> UnitDescription:
+    return replace(
+        read_unit(UNITS / "AT-SIM"), stated=stated, thermal=CUBIC, estimator="least-squares"
+    )
+
+
+def evaluated(
+    unit: UnitDescription, measurements: MeasurementSet, device: Device | None = DEVICE
+) -> tuple[Calibration, Uncertainty]:
+    calibration = calibrate(unit, measurements)
+    return calibration, uncertainty(unit, measurements, calibration, device)
+
+
+@pytest.fixture(scope="module")
+def at_sim() -> tuple[UnitDescription, MeasurementSet, Calibration]:
+    unit = read_unit(UNITS / "AT-SIM")
+    measurements = read_measurements(UNITS / "AT-SIM" / "measurements.csv", unit)
+    return unit, measurements, calibrate(unit, measurements)
+
+
+# ---- coverage factors ----
+
+
+def test_student_agrees_with_scipy() -> None:
+    for dof in (1, 2, 3, 7, 8, 30, 199, 200, 1000, 10**6):
+        # The bisection stops at 1e-17, the expansion's fourth term is below 1e-8 at 200.
+        assert coverage_factor(dof) == pytest.approx(stats.t.ppf(0.975, dof), rel=2e-8)
+    assert student_within(2.0, 5) == pytest.approx(1 - 2 * stats.t.sf(2.0, 5), rel=1e-12)
+
+
+def test_degrees_of_freedom_are_rounded_down() -> None:
+    assert coverage_factor(8.99) == coverage_factor(8.0)
+    assert coverage_factor(0.3) == coverage_factor(1.0)
+    assert coverage_factor(math.inf) == pytest.approx(1.959963984540054, rel=1e-15)
+
+
+def test_welch_satterthwaite_of_the_gum_example() -> None:
+    # GUM H.1.6: u_c = 32 nm from 25 (18), 9.7 (25.6), 16.6 (50), 1.7 (infinite), 10.2 (2) nm.
+    parts = [(25.0, 18.0), (9.7, 25.6), (2.9, 50.0), (16.6, 2.0), (1.7, math.inf)]
+    assert effective_dof(parts) == pytest.approx(16.7, abs=1.0)
+    assert effective_dof([(3.0, 5.0)]) == pytest.approx(5.0)
+    assert effective_dof([]) == math.inf
+
+
+# ---- propagation ----
+
+
+def test_noise_is_the_covariance_of_the_fit(
+    at_sim: tuple[UnitDescription, MeasurementSet, Calibration],
+) -> None:
+    unit, measurements, calibration = at_sim
+    result = uncertainty(unit, measurements, calibration, None)
+    noise = next(s for s in result.sources if s.key == "noise").constants
+    assert noise is not None
+    expected = calibration.constants_covariance(result.temps_degc)
+    found = noise[:, ROWS][:, :, ROWS]
+    # Two orders of summation of the same 42 products.
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * expected.max())
+
+
+def test_held_out_errors_are_those_of_the_selection(
+    at_sim: tuple[UnitDescription, MeasurementSet, Calibration],
+) -> None:
+    unit, measurements, calibration = at_sim
+    p = propagation(unit, measurements, calibration, TEMPS)
+    errors = held_out(p, scatter(p)).errors_g
+    chosen = next(c for c in calibration.candidates if c.chosen)
+    assert math.sqrt(np.mean(errors**2)) == pytest.approx(chosen.held_out_g, rel=1e-9)
+
+
+def test_held_out_operator_is_the_derivative_of_the_errors() -> None:
+    unit = sim_unit()
+    truth, plan = read_truth(UNITS / "AT-SIM")
+    measurements = simulate(unit, truth, replace(plan, readings_per_dwell=4))
+    base = propagation(unit, measurements, calibrate(unit, measurements), TEMPS)
+    before = held_out(base, scatter(base))
+    tilter = [k for k, d in enumerate(measurements.dwells) if d.position.startswith("TP")]
+    step = 1e-4  # V, 0.2 mg: the change of N by it is 1e-4 of itself
+    for reading, axis in ((0, 0), (9, 2), (23, 1), (41, 0)):
+        k = tilter[reading]
+        changed = measurements.dwells[k].voltage_v.copy()
+        changed[axis] += step
+        dwells = list(measurements.dwells)
+        dwells[k] = replace(dwells[k], voltage_v=changed)
+        moved = MeasurementSet("moved", tuple(dwells))
+        p = propagation(unit, moved, calibrate(unit, moved), TEMPS)
+        found = (held_out(p, scatter(p)).errors_g - before.errors_g) / step
+        # Readings of AT-SIM are in the file's order of positions, TP1 to TP6 at each temperature.
+        np.testing.assert_allclose(found, before.operator[:, reading, axis], atol=2e-3)
+
+
+def test_rotations_are_exact() -> None:
+    turned = rotation(np.array([0.0, 0.0, np.pi / 2])) @ np.array([1.0, 0.0, 0.0])
+    np.testing.assert_allclose(turned, [0.0, 1.0, 0.0], atol=1e-15)
+    R = rotation(np.array([0.3, -0.2, 0.1]))
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-15)
+
+
+CASES = {
+    "squareness": (
+        Imperfections(squareness_sd_arcsec=60.0),
+        replace(ZERO, squareness_arcsec=60.0),
+    ),
+    "repeatability": (
+        Imperfections(repeatability_sd_arcsec=60.0),
+        replace(ZERO, repeatability_arcsec=60.0),
+    ),
+    "level": (Imperfections(level_sd_arcsec=60.0), replace(ZERO, level_arcsec=60.0)),
+    "gravity": (Imperfections(gravity_sd_m_per_s2=2e-3), replace(ZERO, gravity_m_per_s2=2e-3)),
+    "thermometer": (
+        Imperfections(thermometer_offset_sd_degc=0.3),
+        replace(ZERO, thermometer_degc=0.3),
+    ),
+    "noise": (Imperfections(), ZERO),
+}
+RUNS = 300
+
+
+def drawn(unit: UnitDescription, truth: Truth, seed: int) -> MeasurementSet:
+    """TP1 to TP6 at seven temperatures, without codes; the statistics are the true ones."""
+    random = np.random.default_rng(seed)
+    rig = Rig(truth.imperfections, unit.gravity_g, seed)
+    count = 400
+    sd = np.full(3, truth.reading_sd_v)
+    dwells = []
+    for nominal in fit_cases.SEVEN:
+        for position in TEST_POSITIONS:
+            temp = nominal + 0.05 * random.standard_normal()
+            exact = truth.voltage_v(rig.force_g(position), temp)
+            noise = sd / np.sqrt(count) * random.standard_normal(3)
+            shown = temp + rig.thermometer_offset_degc
+            dwells.append(Dwell(len(dwells) + 2, position, shown, exact + noise, count, sd))
+    return MeasurementSet("drawn", tuple(dwells))
+
+
+@pytest.mark.parametrize("key", CASES)
+def test_each_source_agrees_with_monte_carlo(key: str) -> None:
+    """The rig tilts exactly and shifts temperatures; the propagation is linear."""
+    imperfections, stated = CASES[key]
+    unit = sim_unit(stated)
+    truth = replace(read_truth(UNITS / "AT-SIM")[0], imperfections=imperfections)
+    exact = truth.constants.constants_at(TEMPS)
+    W = weights(DIRECTIONS[:26])
+    N = np.linalg.inv(exact[:, :9].reshape(-1, 3, 3))
+    errors, forces = [], []
+    for seed in range(RUNS):
+        measurements = drawn(unit, truth, seed)
+        calibration = calibrate(unit, measurements)
+        error = calibration.thermal.constants_at(TEMPS) - exact
+        errors.append(error)
+        D = -np.einsum("nij,njk->nik", N, rows_of(error)).reshape(-1, 12)
+        forces.append(np.einsum("dqa,na->ndq", W, D))
+    result = uncertainty(unit, measurements, calibration, None, TEMPS)
+    known = [s for s in result.sources if s.key in (key, "noise")]
+    constants = np.sum([s.constants for s in known], axis=0)
+    expected = np.diagonal(constants, axis1=1, axis2=2)[:, list(ROWS)]
+    # The variance of RUNS draws is known to sqrt(2 / RUNS) = 8 %; five times that, for hundreds
+    # of values at once.
+    limit = 5.0 * math.sqrt(2.0 / RUNS)
+    ratio = np.mean(np.array(errors) ** 2, axis=0) / expected
+    assert np.abs(ratio - 1.0).max() < limit, ratio
+    if key == "thermometer":  # it cancels in use, and D here is at the true temperature
+        return
+    spread = np.mean(np.array(forces) ** 2, axis=0)
+    force = np.sum([s.force for s in known], axis=0)
+    analytic = np.einsum("dqa,nab,dqb->ndq", W, force, W)
+    floor = 1e-3 * analytic.max()  # quantities that the source does not reach
+    assert np.abs((spread + floor) / (analytic + floor) - 1.0).max() < limit
+
+
+# ---- sizes from the residuals ----
+
+
+def test_residuals_tell_squareness_from_repeatability() -> None:
+    unit = sim_unit()
+    truth, plan = read_truth(UNITS / "AT-SIM")
+    wrong = Imperfections(squareness_sd_arcsec=15.0, repeatability_sd_arcsec=5.0)
+    truth = replace(truth, imperfections=wrong)
+    squares, repeats = [], []
+    for seed in range(100):
+        measurements = simulate(unit, truth, replace(plan, seed=seed, readings_per_dwell=50))
+        p = propagation(unit, measurements, calibrate(unit, measurements), TEMPS)
+        s = scatter(p)
+        squares.append(math.degrees(s.squareness_rad) * 3600.0)
+        repeats.append(math.degrees(s.repeatability_rad) * 3600.0)
+    # Variances with 6 and 36 degrees of freedom, averaged over 100: 6 % and 2.4 %; four times that.
+    assert np.mean(np.square(squares)) == pytest.approx(15.0**2, rel=0.24)
+    assert np.mean(np.square(repeats)) == pytest.approx(5.0**2, rel=0.12)
+
+
+def test_a_stated_squareness_that_the_residuals_contradict_is_told() -> None:
+    unit = sim_unit(replace(ZERO, squareness_arcsec=1.0))
+    truth, plan = read_truth(UNITS / "AT-SIM")
+    truth = replace(truth, imperfections=Imperfections(squareness_sd_arcsec=30.0))
+    measurements = simulate(unit, truth, replace(plan, readings_per_dwell=50))
+    (warning,) = evaluated(unit, measurements)[1].warnings
+    assert "squareness_arcsec = 1 is stated, but the residuals show" in warning
+
+
+def test_without_statistics_the_residuals_give_the_noise() -> None:
+    unit = fit_cases.unit()
+    truth = fit_cases.cubic_truth()
+    found = []
+    for seed in range(60):
+        measurements = fit_cases.readings(truth, fit_cases.SEVEN, sd_v=2e-6, seed=seed)
+        s = scatter(propagation(unit, measurements, calibrate(unit, measurements), TEMPS))
+        assert not s.recorded
+        assert s.noise_dof == 36.0
+        found.append(s.variance_v2.mean())
+    # 36 degrees of freedom, 60 times: 3 %, four times that.
+    assert np.mean(found) == pytest.approx(4e-12, rel=0.12)
+
+
+# ---- the thermal model ----
+
+
+def test_a_wrong_thermal_function_shows_in_the_budget() -> None:
+    unit = replace(sim_unit(), thermal=ThermalChoice("polynomial", 2, None))
+    truth, plan = read_truth(UNITS / "AT-SIM")
+    measurements = simulate(unit, truth, replace(plan, readings_per_dwell=50))
+    calibration, result = evaluated(unit, measurements)
+    p = propagation(unit, measurements, calibration, TEMPS)
+    error = thermal_error(p, scatter(p))
+    assert error is not None
+    exact = truth.constants.constants_at(result.temps_degc)
+    found = calibration.thermal.constants_at(result.temps_degc)
+    typical = np.sqrt(np.mean((found - exact)[:, 9:] ** 2)) / 0.55
+    # Leaving a temperature out doubles or trebles the distance that the curve has to bridge.
+    assert typical < error.sd_g < 4.0 * typical
+    t, d, c = result.worst_component()
+    worst = result.force_budget(c, t, DIRECTIONS[d])
+    assert worst.lines[0].key == "thermal_model"
+    assert "The thermal model gives 100 % of the uncertainty of a_" in worst.verdict
+
+
+def test_without_held_out_data_the_rival_function_gives_the_size() -> None:
+    unit = read_unit(UNITS / "AT-CHERNIAK")
+    measurements = read_measurements(UNITS / "AT-CHERNIAK" / "measurements.csv", unit)
+    _, result = evaluated(unit, measurements)
+    source = next(s for s in result.sources if s.key == "thermal_model")
+    assert source.origin.startswith("not known: nothing was held out")
+    assert source.sd is not None
+    assert source.sd > 1e-4  # two straight lines and a parabola through tables 1 and 2
+
+
+def test_without_held_out_data_or_rival_it_is_unknown() -> None:
+    unit = fit_cases.unit()
+    measurements = fit_cases.readings(fit_cases.cubic_truth(), (20.0, 70.0), sd_v=1e-6, count=100)
+    _, result = evaluated(unit, measurements)
+    b = result.constant_budget(0, result.t0_index)
+    (line,) = b.unknown
+    assert line.contribution is None
+    assert line.sd is None
+    assert b.lines[0] is line
+    assert "Not in it: the thermal model, which is unknown" in b.verdict
+
+
+def test_one_temperature_alone_is_evaluated() -> None:
+    unit = fit_cases.unit()
+    for count in (None, 100):
+        measurements = fit_cases.readings(
+            fit_cases.cubic_truth(), (20.0,), sd_v=1e-6, count=count, seed=3
+        )
+        _, result = evaluated(unit, measurements)
+        assert np.isfinite(result.constants_u).all()
+        assert (result.constants_u > 0.0).all()
+        assert (result.force_u > 0.0).all()
+
+
+# ---- budgets ----
+
+
+def test_budgets_add_up_and_are_sorted(
+    at_sim: tuple[UnitDescription, MeasurementSet, Calibration],
+) -> None:
+    unit, measurements, calibration = at_sim
+    result = uncertainty(unit, measurements, calibration, DEVICE)
+    t, d, c = result.worst_component()
+    for b, expanded in (
+        (result.force_budget(c, t, DIRECTIONS[d]), result.force_u[t, d, c]),
+        (result.constant_budget(3, result.t0_index), result.constants_u[result.t0_index, 3]),
+    ):
+        parts = [line.contribution or 0.0 for line in b.lines]
+        assert parts == sorted(parts, reverse=True)
+        assert sum(line.share for line in b.lines) == pytest.approx(1.0)
+        assert b.combined == pytest.approx(math.sqrt(sum(u * u for u in parts)))
+        assert b.expanded == pytest.approx(expanded, rel=1e-9)
+        for line in b.lines:
+            if line.sensitivity is not None and line.sd is not None:
+                assert line.sensitivity * line.sd == pytest.approx(line.contribution)
+
+
+def test_the_device_is_in_the_acceleration_only(
+    at_sim: tuple[UnitDescription, MeasurementSet, Calibration],
+) -> None:
+    unit, measurements, calibration = at_sim
+    result = uncertainty(unit, measurements, calibration, DEVICE)
+    keys = {s.key: s for s in result.sources}
+    for key in ("raw_code", "temperature_code", "output_lsb", "arithmetic", "method"):
+        assert keys[key].constants is None
+        assert keys[key].force is not None
+    assert keys["thermometer"].force is None
+    b = result.force_budget(0, 0, np.array([1.0, 0.0, 0.0]))
+    found = {line.key: line.contribution for line in b.lines}
+    assert found["output_lsb"] == pytest.approx(2.0**-24 / math.sqrt(12.0))
+    assert found["arithmetic"] == pytest.approx(0.25 * 2.0**-24 / math.sqrt(3.0))
+    assert found["method"] == pytest.approx(5e-7 / math.sqrt(3.0))
+
+
+def test_a_rotation_moves_no_length_and_gravity_scales_it() -> None:
+    unit = sim_unit(replace(ZERO, level_arcsec=10.0, gravity_m_per_s2=1e-3))
+    truth, plan = read_truth(UNITS / "AT-SIM")
+    measurements = simulate(unit, truth, replace(plan, readings_per_dwell=4))
+    _, result = evaluated(unit, measurements)
+    arcsec = math.pi / 180.0 / 3600.0
+    for n in (np.array([0.0, 0.0, 1.0]), np.array([0.6, 0.8, 0.0])):
+        length = {line.key: line.contribution for line in result.force_budget(3, 3, n).lines}
+        assert length["level"] == pytest.approx(0.0, abs=1e-12)
+        assert length["gravity"] == pytest.approx(1e-3 / 9.80665 / unit.gravity_g, rel=1e-6)
+    along_x = result.force_budget(0, 3, np.array([0.0, 0.0, 1.0]))
+    level = next(line.contribution for line in along_x.lines if line.key == "level")
+    # Tilts about y move x by the angle; 1e-4 for the shift of the dwells' temperatures.
+    assert level == pytest.approx(10.0 * arcsec, rel=1e-4)
+
+
+def test_empty_budget_says_so() -> None:
+    line = Line("a", "the source", 0.0, "V", "normal", 1.0, None, None, 0.0, "", "")
+    assert budget("q", "V", [(line, 0.0)]).verdict == "Nothing that is known contributes."

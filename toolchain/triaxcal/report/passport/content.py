@@ -1,0 +1,146 @@
+"""What a passport says, before it is laid out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from triaxcal.codegen.tryout import MethodResult, Residual
+from triaxcal.delivery import Delivery
+from triaxcal.model.types import FloatArray
+from triaxcal.uncertainty.budget import Budget
+from triaxcal.uncertainty.device_sources import Device
+from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
+from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
+
+LENGTH = 3
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """One limit of P1 (13) and how the unit stands to it, all in g.
+
+    Attributes
+    ----------
+    where : str
+        "at T0" or "over the range".
+    limit_g, largest_g : float
+        The limit, and the largest | |a| - g | at the unit's own dwells.
+    uncertainty_g : float
+        Expanded uncertainty of |a| in the worst orientation, and temperature.
+    cause : str
+        The worst source of that uncertainty.
+    advice : str
+        What would make it smaller.
+    """
+
+    where: str
+    limit_g: float
+    largest_g: float
+    uncertainty_g: float
+    cause: str
+    advice: str
+
+    @property
+    def shown(self) -> bool:
+        """Whether the limit holds with the whole 95 % interval inside it."""
+        return self.largest_g + self.uncertainty_g <= self.limit_g
+
+    @property
+    def factor(self) -> float:
+        """Interval's end as a multiple of the limit."""
+        return (self.largest_g + self.uncertainty_g) / self.limit_g
+
+
+@dataclass(frozen=True)
+class Passport:
+    """A delivery with its uncertainty.
+
+    Attributes
+    ----------
+    tools : mapping
+        Section "tools" of verification.json; empty when no tools have been run.
+    """
+
+    delivery: Delivery
+    uncertainty: Uncertainty
+    tools: Mapping[str, Any]
+
+    @cached_property
+    def constant_budgets(self) -> tuple[Budget, ...]:
+        """Budgets of the twelve constants at T0."""
+        u = self.uncertainty
+        return tuple(u.constant_budget(c, u.t0_index) for c in range(12))
+
+    @cached_property
+    def component_budget(self) -> Budget:
+        """Budget of the component of the force that is known worst."""
+        temp, direction, component = self.uncertainty.worst_component()
+        return self.uncertainty.force_budget(component, temp, DIRECTIONS[direction])
+
+    @property
+    def component_orientation(self) -> str:
+        """Orientation in which it is, in words."""
+        return in_words(DIRECTIONS[self.uncertainty.worst_component()[1]])
+
+    @cached_property
+    def length_budget(self) -> Budget:
+        """Budget of |a| where it is known worst."""
+        temp, direction = self.uncertainty.worst_length()
+        return self.uncertainty.force_budget(LENGTH, temp, DIRECTIONS[direction])
+
+    @property
+    def length_orientation(self) -> str:
+        """Orientation in which it is, in words."""
+        return in_words(DIRECTIONS[self.uncertainty.worst_length()[1]])
+
+    @cached_property
+    def delivered(self) -> MethodResult:
+        """Residuals of the unit's own method."""
+        d = self.delivery
+        return next(m for m in d.methods if m.method == d.unit.method)
+
+    @cached_property
+    def acceptance(self) -> tuple[Acceptance, ...]:
+        """Limits at T0 and over the range."""
+        limits, u = self.delivery.unit.limits, self.uncertainty
+        at_t0 = [r for r in self.delivered.residuals if r.at_t0]
+        worst = int(np.argmax(u.force_u[u.t0_index, :, LENGTH]))
+        t0_budget = u.force_budget(LENGTH, u.t0_index, DIRECTIONS[worst])
+        return (
+            _acceptance("at T0", limits.at_t0_g, at_t0, t0_budget),
+            _acceptance(
+                "over the range", limits.over_range_g, self.delivered.residuals, self.length_budget
+            ),
+        )
+
+    @property
+    def shown(self) -> bool:
+        """Whether both limits hold with the uncertainty inside them, and nothing is unknown."""
+        return all(a.shown for a in self.acceptance) and not self.length_budget.unknown
+
+    @cached_property
+    def worst_over_temperature(self) -> FloatArray:
+        """Expanded uncertainty in the worst orientation, (n, 4): a_x, a_y, a_z, |a|, in g."""
+        result: FloatArray = self.uncertainty.force_u.max(axis=1)
+        return result
+
+
+def passport(delivery: Delivery, tools: Mapping[str, Any]) -> Passport:
+    """Passport of a delivery; `tools` is the section of that name in verification.json."""
+    bound = delivery.bound.per_axis_lsb
+    device = Device(delivery.plan.shape.output_q, bound, delivery.model_error_g)
+    found = uncertainty(delivery.unit, delivery.measurements, delivery.calibration, device)
+    return Passport(delivery, found, tools)
+
+
+def _acceptance(
+    where: str, limit_g: float, residuals: tuple[Residual, ...] | list[Residual], budget: Budget
+) -> Acceptance:
+    worst = next(line for line in budget.lines if line.contribution is not None)
+    largest = max((abs(r.error_g) for r in residuals), default=0.0)
+    return Acceptance(where, limit_g, largest, budget.expanded, worst.name, worst.advice)

@@ -1,0 +1,102 @@
+"""passport.json: the passport for machines. docs/file-formats.md has the layout."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from triaxcal import __version__
+from triaxcal.model.metrological import CONSTANT_NAMES
+from triaxcal.report.passport.content import Passport
+from triaxcal.uncertainty.budget import Budget
+from triaxcal.uncertainty.coverage import LEVEL
+
+FORMAT = 1
+
+
+def passport_json(p: Passport) -> bytes:
+    """JSON of a passport; without a clock, so equal inputs give equal bytes."""
+    d, u = p.delivery, p.uncertainty
+    t0 = d.calibration.thermal.t0_degc
+    document = {
+        "format": FORMAT,
+        "triaxcal": __version__,
+        "unit": d.unit.name,
+        "serial": d.unit.serial,
+        "inputs_sha256": d.inputs_sha256,
+        "coverage_probability": LEVEL,
+        "result": "passed" if p.shown else "passed at the dwells, not shown everywhere",
+        "acceptance": [
+            {
+                "where": a.where,
+                "limit_g": a.limit_g,
+                "largest_residual_g": a.largest_g,
+                "expanded_uncertainty_g": a.uncertainty_g,
+                "shown_with_uncertainty": a.shown,
+                "interval_over_limit": a.factor,
+                "worst_source": a.cause,
+            }
+            for a in p.acceptance
+        ],
+        "constants_at_t0": [
+            {
+                "name": CONSTANT_NAMES[c],
+                "value": float(d.calibration.thermal.constants_at(t0)[c]),
+                **_budget(p.constant_budgets[c]),
+            }
+            for c in range(12)
+        ],
+        "acceleration": {
+            "worst_component": {
+                "orientation": p.component_orientation,
+                **_budget(p.component_budget),
+            },
+            "worst_length": {"orientation": p.length_orientation, **_budget(p.length_budget)},
+        },
+        "over_temperature": {
+            "temp_degc": u.temps_degc.tolist(),
+            "constants": d.calibration.thermal.constants_at(u.temps_degc).tolist(),
+            "constants_expanded_uncertainty": u.constants_u.tolist(),
+            "acceleration_expanded_uncertainty_g": p.worst_over_temperature.tolist(),
+        },
+        "warnings": list(u.warnings),
+        "files_sha256": {n: hashlib.sha256(c).hexdigest() for n, c in d.files.items()},
+        "tools": dict(p.tools),
+    }
+    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _budget(b: Budget) -> dict[str, Any]:
+    return {
+        "quantity": b.quantity,
+        "unit": b.unit,
+        "standard_uncertainty": b.combined,
+        "effective_degrees_of_freedom": _finite(b.dof),
+        "coverage_factor": b.factor,
+        "expanded_uncertainty": b.expanded,
+        "verdict": b.verdict,
+        "budget": [
+            {
+                "key": line.key,
+                "source": line.name,
+                "standard_uncertainty": line.sd,
+                "unit": line.unit,
+                "distribution": line.distribution,
+                "degrees_of_freedom": _finite(line.dof),
+                "sensitivity": line.sensitivity,
+                "contribution": line.contribution,
+                "share_of_variance": line.share,
+                "origin": line.origin,
+            }
+            for line in b.lines
+        ],
+    }
+
+
+def _finite(value: float) -> float | None:
+    """A number, or null for infinity."""
+    return float(value) if math.isfinite(value) and np.isfinite(value) else None

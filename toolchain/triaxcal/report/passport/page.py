@@ -1,0 +1,223 @@
+"""passport.html: one page with everything in it, for paper and for a phone."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+from triaxcal import __version__
+from triaxcal.codegen.render import environment
+from triaxcal.codegen.tryout import BEFORE
+from triaxcal.model.metrological import CONSTANT_NAMES
+from triaxcal.report.passport.content import Acceptance, Passport
+from triaxcal.report.passport.curves import HEIGHT, LEFT, WIDTH, curve_panels, uncertainty_panel
+from triaxcal.report.passport.residuals import residual_panels
+from triaxcal.report.passport.words import (
+    g_in_words,
+    handy,
+    in_unit,
+    percent,
+    signed,
+    significant,
+    thousands,
+    with_uncertainty,
+)
+from triaxcal.report.temperatures import degrees
+from triaxcal.uncertainty.budget import Budget, Line
+
+
+def passport_html(p: Passport) -> bytes:
+    """HTML of a passport: no network, no clock, no script."""
+    context = {
+        "identity": _identity(p),
+        "shown": p.shown,
+        "acceptance": [_acceptance(a) for a in p.acceptance],
+        "warnings": p.uncertainty.warnings,
+        "constants": _constants(p),
+        "t0": signed(f"{p.delivery.calibration.thermal.t0_degc:g}"),
+        "panels": curve_panels(p),
+        "panel": {"width": WIDTH, "height": HEIGHT, "left": LEFT},
+        "residuals": residual_panels(p),
+        "before": _largest(p, BEFORE),
+        "after": _largest(p, p.delivery.unit.method),
+        "over_temperature": uncertainty_panel(p),
+        "budgets": [
+            _budget(p.component_budget, "A component", p.component_orientation),
+            _budget(p.length_budget, "The length |a|", p.length_orientation),
+        ],
+        "candidates": _candidates(p),
+        "selection_reason": p.delivery.calibration.selection_reason,
+        "verification": _verification(p),
+        "tools": [
+            {"name": name, "result": str(entry["result"]), "finding": str(entry["finding"])}
+            for name, entry in p.tools.items()
+        ],
+        "files": [
+            {"name": name, "sha256": hashlib.sha256(content).hexdigest()}
+            for name, content in p.delivery.files.items()
+        ],
+    }
+    return environment().get_template("passport.html.j2").render(context).encode()
+
+
+def _identity(p: Passport) -> dict[str, Any]:
+    d = p.delivery
+    temps = ", ".join(signed(degrees(q.temp_degc)) for q in d.calibration.points)
+    checks = len(d.calibration.check_dwells)
+    low, high = d.calibration.range_degc
+    return {
+        "unit": d.unit.name,
+        "serial": d.unit.serial,
+        "rows": [
+            ("Serial number", d.unit.serial),
+            ("Working range", signed(f"{low:g} to {high:g} °C")),
+            (
+                "Measured",
+                f"{len(d.measurements.dwells)} dwells: six positions at {temps} °C"
+                + (f"; {checks} check dwells" if checks else "; no check dwells"),
+            ),
+            ("Local gravity", f"{d.unit.gravity_g * 9.80665:.6g} m/s²"),
+            ("Thermal model", f"{signed(d.calibration.shape.label.replace('degC', '°C'))}"),
+            ("Bias estimator", d.calibration.estimator),
+            ("Compensation", f"{d.unit.method}, LSB 2⁻{_superscript(d.plan.shape.output_q)} g"),
+            ("Made by", f"triaxcal {__version__}, gcc {d.compiler}"),
+            ("Inputs", f"sha256 {d.inputs_sha256[:16]}…"),
+        ],
+    }
+
+
+def _superscript(number: int) -> str:
+    return str(number).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def _acceptance(a: Acceptance) -> dict[str, Any]:
+    factor = significant(a.factor, 2)
+    if a.shown:
+        text = "holds with the whole uncertainty inside the limit"
+    else:
+        text = (
+            f"residuals are within the limit, but the interval's end is {factor} times it: "
+            f"{a.cause}; {a.advice}"
+        )
+    scale = max(a.limit_g, a.largest_g + a.uncertainty_g)
+    return {
+        "where": a.where[0].upper() + a.where[1:],
+        "limit": g_in_words(a.limit_g),
+        "largest": g_in_words(a.largest_g),
+        "uncertainty": g_in_words(a.uncertainty_g),
+        "shown": a.shown,
+        "text": text,
+        "largest_width": round(100 * a.largest_g / scale, 2),
+        "uncertainty_width": round(100 * a.uncertainty_g / scale, 2),
+        "limit_at": round(100 * a.limit_g / scale, 2),
+    }
+
+
+def _constants(p: Passport) -> list[dict[str, Any]]:
+    calibration = p.delivery.calibration
+    at_t0 = calibration.thermal.constants_at(calibration.thermal.t0_degc)
+    rows = []
+    for c, budget in enumerate(p.constant_budgets):
+        scale, unit = (1e3, "mV/g") if c < 9 else (1e3, "mV")
+        value, expanded = with_uncertainty(float(at_t0[c]), budget.expanded, scale)
+        worst = next((line for line in budget.lines if line.contribution), None)
+        rows.append(
+            {
+                "symbol": CONSTANT_NAMES[c][0] if c < 9 else "U",
+                "index": CONSTANT_NAMES[c][1:] if c < 9 else f"0{CONSTANT_NAMES[c][-1]}",
+                "value": value,
+                "expanded": expanded,
+                "unit": unit,
+                "factor": f"{budget.factor:.2f}",
+                "cause": worst.name.removeprefix("the ") if worst else "",
+                "share": percent(worst.share) if worst else "",
+                "group_end": c in (2, 5, 8),
+            }
+        )
+    return rows
+
+
+def _largest(p: Passport, method: str) -> str:
+    result = next(m for m in p.delivery.methods if m.method == method)
+    return g_in_words(max(abs(r.error_g) for r in result.residuals))
+
+
+def _budget(b: Budget, title: str, orientation: str) -> dict[str, Any]:
+    return {
+        "title": title,
+        "quantity": signed(b.quantity),
+        "orientation": orientation,
+        "combined": in_unit(b.combined, b.unit),
+        "expanded": in_unit(b.expanded, b.unit),
+        "factor": f"{b.factor:.2f}",
+        "dof": _dof(b.dof),
+        "verdict": b.verdict.replace(" at -", " at \u2212"),
+        "lines": [_line(line, b.unit) for line in b.lines],
+    }
+
+
+def _line(line: Line, unit: str) -> dict[str, Any]:
+    known = line.contribution is not None
+    sensitivity = "" if not line.sensitivity else _sensitivity(line, unit)
+    return {
+        "name": line.name.removeprefix("the "),
+        "origin": line.origin,
+        "sd": in_unit(line.sd, line.unit) if line.sd is not None else "unknown",
+        "distribution": line.distribution,
+        "dof": _dof(line.dof),
+        "sensitivity": sensitivity,
+        "contribution": in_unit(line.contribution or 0.0, unit) if known else "unknown",
+        "share": percent(line.share) if known else "?",
+        "width": round(100 * line.share, 1),
+        "assumed": line.origin.startswith(("assumed", "unknown", "not known")),
+    }
+
+
+def _sensitivity(line: Line, unit: str) -> str:
+    above, below = handy(unit), handy(line.unit)
+    value = significant((line.sensitivity or 0.0) * above[1] / below[1])
+    if unit == line.unit:
+        return value
+    divisor = f"({below[0]})" if "/" in below[0] else below[0]
+    return f"{value} {above[0]}/{divisor}"
+
+
+def _dof(value: float) -> str:
+    return "∞" if value > 1e5 else f"{value:.0f}"
+
+
+def _candidates(p: Passport) -> list[dict[str, Any]]:
+    return [
+        {
+            "label": signed(c.label.replace("degC", "°C"))
+            if len(c.knots_degc) <= 3
+            else f"piecewise-linear, {len(c.knots_degc)} knots",
+            "estimator": c.estimator,
+            "parameters": c.parameters,
+            "fitted": g_in_words(c.fit_residual_g),
+            "held_out": g_in_words(c.held_out_g) if c.held_out_g is not None else "none",
+            "chosen": c.chosen,
+        }
+        for c in p.delivery.calibration.candidates
+    ]
+
+
+def _verification(p: Passport) -> list[tuple[str, str]]:
+    d = p.delivery
+    lsb_g = 2.0**-d.plan.shape.output_q
+    sets = "; ".join(f"{thousands(count)} {name}" for name, count in d.check.vectors.items())
+    proven = (
+        f"≤ {d.bound.lsb:.3f} LSB = {g_in_words(d.bound.lsb * lsb_g)} at every one of "
+        f"{thousands(d.bound.codes)} temperature codes and any raw code; "
+        f"largest seen {d.check.largest_error_lsb:.3f} LSB"
+    )
+    checked = (
+        f"{thousands(d.check.total)} vectors ({sets}): Python = reference C = generated C, "
+        "bit for bit, no mismatch"
+    )
+    method = f"≤ {g_in_words(d.model_error_g)} at every temperature code and any raw code"
+    return [
+        ("Proven arithmetic error", proven),
+        ("Method against the fitted model", method),
+        ("Cross-check", checked),
+    ]

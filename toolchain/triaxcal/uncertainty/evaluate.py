@@ -1,0 +1,209 @@
+"""All sources of one unit, and the budgets that can be asked of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from triaxcal.fit.calibrate import Calibration
+from triaxcal.model.metrological import CONSTANT_NAMES
+from triaxcal.model.types import FloatArray
+from triaxcal.records import MeasurementSet
+from triaxcal.uncertainty.budget import Budget, Line, budget
+from triaxcal.uncertainty.coverage import coverage_factor
+from triaxcal.uncertainty.device_sources import (
+    Device,
+    arithmetic,
+    method,
+    output_lsb,
+    raw_code,
+    temperature_code,
+)
+from triaxcal.uncertainty.model_sources import thermal_model
+from triaxcal.uncertainty.orientation import DIRECTIONS, QUANTITIES, weights
+from triaxcal.uncertainty.propagation import ROWS, propagation
+from triaxcal.uncertainty.rig_sources import (
+    gravity,
+    level,
+    noise,
+    repeatability,
+    squareness,
+    thermometer,
+    thermometer_drift,
+)
+from triaxcal.uncertainty.scatter import Scatter, scatter
+from triaxcal.uncertainty.source import Source
+from triaxcal.unitfile import UnitDescription
+
+TEMPERATURES = 23
+"""Of the working range, evenly, besides T0 and the calibrated ones."""
+_SUSPICIOUS = 3.0
+"""Residuals this many times beyond a stated squareness are told."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Uncertainty of one unit at temperatures `temps_degc`, shape (n,), rising.
+
+    Attributes
+    ----------
+    t0_index : int
+        Where T0 is in `temps_degc`.
+    sources : tuple of Source
+    scatter : Scatter
+        What the residuals say.
+    warnings : tuple of str
+        Where what was stated contradicts the data.
+    """
+
+    temps_degc: FloatArray
+    t0_index: int
+    sources: tuple[Source, ...]
+    scatter: Scatter
+    warnings: tuple[str, ...]
+
+    @cached_property
+    def constants_u(self) -> FloatArray:
+        """Expanded uncertainty (95 %) of the twelve constants, shape (n, 12), V/g and V."""
+        each = [_sd(s.constants)[:, list(ROWS)] for s in self._of_constants()]
+        return _expanded(np.stack(each), [s.dof for s in self._of_constants()])
+
+    @cached_property
+    def force_u(self) -> FloatArray:
+        """Expanded uncertainty of the force at 1 g, shape (n, directions, 4), g.
+
+        The four are its components x, y, z and its length; directions are `DIRECTIONS`.
+        """
+        W = weights(DIRECTIONS)
+        sources = [s for s in self.sources if s.force is not None]
+        each = np.stack([_projected(s.force, W) for s in sources])
+        return _expanded(each, [s.dof for s in sources])
+
+    def _of_constants(self) -> list[Source]:
+        return [s for s in self.sources if s.constants is not None]
+
+    def constant_budget(self, constant: int, temp: int) -> Budget:
+        """Budget of one of the twelve constants at one of the temperatures."""
+        row = ROWS[constant]
+        lines: list[tuple[Line, float | None]] = []
+        for s in self.sources:
+            if s.unknown:
+                lines.append((_line(s), None))
+            elif s.constants is not None:
+                lines.append((_line(s), math.sqrt(max(float(s.constants[temp, row, row]), 0.0))))
+        unit = "V/g" if constant < 9 else "V"
+        name = f"{CONSTANT_NAMES[constant]} at {self.temps_degc[temp]:.4g} °C"
+        return budget(name, unit, lines)
+
+    def force_budget(self, quantity: int, temp: int, direction: FloatArray) -> Budget:
+        """Budget of a component of the force (0 to 2), or of its length (3), at 1 g."""
+        w = weights(direction[None])[0, quantity]
+        lines: list[tuple[Line, float | None]] = []
+        for s in self.sources:
+            if s.unknown:
+                lines.append((_line(s), None))
+            elif s.force is not None:
+                lines.append((_line(s), math.sqrt(max(float(w @ s.force[temp] @ w), 0.0))))
+        name = f"{QUANTITIES[quantity]} at {self.temps_degc[temp]:.4g} °C"
+        return budget(name, "g", lines)
+
+    def worst_component(self) -> tuple[int, int, int]:
+        """Temperature, direction and component (0 to 2) with the largest uncertainty."""
+        found = np.unravel_index(
+            int(np.argmax(self.force_u[:, :, :3])), self.force_u[:, :, :3].shape
+        )
+        return int(found[0]), int(found[1]), int(found[2])
+
+    def worst_length(self) -> tuple[int, int]:
+        """Temperature and direction where |a| is most uncertain."""
+        found = np.unravel_index(int(np.argmax(self.force_u[:, :, 3])), self.force_u.shape[:2])
+        return int(found[0]), int(found[1])
+
+
+def uncertainty(
+    unit: UnitDescription,
+    measurements: MeasurementSet,
+    calibration: Calibration,
+    device: Device | None,
+    temps_degc: FloatArray | None = None,
+) -> Uncertainty:
+    """Evaluate every source; without a device only the calibration's and the codes'.
+
+    `temps_degc`, shape (n,), must rise and hold T0; None takes the working range.
+    """
+    temps = _temperatures(unit, calibration) if temps_degc is None else temps_degc
+    p = propagation(unit, measurements, calibration, temps)
+    s = scatter(p)
+    sources = [
+        noise(p, s),
+        repeatability(p, s),
+        squareness(p, s),
+        level(p),
+        gravity(p),
+        thermometer(p),
+        thermometer_drift(p),
+        thermal_model(p, s),
+        raw_code(p),
+        temperature_code(p),
+    ]
+    if device is not None:
+        sources += [output_lsb(p, device), arithmetic(p, device), method(p, device)]
+    t0_index = int(np.argmin(np.abs(temps - unit.t0_degc)))
+    return Uncertainty(temps, t0_index, tuple(sources), s, tuple(_warnings(unit, s)))
+
+
+def _temperatures(unit: UnitDescription, calibration: Calibration) -> FloatArray:
+    low, high = calibration.range_degc
+    inside = [p.temp_degc for p in calibration.points if low < p.temp_degc < high]
+    t0 = [unit.t0_degc] if low <= unit.t0_degc <= high else []
+    # A group near T0 is shown at T0 itself.
+    inside = [t for t in inside if abs(t - unit.t0_degc) > 0.5]
+    return np.unique(np.concatenate([np.linspace(low, high, TEMPERATURES), inside, t0]))
+
+
+def _warnings(unit: UnitDescription, s: Scatter) -> Iterator[str]:
+    stated = unit.stated.squareness_arcsec
+    found = math.degrees(s.squareness_rad) * 3600.0
+    if stated is not None and found > _SUSPICIOUS * stated and s.squareness_rad > s.resolution_rad:
+        yield (
+            f"squareness_arcsec = {stated:g} is stated, but the residuals show {found:.3g} arcsec: "
+            "the uncertainty is too small"
+        )
+
+
+def _sd(covariance: FloatArray | None) -> FloatArray:
+    assert covariance is not None
+    result: FloatArray = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
+    return result
+
+
+def _projected(covariance: FloatArray | None, W: FloatArray) -> FloatArray:
+    """Standard deviations (n, directions, 4) of a covariance of D (n, 12, 12)."""
+    assert covariance is not None
+    flat = W.reshape(-1, 12)
+    variance = np.einsum("nqa,qa->nq", flat @ covariance, flat)
+    result: FloatArray = np.sqrt(np.maximum(variance, 0.0)).reshape(-1, *W.shape[:2])
+    return result
+
+
+def _expanded(each: FloatArray, dofs: list[float]) -> FloatArray:
+    """k u of standard uncertainties (sources, ...), by Welch-Satterthwaite."""
+    variance = np.sum(each**2, axis=0)
+    scale = float(np.max(each)) or 1.0
+    # Scaled so that no fourth power underflows.
+    loss = np.tensordot(1.0 / np.array(dofs), (each / scale) ** 4, axes=1)
+    dof = (variance / scale**2) ** 2 / np.maximum(loss, 1e-300)
+    factors = {d: coverage_factor(d) for d in np.unique(np.floor(np.minimum(dof, 1e9))).tolist()}
+    k = np.vectorize(factors.__getitem__)(np.floor(np.minimum(dof, 1e9)))
+    result: FloatArray = k * np.sqrt(variance)
+    return result
+
+
+def _line(s: Source) -> Line:
+    return Line(
+        s.key, s.name, s.sd, s.unit, s.distribution, s.dof, None, None, 0.0, s.origin, s.advice
+    )

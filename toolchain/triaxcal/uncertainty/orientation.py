@@ -1,0 +1,54 @@
+"""Orientations of 1 g, and what of the force is asked for in each."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+
+QUANTITIES = ("a_x", "a_y", "a_z", "|a|")
+_SPIRAL = 120
+
+
+def weights(directions: FloatArray) -> FloatArray:
+    """Rows w, shape (directions, 4, 12), whose products with D are `QUANTITIES`' errors at 1 g.
+
+    Error of a component: D_i [n; 1]; of the length: its projection on n.
+    """
+    count = len(directions)
+    affine = np.column_stack([directions, np.ones(count)])
+    W = np.zeros((count, 4, 3, 4))
+    for i in range(3):
+        W[:, i, i] = affine
+    W[:, 3] = directions[:, :, None] * affine[:, None, :]
+    return W.reshape(count, 4, 12)
+
+
+def _directions() -> FloatArray:
+    """Unit vectors: axes, edges and corners of the cube, and a Fibonacci spiral between them."""
+    lattice = [v for v in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(v)]
+    k = np.arange(_SPIRAL) + 0.5
+    z = 1.0 - 2.0 * k / _SPIRAL
+    angle = np.pi * (1.0 + np.sqrt(5.0)) * k
+    ring = np.sqrt(1.0 - z**2)
+    spiral = np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])
+    cube = np.array(lattice)
+    result: FloatArray = np.vstack([cube / np.linalg.norm(cube, axis=1, keepdims=True), spiral])
+    return result
+
+
+DIRECTIONS = _directions()
+"""Orientations over which the worst is sought, shape (directions, 3), axis order x, y, z."""
+
+
+def in_words(direction: FloatArray) -> str:
+    """Direction of the force as the axes that point up, or as a vector."""
+    largest = float(np.max(np.abs(direction)))
+    whole = direction / largest
+    if np.allclose(whole, np.rint(whole), atol=1e-9):
+        parts = [f"{'+' if v > 0 else '-'}{a}" for a, v in zip(AXES, whole, strict=True) if v]
+        return f"{parts[0]} up" if len(parts) == 1 else f"{' '.join(parts)} up alike"
+    return "force along (" + ", ".join(f"{v:+.2f}" for v in direction) + ")"

@@ -1,0 +1,74 @@
+"""One source of uncertainty: what is known of it, and what it does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.model.types import FloatArray
+from triaxcal.uncertainty.propagation import Propagation, square
+
+NORMAL, RECTANGULAR, STUDENT = "normal", "rectangular", "Student"
+ASSUMED_DOF = 8.0
+"""A value that is only assumed is believed to a quarter: 1 / (2 · 0.25^2), GUM (G.3)."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source and its effect on the twelve constants and on the compensated acceleration.
+
+    Attributes
+    ----------
+    key : str
+        For machines.
+    name : str
+        For people, as the subject of a sentence.
+    sd : float or None
+        Standard uncertainty of the source itself, in `unit`; None where it is unknown.
+    distribution : str
+    dof : float
+    origin : str
+        Where `sd` comes from, in words.
+    advice : str
+        What would make it smaller.
+    constants, force : array, shape (n, 12, 12), or None
+        Covariance of [K U0] and of D (`uncertainty.propagation`) at the temperatures; None where
+        the source does not act.
+    """
+
+    key: str
+    name: str
+    sd: float | None
+    unit: str
+    distribution: str
+    dof: float
+    origin: str
+    advice: str
+    constants: FloatArray | None
+    force: FloatArray | None
+
+    @property
+    def unknown(self) -> bool:
+        """Whether nothing is known of its size."""
+        return self.sd is None
+
+
+def from_factor(p: Propagation, factor: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Covariances of constants and of force from the factor (n, 12, m) of [K U0]."""
+    return square(factor), square(p.force_factor(factor))
+
+
+def direct(p: Propagation, factor_g: FloatArray) -> FloatArray:
+    """Covariance of D of errors (n, 3, m) of the force that do not depend on it, in g."""
+    blocks = np.zeros((len(p.temps_degc), 3, 4, factor_g.shape[-1]))
+    blocks[:, :, 3] = factor_g
+    return square(blocks.reshape(len(p.temps_degc), 12, -1))
+
+
+def stated_or(stated: float | None, default: float, key: str) -> tuple[float, float, str]:
+    """Standard uncertainty, degrees of freedom and origin of one that unit.toml may state."""
+    if stated is not None:
+        return stated, math.inf, f"unit.toml, [uncertainty] {key}"
+    return default, ASSUMED_DOF, f"assumed: [uncertainty] {key} says nothing"
