@@ -188,7 +188,7 @@ def _payload(
     nibbles = _HEX[text]
     ok = np.flatnonzero((nibbles < 16).all(axis=1))
     if len(ok):
-        data = (nibbles[ok, 0::2] << 4) | nibbles[ok, 1::2]
+        data: ByteArray = (nibbles[ok, 0::2] << np.uint8(4)) | nibbles[ok, 1::2]
         yield _frames(t_ns[ok], can_id[ok], size, fd, data), kept[ok]
 
 
