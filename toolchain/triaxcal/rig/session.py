@@ -13,7 +13,7 @@ from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.rig.blocks import Block
 from triaxcal.rig.equilibrium import Trend, trend, window_s
 from triaxcal.rig.events import DURABLE, AcceptedDwell, Agree, Command, Event, Redo
-from triaxcal.rig.frames import BUS_OFF, error_names
+from triaxcal.rig.faults import fault
 from triaxcal.rig.orientation import described, recognised
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.stillness import Reference, average, make_reference, motion, refusals
@@ -118,16 +118,16 @@ class Session:
         self.lost += block.lost
         self.bad_crc += block.trouble.bad_crc
         events: list[Event] = []
-        fault = self._fault(block)
-        moved = fault or motion(
+        wrong = fault(block, self.previous, self.plan)
+        moved = wrong or motion(
             block,
             self.previous,
             self.reference,
             self.plan.stillness,
             self.micro_g_per_code,
         )
-        if fault:
-            self._say(events, "trouble", block, fault)
+        if wrong:
+            self._say(events, "trouble", block, wrong)
         self._take_temperature(block)
         self.seen = recognised(block.mean, self.micro_g_per_code)
         self.previous = block
@@ -151,31 +151,6 @@ class Session:
         return events
 
     # ---- parts of on_block ----
-
-    def _fault(self, block: Block) -> str:
-        """What makes a block worthless, in words; "" when nothing does."""
-        settings = self.plan.stillness
-        if self.previous is not None and block.index > self.previous.index + 1:
-            return f"gap of {block.index - self.previous.index - 1} s or more without samples"
-        if block.trouble.error_bits & BUS_OFF:
-            return f"error frames: {error_names(block.trouble.error_bits)}"
-        if block.jumps > settings.jumps_max_ratio * block.count:
-            return (
-                f"{block.jumps} jumps of the counters in 1 s: "
-                "another node sends under the rig's IDs, or the rig restarts"
-            )
-        if block.jumps:
-            return "the counters jumped: the rig restarted"
-        if block.lost > settings.gap_max_s * self.plan.rate_hz:
-            return f"{block.lost} of {self.plan.rate_hz} samples lost in 1 s"
-        if block.clipped:
-            return f"clipped: {block.clipped} samples at the end of the ADC's range"
-        stuck = [axis for axis, is_stuck in zip("xyz", block.stuck, strict=True) if is_stuck]
-        if stuck:
-            return f"stuck: {', '.join(stuck)} gives one and the same code"
-        if block.status:
-            return f"the rig reports status 0x{block.status:02X}"
-        return "" if block.temp_code is not None else "no temperature from the rig"
 
     def _take_temperature(self, block: Block) -> None:
         if self.temps and block.index <= self.temps[-1][0]:
