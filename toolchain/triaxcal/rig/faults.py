@@ -19,12 +19,17 @@ def _faults(block: Block, previous: Block | None, plan: SessionPlan) -> Iterator
     settings = plan.stillness
     if block.trouble.error_bits & BUS_OFF:
         yield f"error frames: {error_names(block.trouble.error_bits)}"
-    if previous is not None and block.index != previous.index + 1:
-        yield f"gap of {block.index - previous.index - 1} s or more without samples"
+    if block.trouble.orphans > settings.jumps_max_ratio * plan.rate_hz:
+        yield (
+            f"{block.trouble.orphans} frames without their partner: "
+            "another node sends under the rig's IDs"
+        )
     if block.jumps > settings.jumps_max_ratio * block.count:
         yield (
             f"{block.jumps} jumps of the counters in 1 s: another node sends under the rig's IDs"
         )
+    if previous is not None and block.index != previous.index + 1:
+        yield f"gap of {block.index - previous.index - 1} s or more without samples"
     if block.jumps:
         yield "the counters jumped: the rig restarted"
     if block.lost > settings.gap_max_s * plan.rate_hz:

@@ -44,6 +44,7 @@ class Session:
         self.reference: Reference | None = None
         self.step = 0
         self.lost = self.bad_crc = 0
+        self.gaps: list[tuple[int, int]] = []  # after which second, how many
         self.last_event = ""
         self._restart()
 
@@ -75,8 +76,9 @@ class Session:
         self.temps: deque[tuple[int, float]] = deque()
         self.trends: deque[tuple[int, Trend]] = deque(maxlen=60)
 
-    def resume(self) -> None:
-        """Go on after a crash: as a session made from the durable events would."""
+    def resume(self, durable: int) -> None:
+        """Go on after a crash: as a session made from the first `durable` events would."""
+        del self.durable[durable:]
         self._restart()
 
     @property
@@ -117,6 +119,8 @@ class Session:
         """Decisions after one more second."""
         self.lost += block.lost
         self.bad_crc += block.trouble.bad_crc
+        if self.previous is not None and block.index > self.previous.index + 1:
+            self.gaps.append((self.previous.index, block.index - self.previous.index - 1))
         events: list[Event] = []
         wrong = fault(block, self.previous, self.plan)
         moved = wrong or motion(
