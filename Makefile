@@ -9,7 +9,7 @@ DEVELOPER := $(VENV)/.developer
 export UNIT
 
 .DEFAULT_GOAL := help
-.PHONY: help calib-header simulate test check lint types nightly bench golden clean
+.PHONY: help rig-demo calib-header simulate test check lint types nightly bench golden clean
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -45,6 +45,10 @@ golden: $(DEVELOPER)  ## Write the golden files anew; look at the difference bef
 bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 	@$(BIN)/python bench/calib_header.py
 
+rig-demo: $(DEVELOPER)  ## A whole session on the simulated rig, to a header (2 minutes)
+	@$(BIN)/triaxcal rig run --bus virtual --unit AT-SIM-BENCH --plain --sessions build/rig-demo
+	@$(MAKE) --no-print-directory calib-header UNIT=AT-SIM-BENCH
+
 clean:  ## Remove what make made
 	rm -rf build $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
@@ -58,5 +62,5 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 $(DEVELOPER): $(INSTALLED)
 	@echo "adding the developers' tools to $(VENV) (once) ..."
-	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,rig]'
 	@touch $@

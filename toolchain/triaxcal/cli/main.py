@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from triaxcal import __version__
+from triaxcal.cli.rig import rig
 from triaxcal.errors import RefusedError
 
 
@@ -49,6 +50,9 @@ def simulate(unit: Path, seed: int | None) -> None:
     from triaxcal.simulation.unit import write_simulated_unit  # noqa: PLC0415
 
     click.echo(f"{write_simulated_unit(unit, seed)} written")
+
+
+main.add_command(rig)
 
 
 def entry() -> None:

@@ -46,8 +46,8 @@ class RigSettings:
 
     seed: int = 1
     start_degc: float = 20.0
-    chamber_tau_s: float = 60.0
-    unit_tau_s: float = 150.0
+    chamber_tau_s: float = 30.0
+    unit_tau_s: float = 80.0
     cycle_k: float = 0.0
     cycle_s: float = 120.0
     flicker_micro_g: float = 0.0

@@ -22,6 +22,7 @@ from triaxcal.rig.sources import WAIT_S, can_devices
 
 QUEUE_BYTES = 4 << 20
 _SO_RCVBUFFORCE, _SO_TIMESTAMPNS, _SO_RXQ_OVFL = 33, 35, 40
+_CAN_RAW_ERR_FILTER = 2
 _CLASSIC_BYTES, _FD_BYTES = 16, 72
 _FRAME_QUEUE_BYTES = 384
 """What the kernel charges a queue for one frame."""
@@ -201,7 +202,7 @@ def open_socketcan(device: str, fd: bool) -> SocketSource:
         opened = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         try:
             everything = struct.pack("@I", 0x1FFFFFFF)
-            opened.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_ERR_FILTER, everything)
+            opened.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, everything)
             if fd:
                 opened.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
             opened.bind((device,))

@@ -58,7 +58,7 @@ class BusSource:
         RefusedError
             When the bus cannot be read any more.
         """
-        messages = []
+        messages: list[can.Message] = []
         try:
             message = self.bus.recv(WAIT_S)
             while message is not None and len(messages) < 4096:
