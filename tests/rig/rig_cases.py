@@ -66,10 +66,10 @@ def rig_of(setup: Setup, *orders: str, **settings) -> SimulatedRig:
     )
 
 
-def play(setup: Setup, rig: SimulatedRig, feed, session, limit_s=4000):
-    """Play the operator until the session is done; all events."""
+def play(rig: SimulatedRig, feed, session, limit_s=4000, accepted=None):
+    """Play the operator until the session is done, or has so many dwells; all events."""
     robot, events = Robot(rig), []
-    while not session.done:
+    while not session.done and (accepted is None or len(session.accepted) < accepted):
         assert rig.seconds < limit_s, f"not done after {limit_s} s: {session.last_event}"
         events += feed(rig.advance())
         robot.act(session)

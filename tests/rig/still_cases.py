@@ -14,18 +14,18 @@ SD_MICRO_G = 20.0 * np.sqrt(RATE / 2.0)  # 20 micro-g per root hertz
 MICRO_G_PER_CODE = np.array([-0.54, -0.54, -0.54])
 
 
-def blocks_of(rng, seconds, added_micro_g=None, sd=SD_MICRO_G, rate=RATE, before=()):
-    """Blocks of white noise about constant codes; `added_micro_g` (seconds * rate,) on x."""
-    micro_g = sd * rng.standard_normal((seconds * rate, 3))
+def blocks_of(rng, seconds, added_micro_g=None, sd=SD_MICRO_G):
+    """Blocks of white noise about constant codes; `added_micro_g` (seconds * RATE,) on x."""
+    micro_g = sd * rng.standard_normal((seconds * RATE, 3))
     if added_micro_g is not None:
         micro_g[:, 0] += added_micro_g
     codes = np.rint(np.array([1e4, 2e4, -1.8e6]) + micro_g / MICRO_G_PER_CODE)
-    shaped = codes.reshape(seconds, rate, 3)
+    shaped = codes.reshape(seconds, RATE, 3)
     totals = shaped.sum(axis=1).astype(np.int64)
     variances = shaped.var(axis=1, ddof=1)
     return [
         Block(
-            i + len(before), i * 10**9, rate, 0, tuple(map(int, totals[i])),
+            i, i * 10**9, RATE, 0, tuple(map(int, totals[i])),
             tuple(map(float, variances[i])), 0, (False,) * 3, 0, 0, 2560.0, Trouble(),
         )
         for i in range(seconds)

@@ -130,7 +130,7 @@ def test_a_frame_under_the_wrong_id_is_found():
 def test_a_wrong_dbc_is_refused(tmp_path, change, message):
     path = tmp_path / "wrong.dbc"
     path.write_text(default_dbc().read_text().replace(*change))
-    with pytest.raises(RefusedError, match="wrong.dbc") as refusal:
+    with pytest.raises(RefusedError, match=r"wrong\.dbc") as refusal:
         read_dbc(path)
     assert message in str(refusal.value)
 

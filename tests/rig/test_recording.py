@@ -22,7 +22,7 @@ from triaxcal.rig.store import write_records
 
 def session(setup, folder, *orders):
     taken = Recording(setup, folder, "test")
-    events = play(setup, rig_of(setup, *orders), taken.feed, taken.engine.session)
+    events = play(rig_of(setup, *orders), taken.feed, taken.engine.session)
     taken.close()
     return taken, events
 
@@ -56,13 +56,14 @@ def test_the_fit_gets_u_as_the_variance_of_the_mean(recorded, tmp_path):
         np.testing.assert_allclose(np.sqrt(row.variance_of_mean_v2), u_v, rtol=1e-12)
 
 
-def test_a_journal_cut_anywhere_keeps_what_came_before(recorded, tmp_path):
+@pytest.mark.parametrize("step", [13, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_journal_cut_anywhere_keeps_what_came_before(recorded, tmp_path, step):
     _, folder, _ = recorded
     text = (folder / JOURNAL_FILE).read_bytes()
     whole = read_journal(folder / JOURNAL_FILE).records
     ends = [i + 1 for i, byte in enumerate(text) if byte == ord("\n")]
     path = tmp_path / "cut"
-    for size in range(0, len(text) + 1, 1):
+    for size in {*range(0, len(text) + 1, step), *ends, *(end - 1 for end in ends)}:
         path.write_bytes(text[:size])
         found = read_journal(path)
         assert found.records == whole[: sum(end <= size for end in ends)]
@@ -134,7 +135,7 @@ def test_a_flipped_payload_in_a_log_without_journal_changes_no_mean(recorded, tm
             assert np.abs(np.subtract(dwell.mean_code, there.mean_code)).max() < 6 * 260 / 1999
 
 
-def test_a_log_of_another_unit_is_refused(recorded, tmp_path):
+def test_a_log_of_another_unit_is_refused(recorded):
     setup, folder, _ = recorded
     unit = type(setup.unit)(**{**_fields(setup.unit), "serial": "OTHER-7"})
     other = type(setup)(setup.folder, unit, setup.plan, setup.dbc)
@@ -148,7 +149,7 @@ def _fields(unit):
     return {name: getattr(unit, name) for name in unit.__dataclass_fields__}
 
 
-@pytest.mark.parametrize("stop_s", [30, 70, 88, 104, 105, 106, 140, 200])
+@pytest.mark.parametrize("stop_s", [30, 70, 105, 106, 200])
 def test_a_stopped_session_is_resumed_and_replayed_alike(tmp_path, stop_s):
     setup = short_setup(tmp_path, temps="[20]")
     rig, folder = rig_of(setup), tmp_path / "001"
@@ -168,7 +169,7 @@ def test_a_stopped_session_is_resumed_and_replayed_alike(tmp_path, stop_s):
     again = Recording(setup, folder, "test")
     kept = [e.dwell for e in durable_events(read_journal(folder / JOURNAL_FILE).records) if e.dwell]
     assert kept == [e.dwell for e in acknowledged]
-    play(setup, rig, again.feed, again.engine.session)
+    play(rig, again.feed, again.engine.session)
     again.close()
     played = replay(setup, folder / LOG_FILE, folder / JOURNAL_FILE)
     assert played.engine.session.accepted == again.engine.session.accepted
@@ -206,7 +207,7 @@ def test_a_full_disk_ends_the_session_with_an_intact_prefix(tmp_path, limit):
         "n = int(sys.argv[2]); resource.setrlimit(resource.RLIMIT_FSIZE, (n, n))\n"
         "try:\n"
         "    taken = Recording(setup, folder / '001', 'test')\n"
-        "    play(setup, rig_of(setup), taken.feed, taken.engine.session)\n"
+        "    play(rig_of(setup), taken.feed, taken.engine.session)\n"
         "except RefusedError as refusal:\n"
         "    print(refusal); sys.exit(refusal.exit_code)\n"
     )

@@ -25,10 +25,16 @@ def texts(events, kind):
     return [e.text for e in events if e.kind == kind]
 
 
-def run(setup, *orders, **settings):
+def run(setup, *orders, accepted=None):
     engine = Engine(setup, "test")
-    rig = rig_of(setup, *orders, **settings)
-    return engine, play(setup, rig, engine.feed, engine.session)
+    return engine, play(rig_of(setup, *orders), engine.feed, engine.session, accepted=accepted)
+
+
+@pytest.fixture(scope="module")
+def clean_start_ns(tmp_path_factory):
+    """Start of the first average when nothing goes wrong."""
+    setup = short_setup(tmp_path_factory.mktemp("clean"), temps="[20]")
+    return run(setup, accepted=1)[0].session.accepted[0, "TP1"].start_ns
 
 
 @pytest.mark.parametrize("layout", ["classic", "fd"])
@@ -47,7 +53,7 @@ def test_a_session_without_faults(tmp_path, layout):
     [
         ("slip@84:150", "refused", r"TP1: slip of 1\d\d micro-g on x at \d+ s"),
         ("nudge@82:20", "refused", r"TP1: shaken: variance on x .* retake"),
-        ("lose@82.1:160", "trouble", r"8\d of 100 samples lost in 1 s"),
+        ("lose@82.1:160", "trouble", r"7\d of 100 samples lost in 1 s"),
         ("lose@82.1:70", "refused", r"TP1: 3\d of 2000 samples lost, retake"),
         ("linkdown@82:1:4", "trouble", r"gap of [34] s or more without samples"),
         ("gone@82:1:4", "trouble", r"gap of \d s|the counters jumped: the rig restarted"),
@@ -57,29 +63,27 @@ def test_a_session_without_faults(tmp_path, layout):
         ("stuck@82:1:2", "trouble", r"stuck: y gives one and the same code"),
     ],
 )
-def test_a_fault_in_the_averaging_is_found_named_and_outlived(tmp_path, order, kind, said):
+def test_a_fault_in_the_averaging_is_found_named_and_outlived(
+    tmp_path, clean_start_ns, order, kind, said
+):
     setup = short_setup(tmp_path, temps="[20]")
-    _, clean = run(setup)
-    engine, events = run(setup, order)
+    engine, events = run(setup, order, accepted=1)
     assert [t for t in texts(events, kind) if re.search(said, t)], events
     assert any(t.startswith("TP1: ") for t in texts(events, "refused"))
-    assert len(texts(events, "accepted")) == 6
-    first = next(e for e in events if e.kind == "accepted")
     # Every reading of the accepted average is from after the fault.
-    assert first.dwell.start_ns > next(e for e in clean if e.kind == "accepted").dwell.start_ns
-    assert engine.session.done
+    assert engine.session.accepted[0, "TP1"].start_ns > max(clean_start_ns, 82 * 10**9)
 
 
-@pytest.mark.parametrize("order", ["duplicate@82.1:8", "bitflip@82.1:8", "error@82.1:5"])
-def test_what_costs_no_more_than_a_few_samples_is_counted_and_accepted(tmp_path, order):
-    setup = short_setup(tmp_path, temps="[20]")
-    engine, events = run(setup, order)
+@pytest.mark.parametrize(
+    ("order", "lost", "bad_crc"),
+    [("duplicate@82.1:8", {0}, 0), ("bitflip@82.1:8", {4, 5}, 8), ("error@82.1:5", {0}, 0)],
+)
+def test_what_costs_no_more_than_a_few_samples_is_counted(tmp_path, order, lost, bad_crc):
+    engine, events = run(short_setup(tmp_path, temps="[20]"), order, accepted=1)
     assert texts(events, "refused") == []
     dwell = engine.session.accepted[0, "TP1"]
-    assert dwell.lost == {"duplicate@82.1:8": 0, "bitflip@82.1:8": 4, "error@82.1:5": 0}[order] or (
-        order.startswith("bitflip") and dwell.lost in {4, 5, 6}
-    )
-    assert dwell.bad_crc == (8 if order.startswith("bitflip") else 0)
+    assert dwell.lost in lost
+    assert dwell.bad_crc == bad_crc
 
 
 def test_another_serial_number_is_refused(tmp_path):
@@ -124,6 +128,19 @@ def test_a_position_out_of_order_is_taken_at_once_when_the_plan_says_so(tmp_path
     events = advance(engine, rig, LEARNED + 80)
     assert texts(events, "found") == ["found TP4 (+Y up) instead of TP1: taken out of order"]
     assert [e.dwell.position for e in events if e.kind == "accepted"] == ["TP4"]
+
+
+def test_after_a_slip_the_position_has_to_be_taken_up_anew(tmp_path):
+    setup = short_setup(tmp_path, temps="[20]")
+    engine, rig = Engine(setup, "test"), rig_of(setup, "slip@84:150")
+    events = advance(engine, rig, LEARNED + 120)
+    assert len(texts(events, "refused")) == 1
+    assert texts(events, "accepted") == []
+    assert view(engine.session).headline == "TURN AWAY FROM TP1 (+Z up) AND BACK - it slipped"
+    rig.turn_to("TP2")
+    advance(engine, rig, 6)
+    rig.turn_to("TP1")
+    assert len(texts(advance(engine, rig, 50), "accepted")) == 1
 
 
 def test_a_redo_supersedes(tmp_path):
@@ -175,7 +192,8 @@ def test_the_constants_come_back(tmp_path):
     for dwell in engine.session.accepted.values():
         force = truth_force_g(dwell.position, setup.unit.gravity_g)
         exact = rig._truth.voltage_v(force, dwell.temp_degc) / setup.unit.adc.volts_per_code
-        assert np.all(np.abs(np.array(dwell.mean_code) - exact) < 5 * np.array(dwell.u_code))
+        # u from ten batch means: Student's t, 9 degrees of freedom, 36 axes, once in 1000.
+        assert np.all(np.abs(np.array(dwell.mean_code) - exact) < 8.2 * np.array(dwell.u_code))
 
 
 def test_positions_are_recognised():

@@ -334,3 +334,26 @@ def export(log: Path, target: Path) -> None:
     from triaxcal.rig.export import export_log  # noqa: PLC0415
 
     click.echo(f"{target}: {export_log(log, target)} frames")
+
+
+@rig.command()
+@_common
+@click.option("--samples", type=click.IntRange(1), default=100_000, show_default=True)
+@click.option("--bus", help="CAN device to do it on; without it, a socket between two processes.")
+@click.option("--seed", type=int, default=1, show_default=True)
+def fil(
+    *,
+    unit: str,
+    plan: Path | None,
+    dbc: Path | None,
+    samples: int,
+    bus: str | None,
+    seed: int,
+) -> None:
+    """Run the generated C as a node and check each answer against Python, bit for bit."""
+    from triaxcal.cli.rig_fil import firmware_in_the_loop  # noqa: PLC0415
+
+    setup = _setup(unit, plan, dbc)
+    done = firmware_in_the_loop(setup, samples, bus, seed)
+    rate = done.samples / done.seconds
+    click.echo(f"{done.samples} samples bit for bit, {rate:.0f} a second")

@@ -54,7 +54,9 @@ class Robot:
         if session.done:
             return
         self._rig.target_degc = session.plan.steps[session.step].temp_degc
-        if session.wanted is not None:
+        if session.reseat is not None:
+            self._rig.turn_to("TP1" if session.reseat != "TP1" else "TP2")
+        elif session.wanted is not None:
             self._rig.turn_to(session.wanted)
 
 

@@ -73,6 +73,7 @@ class Session:
         self.learning: list[Block] = []
         self.rest: list[Block] = []
         self.taking: str | None = None  # position whose dwell is under way
+        self.reseat: str | None = None  # position that slipped: it must be left and taken up anew
         self.temps: deque[tuple[int, float]] = deque()
         self.trends: deque[tuple[int, Trend]] = deque(maxlen=60)
 
@@ -234,6 +235,10 @@ class Session:
 
     def _choose(self, block: Block, events: list[Event]) -> None:
         pending = self.pending
+        if self.reseat is not None:
+            if self.seen == self.reseat:
+                return
+            self.reseat = None
         if len(self.rest) < self.plan.stillness.clean_blocks or self.seen is None:
             self.offered = None
             return
@@ -274,6 +279,8 @@ class Session:
         self.rest = self.rest[-settings.clean_blocks :]
         if reasons:
             self._say(events, "refused", block, f"{position}: {'; '.join(reasons)}, retake")
+            # After a slip the unit lies otherwise than it should; resting on would not help.
+            self.reseat = position if reasons[0].startswith("slip") else None
         else:
             self._accept(block, self._dwell(position, blocks), events)
 

@@ -70,7 +70,7 @@ class SocketSource:
         try:
             self._open()
         except OSError as error:
-            raise _open_refusal(name, error) from error
+            raise open_refusal(name, error) from error
 
     def _open(self) -> None:
         opened = self._connect()
@@ -98,7 +98,7 @@ class SocketSource:
         ready, _, _ = select.select([self._socket], [], [], WAIT_S)
         rows = self._receive() if ready else []
         self._watch(bool(rows))
-        return _frames(rows)
+        return frames_of_rows(rows)
 
     def _receive(self) -> list[tuple[int, bytes]]:
         rows: list[tuple[int, bytes]] = []
@@ -195,23 +195,28 @@ def open_socketcan(device: str, fd: bool) -> SocketSource:
     RefusedError
         When this machine has no SocketCAN, no such device, or does not permit it.
     """
-    if not hasattr(socket, "AF_CAN"):
-        raise RefusedError(device, "this Python has no SocketCAN", remedy="use Linux")
+    return SocketSource(device, lambda: can_socket(device, fd))
 
-    def connect() -> socket.socket:
-        opened = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-        try:
-            everything = struct.pack("@I", 0x1FFFFFFF)
-            opened.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, everything)
-            if fd:
-                opened.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
-            opened.bind((device,))
-        except BaseException:
-            opened.close()
-            raise
-        return opened
 
-    return SocketSource(device, connect)
+def can_socket(device: str, fd: bool) -> socket.socket:
+    """Raw socket of a CAN device, error frames included.
+
+    Raises
+    ------
+    OSError
+        When there is no such device, no SocketCAN, or no permission.
+    """
+    opened = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    try:
+        everything = struct.pack("@I", 0x1FFFFFFF)
+        opened.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, everything)
+        if fd:
+            opened.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
+        opened.bind((device,))
+    except BaseException:
+        opened.close()
+        raise
+    return opened
 
 
 def inherited(file: int) -> SocketSource:
@@ -232,7 +237,8 @@ def packed(frames: Frames) -> list[bytes]:
     ]
 
 
-def _frames(rows: list[tuple[int, bytes]]) -> Frames:
+def frames_of_rows(rows: list[tuple[int, bytes]]) -> Frames:
+    """Frames of times in ns and struct can_frame or canfd_frame; what is neither is left out."""
     rows = [row for row in rows if len(row[1]) in {_CLASSIC_BYTES, _FD_BYTES}]
     if not rows:
         return empty()
@@ -249,7 +255,8 @@ def _frames(rows: list[tuple[int, bytes]]) -> Frames:
     )
 
 
-def _open_refusal(name: str, error: OSError) -> RefusedError:
+def open_refusal(name: str, error: OSError) -> RefusedError:
+    """Error of a CAN device that cannot be opened: says why, and which devices there are."""
     if error.errno in {errno.EPERM, errno.EACCES}:
         return RefusedError(name, "no permission", remedy="run as a user that may open CAN sockets")
     if error.errno in {errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT}:

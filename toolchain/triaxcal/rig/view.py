@@ -64,7 +64,7 @@ def _phase(session: Session) -> str:
         return "average" if rested < averaged else "guard"
     if not session.at_temperature:
         return "temperature"
-    return "still" if session.seen == session.wanted else "turn"
+    return "still" if session.seen == session.wanted and not session.reseat else "turn"
 
 
 def _progress(session: Session, phase: str) -> tuple[int, int]:
@@ -89,6 +89,8 @@ def _headline(session: Session, phase: str) -> str:
     done, whole = _progress(session, phase)
     wanted = described(session.wanted) if session.wanted else ""
     target = session.plan.steps[session.step].temp_degc
+    if session.reseat is not None:
+        return f"TURN AWAY FROM {described(session.reseat)} AND BACK - it slipped"
     if session.offered is not None:
         return f"TURN TO {wanted} - or press y to take {described(session.offered)} now"
     return {
