@@ -1,4 +1,4 @@
-"""The receivers: python-can's virtual bus, and our own on a socket pair that stands for a device."""
+"""The receivers: the virtual bus, and our own on a socket pair that stands for a device."""
 
 from __future__ import annotations
 
