@@ -9,7 +9,7 @@ DEVELOPER := $(VENV)/.developer
 export UNIT
 
 .DEFAULT_GOAL := help
-.PHONY: help rig-demo calib-header simulate test check lint types nightly bench golden clean
+.PHONY: help rig-demo test-can calib-header simulate test check lint types nightly bench golden clean
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -44,6 +44,12 @@ golden: $(DEVELOPER)  ## Write the golden files anew; look at the difference bef
 
 bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 	@$(BIN)/python bench/calib_header.py
+	@$(BIN)/python bench/rig_decode.py
+	@$(BIN)/python bench/rig_receive.py
+	@$(BIN)/python bench/rig_stillness.py
+
+test-can: $(DEVELOPER)  ## The bench on real SocketCAN: this machine's vcan, or QEMU (2 minutes)
+	@rig/test-can.sh
 
 rig-demo: $(DEVELOPER)  ## A whole session on the simulated rig, to a header (2 minutes)
 	@$(BIN)/triaxcal rig run --bus virtual --unit AT-SIM-BENCH --plain --sessions build/rig-demo

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from triaxcal.errors import RefusedError
 from triaxcal.model.types import IntArray
@@ -113,7 +114,7 @@ def _parse_alike(
     name_end = _DIGITS + 10
     if mark < name_end + 4 or length > 4000:
         return
-    text = buffer[starts[:, None] + np.arange(length)]
+    text = sliding_window_view(buffer, length)[starts]
     good = _punctuated(text)
     seconds, s_ok = _decimal(text[:, 1 : 1 + _DIGITS])
     micros, u_ok = _decimal(text[:, 2 + _DIGITS : 8 + _DIGITS])
