@@ -8,12 +8,12 @@ base=build/test-can
 work=$PWD/$base/work
 rm -rf "$work"
 mkdir -p "$work"
-$python tests/can/prepare.py "$work"
+$python tests/realcan/prepare.py "$work"
 
 if ip link add dev vcan9 type vcan 2>/dev/null; then
     ip link del vcan9
     echo "test-can: on this machine's own vcan"
-    TRIAXCAL_CAN_WORK=$work exec $python -m pytest -q -p no:cacheprovider tests/can
+    TRIAXCAL_CAN_WORK=$work exec $python -m pytest -q -p no:cacheprovider tests/realcan
 fi
 
 missing=()
@@ -66,7 +66,7 @@ ip link set lo up
 echo started > /host$work/started
 chroot /host /bin/bash -c "cd $PWD && export PATH=$PATH PYTHONDONTWRITEBYTECODE=1 \
     TRIAXCAL_CAN_WORK=$work TMPDIR=$work && $PWD/$python -m pytest -q -p no:cacheprovider \
-    -p no:hypothesispytest tests/can; echo \\\$? > $work/status"
+    -p no:hypothesispytest tests/realcan; echo \\\$? > $work/status"
 sync; poweroff -f
 INIT
 chmod +x "$tree/init"

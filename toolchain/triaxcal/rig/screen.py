@@ -26,7 +26,7 @@ _COLOURS = {
 }
 _MARKS = {"done": ("[x]", "green"), "now": ("[>]", "bold"), "redo": ("[r]", "yellow"),
           "open": ("[ ]", "")}  # fmt: skip
-_KEYS = "y take what was found   1-6 take TP1-TP6 again   q stop (go on later with rig resume)"
+_KEYS = " y take what was found    1-6 take TP1-TP6 again    q stop (then: rig resume)"
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,9 @@ def screen(view: View, bus: BusView, alarms: tuple[str, ...]) -> Group:
     style = "white on red" if alarms else _COLOURS[view.phase]
     top = Panel(Text(view.headline, style="bold", justify="center"), style=style, padding=(1, 1))
     bar = ProgressBar(total=max(whole, 1), completed=done)
-    message = Text(alarms[-1] if alarms else view.last_event, overflow="ellipsis", no_wrap=False)
+    message = Text(
+        " " + (alarms[-1] if alarms else view.last_event), overflow="ellipsis", no_wrap=False
+    )
     message.stylize("bold red" if alarms else "")
     return Group(
         top, bar, _checklist(view), _axes(view), _status(view, bus), message, Text(_KEYS, "dim")
@@ -94,8 +96,8 @@ def _status(view: View, bus: BusView) -> Text:
     lost = view.lost + bus.dropped
     line = Text(f"\n T {temp}, {trend}    time left about {left}\n", style="bold")
     line.append(
-        f" {bus.channel}: {bus.frames_per_s:.0f} frames/s, load {load:.0f} %    "
-        f"lost samples {view.lost}, dropped by the kernel {bus.dropped}, bad CRC {view.bad_crc}\n",
+        f" {bus.channel}: {bus.frames_per_s:.0f} frames/s, load {load:.0f} %\n"
+        f" lost samples {view.lost}, dropped by the kernel {bus.dropped}, bad CRC {view.bad_crc}\n",
         style="yellow" if lost or view.bad_crc else "",
     )
     return line

@@ -155,7 +155,7 @@ def test_firmware_in_the_loop_bit_for_bit(vcan):
         answers = {name: recorded[name] for name in recorded.files}
     at = [0]
 
-    def routine(temp, raw):
+    def routine(_, raw):
         rows = slice(at[0], at[0] + len(raw))
         np.testing.assert_array_equal(answers["raw"][rows], raw)
         at[0] += len(raw)
