@@ -14,7 +14,7 @@ NAMED = case "$$UNIT" in \
     */*) echo "make: UNIT=$$UNIT is a path; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; esac
 
 .DEFAULT_GOAL := help
-.PHONY: help calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
+.PHONY: help rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -56,6 +56,16 @@ golden: $(DEVELOPER)  ## Write the golden files anew; look at the difference bef
 
 bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 	@$(BIN)/python bench/calib_header.py
+	@$(BIN)/python bench/rig_decode.py
+	@$(BIN)/python bench/rig_receive.py
+	@$(BIN)/python bench/rig_stillness.py
+
+test-can: $(DEVELOPER)  ## The bench on real SocketCAN: this machine's vcan, or QEMU (2 minutes)
+	@rig/test-can.sh
+
+rig-demo: $(DEVELOPER)  ## A whole session on the simulated rig, to a header (2 minutes)
+	@$(BIN)/triaxcal rig run --bus virtual --unit AT-SIM-BENCH --plain --sessions build/rig-demo
+	@$(MAKE) --no-print-directory calib-header UNIT=AT-SIM-BENCH
 
 test-targets: $(INSTALLED)  ## The generated C on other cores under QEMU (all shapes, or UNIT=<name>)
 	@$(BIN)/triaxcal target test $${UNIT:+"units/$$UNIT"}
@@ -76,5 +86,5 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 $(DEVELOPER): $(INSTALLED)
 	@echo "adding the developers' tools to $(VENV) (once) ..."
-	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,rig]'
 	@touch $@

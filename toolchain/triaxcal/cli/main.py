@@ -11,6 +11,7 @@ import click
 
 from triaxcal import __version__
 from triaxcal.cli.entry import INTERRUPTED
+from triaxcal.cli.rig import rig
 from triaxcal.cli.target import target
 from triaxcal.cli.verify import verify
 from triaxcal.errors import RefusedError
@@ -57,6 +58,7 @@ def simulate(unit: Path, seed: int | None) -> None:
     click.echo(f"{write_simulated_unit(unit, seed)} written")
 
 
+main.add_command(rig)
 main.add_command(target)
 main.add_command(verify)
 

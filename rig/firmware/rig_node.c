@@ -1,0 +1,170 @@
+/*
+ * rig_node.c - the generated compensation as a node on the rig's bus.
+ *
+ * Takes RIG_TEMP, RIG_XY and RIG_Z, answers each sample with COMP_X, COMP_Y, COMP_Z of its
+ * sequence number. Frames are packed and unpacked by the code that cantools makes of tilter.dbc;
+ * frames with a wrong CRC or length are passed over.
+ *
+ *     rig_node socket 7    on an inherited socket that carries struct can_frame
+ *     rig_node can vcan0   on a CAN device
+ *
+ * Ends with 0 when the socket is closed, 1 when it fails, 2 for a wrong command line.
+ */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <net/if.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <linux/can.h>
+#include <linux/can/raw.h>
+
+#include "rig_e2e.h"
+#include "tilter.h"
+#include "triax_calib.h"
+#include "triax_comp.h"
+
+typedef struct {
+    int socket;
+    triax_state_t state;
+    uint32_t temp_status;
+    int has_temp;
+    int has_xy;
+    struct tilter_rig_xy_t xy;
+} node_t;
+
+static int send_frame(const node_t *node, uint32_t id, uint8_t payload[8])
+{
+    struct can_frame frame;
+
+    payload[0] = rig_crc8((uint16_t)id, payload, 8);
+    memset(&frame, 0, sizeof frame);
+    frame.can_id = id;
+    frame.can_dlc = 8;
+    memcpy(frame.data, payload, 8);
+    for (;;) {
+        if (write(node->socket, &frame, sizeof frame) == (ssize_t)sizeof frame) {
+            return 0;
+        }
+        if (errno != EINTR && errno != ENOBUFS) {
+            return -1;
+        }
+        if (errno == ENOBUFS) {
+            (void)usleep(200); /* the device's queue is full; it empties at the bus's pace */
+        }
+    }
+}
+
+static int answer(const node_t *node, uint8_t sequence, const int32_t accel[3], uint32_t status)
+{
+    struct tilter_comp_x_t x = {0U, sequence, accel[0], (uint16_t)status};
+    struct tilter_comp_y_t y = {0U, sequence, accel[1], (uint16_t)status};
+    struct tilter_comp_z_t z = {0U, sequence, accel[2], (uint16_t)status};
+    uint8_t payload[8];
+
+    (void)tilter_comp_x_pack(payload, &x, sizeof payload);
+    if (send_frame(node, TILTER_COMP_X_FRAME_ID, payload) != 0) {
+        return -1;
+    }
+    (void)tilter_comp_y_pack(payload, &y, sizeof payload);
+    if (send_frame(node, TILTER_COMP_Y_FRAME_ID, payload) != 0) {
+        return -1;
+    }
+    (void)tilter_comp_z_pack(payload, &z, sizeof payload);
+    return send_frame(node, TILTER_COMP_Z_FRAME_ID, payload);
+}
+
+static int take(node_t *node, const struct can_frame *frame)
+{
+    struct tilter_rig_temp_t temp;
+    struct tilter_rig_z_t z;
+    int32_t raw[3];
+    int32_t accel[3];
+    uint32_t status;
+
+    if (frame->can_dlc != 8 || frame->can_id > CAN_SFF_MASK ||
+        frame->data[0] != rig_crc8((uint16_t)frame->can_id, frame->data, 8)) {
+        return 0;
+    }
+    switch (frame->can_id) {
+    case TILTER_RIG_TEMP_FRAME_ID:
+        (void)tilter_rig_temp_unpack(&temp, frame->data, 8);
+        node->temp_status = triax_set_temperature(&node->state, &TRIAX_CALIB, temp.temp_code);
+        node->has_temp = 1;
+        return 0;
+    case TILTER_RIG_XY_FRAME_ID:
+        (void)tilter_rig_xy_unpack(&node->xy, frame->data, 8);
+        node->has_xy = 1;
+        return 0;
+    case TILTER_RIG_Z_FRAME_ID:
+        (void)tilter_rig_z_unpack(&z, frame->data, 8);
+        if (!node->has_temp || !node->has_xy || node->xy.sequence != z.sequence) {
+            return 0;
+        }
+        node->has_xy = 0;
+        raw[0] = node->xy.accel_x;
+        raw[1] = node->xy.accel_y;
+        raw[2] = z.accel_z;
+        status = triax_apply(&node->state, raw, accel);
+        return answer(node, z.sequence, accel, status | node->temp_status);
+    default:
+        return 0;
+    }
+}
+
+static int open_can(const char *device)
+{
+    struct sockaddr_can address;
+    struct ifreq request;
+    int size = 4 << 20;
+    int opened = socket(PF_CAN, SOCK_RAW, CAN_RAW);
+
+    if (opened < 0) {
+        return -1;
+    }
+    memset(&request, 0, sizeof request);
+    (void)snprintf(request.ifr_name, sizeof request.ifr_name, "%s", device);
+    if (ioctl(opened, SIOCGIFINDEX, &request) != 0) {
+        return -1;
+    }
+    memset(&address, 0, sizeof address);
+    address.can_family = AF_CAN;
+    address.can_ifindex = request.ifr_ifindex;
+    (void)setsockopt(opened, SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof size);
+    return bind(opened, (struct sockaddr *)&address, sizeof address) == 0 ? opened : -1;
+}
+
+int main(int argc, char **argv)
+{
+    node_t node;
+    struct can_frame frame;
+    ssize_t size;
+
+    memset(&node, 0, sizeof node);
+    if (argc != 3 || (strcmp(argv[1], "socket") != 0 && strcmp(argv[1], "can") != 0)) {
+        fprintf(stderr, "rig_node: say: rig_node socket NUMBER, or rig_node can DEVICE\n");
+        return 2;
+    }
+    node.socket = strcmp(argv[1], "can") == 0 ? open_can(argv[2]) : (int)strtol(argv[2], NULL, 10);
+    if (node.socket < 0) {
+        fprintf(stderr, "rig_node: %s: %s\n", argv[2], strerror(errno));
+        return 1;
+    }
+    for (;;) {
+        size = read(node.socket, &frame, sizeof frame);
+        if (size == 0) {
+            return 0;
+        }
+        if (size < 0 && errno == EINTR) {
+            continue;
+        }
+        if (size < 0 || (size == (ssize_t)sizeof frame && take(&node, &frame) != 0)) {
+            fprintf(stderr, "rig_node: %s: %s\n", argv[2], strerror(errno));
+            return 1;
+        }
+    }
+}

@@ -1,0 +1,135 @@
+"""The receivers: the virtual bus, and our own on a socket pair that stands for a device."""
+
+from __future__ import annotations
+
+import errno
+import socket
+import time
+
+import numpy as np
+import pytest
+from rig_cases import rig_of, short_setup
+
+from triaxcal.errors import RefusedError, UsageError
+from triaxcal.rig.frames import concatenate
+from triaxcal.rig.socketcan import SocketSource, open_refusal, packed
+from triaxcal.rig.sources import SimulatedSource, open_bus
+
+
+def same(a, b, names=("can_id", "length", "fd")):
+    assert len(a) == len(b)
+    for name in names:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    width = min(a.data.shape[1], b.data.shape[1])
+    np.testing.assert_array_equal(a.data[:, :width], b.data[:, :width])
+
+
+@pytest.mark.parametrize("layout", ["classic", "fd"])
+def test_the_virtual_bus_carries_every_frame_and_its_time(tmp_path, layout):
+    setup = short_setup(tmp_path, layout=layout)
+    orders = ("error@1.2:3", "bitflip@1.5:3")
+    source, alone = SimulatedSource(rig_of(setup, *orders)), rig_of(setup, *orders)
+    for _ in range(3):
+        same(source.read(), alone.advance(), ("can_id", "length", "fd", "t_ns"))
+    source.close()
+
+
+class Device:
+    """Hands out socket pairs; the test holds the other ends."""
+
+    def __init__(self):
+        self.ends = []
+        self.there = True
+
+    def connect(self):
+        if not self.there:
+            raise OSError(errno.ENODEV, "No such device")
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.ends.append(theirs)
+        return ours
+
+
+@pytest.fixture
+def device():
+    made = Device()
+    yield made
+    for end in made.ends:
+        end.close()
+
+
+def opened(device):
+    source = SocketSource("test0", device.connect)
+    source.notes()
+    return source
+
+
+def read_until(source, count, limit_s=20.0):
+    parts, end = [], time.monotonic() + limit_s
+    while sum(map(len, parts)) < count and time.monotonic() < end:
+        parts.append(source.read())
+    return concatenate([p for p in parts if len(p)])
+
+
+@pytest.mark.parametrize("layout", ["classic", "fd"])
+def test_our_receiver_reads_the_kernels_frames(tmp_path, device, layout):
+    source = opened(device)
+    frames = rig_of(short_setup(tmp_path, layout=layout), "error@0.5:2").advance()
+    for frame in packed(frames):
+        device.ends[0].send(frame)
+    same(read_until(source, len(frames)), frames)
+    source.close()
+
+
+def test_silence_is_told_and_so_is_its_end(tmp_path, device):
+    source = opened(device)
+    frames = rig_of(short_setup(tmp_path)).advance()
+    notes, end = [], time.monotonic() + 20.0
+    while not notes and time.monotonic() < end:
+        source.read()
+        notes += source.notes()
+    assert notes[0].startswith("test0: no frames; is the rig on")
+    while len(notes) < 2 and time.monotonic() < end:
+        device.ends[-1].send(packed(frames)[0])
+        source.read()
+        notes += source.notes()
+    assert notes[-1] == "test0: frames come again"
+    source.close()
+
+
+def test_a_device_that_goes_away_and_comes_back(tmp_path, device):
+    source = opened(device)
+    frames = rig_of(short_setup(tmp_path)).advance()
+    device.there = False
+    device.ends[0].close()
+    notes, end = [], time.monotonic() + 20.0
+    while not notes and time.monotonic() < end:
+        source.read()
+        notes += source.notes()
+    assert len(notes) == 1
+    device.there = True
+    while len(device.ends) < 2 and time.monotonic() < end:
+        source.read()
+    assert "test0: the device is back" in source.notes()
+    for frame in packed(frames):
+        device.ends[1].send(frame)
+    same(read_until(source, len(frames)), frames)
+    source.close()
+
+
+def test_a_device_that_is_not_there_is_refused(device):
+    device.there = False
+    with pytest.raises(RefusedError, match="test0: cannot be opened: no such device; CAN devices"):
+        SocketSource("test0", device.connect)
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [(errno.EPERM, "no permission"), (errno.EAFNOSUPPORT, "the kernel has no SocketCAN")],
+)
+def test_why_a_device_cannot_be_opened(number, said):
+    assert said in str(open_refusal("can7", OSError(number, "x")))
+
+
+def test_an_interface_that_python_can_does_not_know():
+    with pytest.raises(UsageError, match=r'found \'pcann\' \(did you mean "pcan"\?\)'):
+        open_bus("pcann:X", fd=False)

@@ -1,0 +1,97 @@
+"""`triaxcal rig fil`: build the node, start it, ask it."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from triaxcal.codegen.compiler import FLAGS, find_compiler
+from triaxcal.codegen.crosscheck import python_routine
+from triaxcal.delivery import deliver
+from triaxcal.errors import RefusedError
+from triaxcal.resources import shipped
+from triaxcal.rig.engine import Setup
+from triaxcal.rig.fil import NODE_SOURCES, Agreement, exchange, packing_source, vectors
+from triaxcal.rig.socketcan import can_socket, open_refusal
+
+_CODE_BITS = 24
+
+
+def firmware_in_the_loop(setup: Setup, samples: int, bus: str | None, seed: int) -> Agreement:
+    """Calibrate the unit, build its node, and compare its answers.
+
+    Raises
+    ------
+    RefusedError
+        When the unit is refused, its codes do not fit the frames, a tool is missing, or an
+        answer differs.
+    """
+    if setup.unit.adc.bits > _CODE_BITS:
+        raise RefusedError(
+            f"{setup.unit.name}, [adc] bits",
+            f"found {setup.unit.adc.bits}",
+            expected=f"at most {_CODE_BITS}, the codes of RIG_XY and RIG_Z",
+        )
+    delivery = deliver(setup.folder)
+    plan = delivery.plan
+    temps, raw = vectors(samples, (plan.temp_min_code, plan.temp_max_code), seed)
+    with tempfile.TemporaryDirectory() as folder:
+        node = build_node(Path(folder), delivery.files, setup)
+        with node_on(node, bus) as link:
+            return exchange(link, setup.dbc, temps, raw, python_routine(plan))
+
+
+def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
+    """Compile the node with a unit's generated files; returns the program.
+
+    Raises
+    ------
+    RefusedError
+        When there is no compiler or it refuses.
+    """
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    for name, text in packing_source(setup.dbc).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    ours = shipped("rig") / "firmware"
+    program = folder / "rig_node"
+    sources = [
+        *(ours / name for name in NODE_SOURCES),
+        folder / "tilter.c",
+        folder / "triax_comp.c",
+    ]
+    command = [find_compiler(), *FLAGS, f"-I{folder}", f"-I{ours}", "-o", str(program)]
+    done = subprocess.run(
+        [*command, *map(str, sources)], capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        lines = [line for line in done.stderr.splitlines() if "error" in line]
+        raise RefusedError("gcc", (lines or ["failed without a word"])[0])
+    return program
+
+
+@contextlib.contextmanager
+def node_on(program: Path, bus: str | None) -> Iterator[socket.socket]:
+    """Start the node; gives our end of its bus."""
+    if bus is not None:
+        try:
+            link = can_socket(bus, fd=False)
+        except OSError as error:
+            raise open_refusal(bus, error) from error
+        process = subprocess.Popen([str(program), "can", bus])
+    else:
+        link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        number = theirs.fileno()
+        process = subprocess.Popen([str(program), "socket", str(number)], pass_fds=[number])
+        theirs.close()
+    try:
+        yield link
+    finally:
+        link.close()
+        if bus is not None:
+            process.terminate()
+        process.wait(10)

@@ -1,0 +1,166 @@
+"""The live part of `triaxcal rig`: screen, keys, the end of a session."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import sys
+import termios
+import time
+import tty
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import click
+from rich.console import Console
+from rich.live import Live
+
+from triaxcal.errors import RefusedError
+from triaxcal.model.positions import TEST_POSITIONS
+from triaxcal.rig import recording, runner, store
+from triaxcal.rig.engine import Setup
+from triaxcal.rig.events import Agree, Command, Redo
+from triaxcal.rig.plan import SessionPlan
+from triaxcal.rig.screen import BusView, plain_status, screen
+from triaxcal.rig.simulator import SimulatedRig
+from triaxcal.rig.socketcan import SocketSource
+from triaxcal.rig.sources import SimulatedSource, Source, messages_of
+from triaxcal.rig.view import view
+
+_REFRESH_S = 0.25
+_ALARM_S = 10.0
+_BITRATE = 1_000_000
+
+
+class _Stop(Exception):  # noqa: N818  not an error
+    """The operator wants to stop."""
+
+
+class _Keys:
+    """Keys of the operator: single ones on a terminal, none elsewhere."""
+
+    def __init__(self, plain: bool) -> None:
+        self._on = not plain and sys.stdin.isatty()
+
+    @contextlib.contextmanager
+    def listening(self) -> Iterator[None]:
+        if not self._on:
+            yield
+            return
+        file = sys.stdin.fileno()
+        before = termios.tcgetattr(file)
+        tty.setcbreak(file)
+        try:
+            yield
+        finally:
+            termios.tcsetattr(file, termios.TCSADRAIN, before)
+
+    def words(self) -> list[Command]:
+        words: list[Command] = []
+        while self._on and select.select([sys.stdin], [], [], 0)[0]:
+            key = sys.stdin.read(1)
+            if key == "q":
+                raise _Stop
+            if key == "y":
+                words.append(Agree())
+            elif f"TP{key}" in TEST_POSITIONS:
+                words.append(Redo(f"TP{key}"))
+        return words
+
+
+def guide(setup: Setup, source: Source, folder: Path, plain: bool) -> None:
+    """Guide a session to its end and write the records."""
+    robot = None
+    if isinstance(source, SimulatedSource):
+        robot = runner.Robot(source.rig)
+    taken = recording.Recording(setup, folder, source.name)
+    keys = _Keys(plain)
+    try:
+        with keys.listening():
+            ticks = runner.live(taken, source, keys.words, robot)
+            if plain:
+                _plainly(ticks, taken)
+            else:
+                _on_screen(ticks, taken, source)
+    except (_Stop, KeyboardInterrupt):
+        click.echo(f"stopped; go on with: triaxcal rig resume --unit {setup.folder}", err=True)
+        sys.exit(1)
+    finally:
+        source.close()
+        taken.close()
+    _write(setup, taken)
+
+
+def _write(setup: Setup, taken: recording.Recording) -> None:
+    """Records of the session; a resumed one is put together from its log."""
+    session, log = taken.engine.session, taken.log.state
+    if taken.resumed:
+        path = taken.folder / recording.LOG_FILE
+        played = recording.replay(setup, path, taken.folder / recording.JOURNAL_FILE)
+        if played.engine.session.accepted != session.accepted:
+            raise RefusedError(
+                str(path), "gives other dwells than the journal", remedy="report this session"
+            )
+        session, log = played.engine.session, played.log
+    files = store.write_records(setup.folder, session, setup.dbc.sha256, log)
+    click.echo("written: " + ", ".join(map(str, files)))
+    click.echo(f"next: make calib-header UNIT={setup.unit.name}")
+
+
+def _plainly(ticks: Iterator[runner.Tick], taken: recording.Recording) -> None:
+    before = ""
+    for tick in ticks:
+        for event in tick.events:
+            if event.text != before:
+                stamp = time.strftime("%H:%M:%S", time.gmtime(event.t_ns / 1e9))
+                click.echo(f"{stamp} {event.kind}: {event.text}")
+            before = event.text
+        for note in tick.notes:
+            click.echo(f"bus: {note}")
+    click.echo(plain_status(view(taken.engine.session)))
+
+
+def _on_screen(ticks: Iterator[runner.Tick], taken: recording.Recording, source: Source) -> None:
+    alarms: deque[tuple[float, str]] = deque(maxlen=8)
+    shown = 0.0
+    with Live(console=Console(), screen=True, auto_refresh=False) as picture:
+        for tick in ticks:
+            now = time.monotonic()
+            said = [e.text for e in tick.events if e.kind in {"refused", "trouble", "left"}]
+            alarms.extend((now, text) for text in (*said, *tick.notes))
+            if now - shown < _REFRESH_S:
+                continue
+            shown = now
+            while alarms and now - alarms[0][0] > _ALARM_S:
+                alarms.popleft()
+            dropped = source.dropped if isinstance(source, SocketSource) else 0
+            bus = BusView(source.name, tick.frames_per_s, tick.bits_per_s, dropped, _BITRATE)
+            texts = tuple(text for _, text in alarms)
+            picture.update(screen(view(taken.engine.session), bus, texts), refresh=True)
+
+
+def simulate_on(
+    bus: can.BusABC, rig: SimulatedRig, plan: SessionPlan, seconds: float | None, hold: int
+) -> None:
+    """Send the simulated rig's frames at the pace of the clock."""
+    positions = [p for step in plan.steps for p in step.positions]
+    start = time.monotonic()
+    try:
+        while seconds is None or rig.seconds < seconds:
+            if rig.seconds % hold == 0:
+                rig.turn_to(positions[rig.seconds // hold % len(positions)])
+            frames = rig.advance()
+            first = int(frames.t_ns[0]) if len(frames) else 0
+            base = start + rig.seconds - 1
+            for t_ns, message in zip(frames.t_ns.tolist(), messages_of(frames), strict=True):
+                wait = base + (t_ns - first) / 1e9 - time.monotonic()
+                if wait > 0.001:
+                    time.sleep(wait)
+                bus.send(message)
+            time.sleep(max(0.0, start + rig.seconds - time.monotonic()))
+    except KeyboardInterrupt:
+        click.echo("stopped", err=True)
+    finally:
+        bus.shutdown()

@@ -1,0 +1,1 @@
+"""The bench: from frames on a CAN bus to records that can be trusted."""

@@ -1,0 +1,108 @@
+"""`triaxcal rig check`: whether everything is there, before hours are spent."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.model.positions import AXES
+from triaxcal.rig.engine import Engine, Setup
+from triaxcal.rig.frames import Frames, concatenate
+from triaxcal.rig.orientation import described, recognised
+from triaxcal.rig.samples import BAD_CRC, DUPLICATE, ORPHAN, SampleDecoder, Samples
+from triaxcal.rig.sources import Source
+
+_RATE_TOLERANCE = 0.02
+"""Of the plan's rate; a few seconds' count is exact to a sample or two."""
+_NOISE_MAX_MICRO_G = 2000.0
+"""Above this the rig is being shaken: 100 times the noise of a navigation accelerometer at 1 Hz."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at: good or not, and what was found."""
+
+    good: bool
+    text: str
+
+
+def collect(source: Source, seconds: float) -> Frames:
+    """Frames of some seconds by their own times; gives up when twice as long has passed."""
+    parts = [source.read()]
+    end = time.monotonic() + 2.0 * seconds
+    span_ns = 0
+    first: int | None = None
+    while span_ns < seconds * 1e9 and time.monotonic() < end:
+        parts.append(source.read())
+        if len(parts[-1]):
+            first = int(parts[-1].t_ns[0]) if first is None else first
+            span_ns = int(parts[-1].t_ns[-1]) - first
+    return concatenate([p for p in parts if len(p)])
+
+
+def findings(setup: Setup, frames: Frames, where: str, notes: list[str]) -> list[Finding]:
+    """What the frames of a few seconds tell."""
+    found = [Finding(False, note) for note in notes]
+    if not len(frames):
+        return [*found, Finding(False, f"{where}: no frames at all")]
+    plan = setup.plan
+    samples = SampleDecoder(setup.dbc, plan.layout, plan.rate_hz).feed(frames)
+    found += _bus(setup, frames, samples)
+    found.append(_identity(setup, frames, where, samples))
+    if len(samples.number) < plan.rate_hz:
+        text = f"{len(frames)} frames, {len(samples.number)} samples: wrong DBC, layout or rig"
+        return [*found, Finding(False, text)]
+    return found + _samples(setup, samples)
+
+
+def _bus(setup: Setup, frames: Frames, samples: Samples) -> list[Finding]:
+    kinds = samples.trouble
+    errors = int(frames.is_error.sum())
+    counts = (
+        ("frames with a wrong CRC or length", int((kinds == BAD_CRC).sum())),
+        ("frames without their partner", int((kinds == ORPHAN).sum())),
+        ("samples sent twice", int((kinds == DUPLICATE).sum())),
+        ("error frames", errors),
+        ("jumps of the counters (two nodes with one ID?)", int(samples.jump.sum())),
+    )
+    known = {m.frame_id for m in setup.dbc.messages.values()}
+    strange = sorted({int(i) for i in np.unique(frames.can_id[~frames.is_error])} - known)
+    found = [Finding(count == 0, f"{count} {name}") for name, count in counts]
+    ids = ", ".join(f"0x{i:X}" for i in strange[:8])
+    return [*found, Finding(True, f"IDs that are not the rig's: {ids or 'none'}")]
+
+
+def _identity(setup: Setup, frames: Frames, where: str, samples: Samples) -> Finding:
+    if not samples.identity:
+        return Finding(False, "the rig has not said its serial number (RIG_IDENT)")
+    try:
+        Engine(setup, where).feed(frames)
+    except RefusedError as refusal:
+        return Finding(False, str(refusal))
+    return Finding(True, f'serial number "{setup.unit.serial}", {setup.plan.rate_hz} Hz')
+
+
+def _samples(setup: Setup, samples: Samples) -> list[Finding]:
+    plan = setup.plan
+    seconds = (int(samples.t_ns[-1]) - int(samples.t_ns[0])) / 1e9
+    rate = (len(samples.number) - 1) / max(seconds, 1e-9)
+    lost = int(samples.number[-1] - samples.number[0]) + 1 - len(samples.number)
+    scale = plan.micro_g_per_code(setup.unit)
+    # Differences of neighbours: a drift does not enter.
+    sd = np.sqrt(np.mean(np.diff(samples.codes, axis=0) ** 2, axis=0) / 2.0) * np.abs(scale)
+    seen = recognised(samples.codes.mean(axis=0), scale)
+    noise = ", ".join(f"{axis} {v:.0f}" for axis, v in zip(AXES, sd, strict=True))
+    codes = samples.temp_code
+    temp = setup.unit.temperature_sensor.degc(float(codes.mean())) if len(codes) else None
+    return [
+        Finding(lost == 0, f"{len(samples.number)} samples, {lost} lost"),
+        Finding(abs(rate / plan.rate_hz - 1.0) < _RATE_TOLERANCE, f"{rate:.2f} samples a second"),
+        Finding(
+            bool((sd > 0.0).all() and (sd < _NOISE_MAX_MICRO_G).all()), f"noise {noise} micro-g"
+        ),
+        Finding(seen is not None, f"position {described(seen) if seen else 'not recognised'}"),
+        Finding(temp is not None, f"temperature {temp:.2f} degC" if temp is not None else "none"),
+    ]

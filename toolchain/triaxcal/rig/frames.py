@@ -1,0 +1,121 @@
+"""Frames of a CAN bus, many at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from triaxcal.model.types import IntArray
+
+UintArray = npt.NDArray[np.uint32]
+ByteArray = npt.NDArray[np.uint8]
+BoolArray = npt.NDArray[np.bool_]
+
+EFF_FLAG = 0x8000_0000
+RTR_FLAG = 0x4000_0000
+ERR_FLAG = 0x2000_0000
+ID_MASK = 0x1FFF_FFFF
+"""Flags beside the ID, as linux/can.h has them: extended ID, remote request, error frame."""
+
+ERROR_BITS = {
+    0x0000_0001: "transmit timeout",
+    0x0000_0002: "lost arbitration",
+    0x0000_0004: "controller problem",
+    0x0000_0008: "protocol violation",
+    0x0000_0010: "transceiver problem",
+    0x0000_0020: "no acknowledgement",
+    0x0000_0040: "bus-off",
+    0x0000_0080: "bus error",
+    0x0000_0100: "controller restarted",
+}
+"""Classes of error frames, linux/can/error.h."""
+BUS_OFF = 0x40
+RESTARTED = 0x100
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Frames in the order of their arrival.
+
+    Attributes
+    ----------
+    t_ns : int64 array, shape (n,)
+        Time of arrival, ns since 1970.
+    can_id : uint32 array, shape (n,)
+        ID with the flags above.
+    length : uint8 array, shape (n,)
+        Bytes of payload.
+    fd : bool array, shape (n,)
+        CAN FD frame.
+    data : uint8 array, shape (n, 8) or (n, 64)
+        Payload, zeros behind its end.
+    """
+
+    t_ns: IntArray
+    can_id: UintArray
+    length: ByteArray
+    fd: BoolArray
+    data: ByteArray
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+    def take(self, index: slice | BoolArray | IntArray) -> Frames:
+        """Some of the frames."""
+        return Frames(
+            self.t_ns[index],
+            self.can_id[index],
+            self.length[index],
+            self.fd[index],
+            self.data[index],
+        )
+
+    @property
+    def is_error(self) -> BoolArray:
+        """Which are error frames."""
+        return np.asarray((self.can_id & np.uint32(ERR_FLAG)) != 0, np.bool_)
+
+
+def empty(width: int = 8) -> Frames:
+    """No frames."""
+    return Frames(
+        np.zeros(0, np.int64),
+        np.zeros(0, np.uint32),
+        np.zeros(0, np.uint8),
+        np.zeros(0, np.bool_),
+        np.zeros((0, width), np.uint8),
+    )
+
+
+def concatenate(parts: Sequence[Frames]) -> Frames:
+    """Several batches in one, in their order."""
+    if len(parts) == 1:
+        return parts[0]
+    if not parts:
+        return empty()
+    width = max(part.data.shape[1] for part in parts)
+    return Frames(
+        np.concatenate([p.t_ns for p in parts]),
+        np.concatenate([p.can_id for p in parts]),
+        np.concatenate([p.length for p in parts]),
+        np.concatenate([p.fd for p in parts]),
+        np.concatenate([widened(p.data, width) for p in parts]),
+    )
+
+
+def widened(data: ByteArray, width: int) -> ByteArray:
+    """Payloads (n, w) with zeros behind, to (n, width)."""
+    if data.shape[1] == width:
+        return data
+    wide = np.zeros((len(data), width), np.uint8)
+    wide[:, : data.shape[1]] = data
+    return wide
+
+
+def error_names(can_id: int) -> str:
+    """What an error frame says, in words."""
+    found = [name for bit, name in ERROR_BITS.items() if can_id & bit]
+    return ", ".join(found) or "unknown error"

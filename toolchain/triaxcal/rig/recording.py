@@ -1,0 +1,287 @@
+"""A session on the disk: its folder, its evidence and journal, live and read again."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from triaxcal import __version__
+from triaxcal.errors import RefusedError
+from triaxcal.rig.candump import NS_PER_US, read_log
+from triaxcal.rig.engine import Engine, Setup
+from triaxcal.rig.events import DURABLE, AcceptedDwell, Agree, Command, Event, Redo
+from triaxcal.rig.frames import Frames
+from triaxcal.rig.journal import Journal, Record, disk_refusal, read_journal
+from triaxcal.rig.rawlog import RawLog
+from triaxcal.rig.stillness import Reference
+
+FORMAT = 1
+LOG_FILE = "frames.log"
+JOURNAL_FILE = "session.journal"
+_NUMBERED = re.compile(r"[0-9]{3,}")
+
+
+class Recording:
+    """A live session: evidence first, then the decision, then the acknowledgement.
+
+    Whatever `feed` returns is on the disk already.
+    """
+
+    def __init__(self, setup: Setup, folder: Path, channel: str) -> None:
+        """Start a session in a folder, or go on with the one that is there.
+
+        Raises
+        ------
+        RefusedError
+            When the disk refuses, the journal is damaged, or it is about another unit, plan or
+            DBC.
+        """
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise disk_refusal(folder, error) from error
+        journal = folder / JOURNAL_FILE
+        records = read_journal(journal).records if journal.exists() else ()
+        self.folder = folder
+        self.log = RawLog(folder / LOG_FILE, channel)
+        self.journal = Journal(journal)
+        history: tuple[Event, ...] = ()
+        self.resumed = bool(records)
+        if records:
+            refuse_other_session(journal, records[0], setup)
+            history = durable_events(records)
+            self.journal.append({"kind": "resume", "durable": len(history), **self._place()})
+        else:
+            self.journal.append({**header(setup), "channel": channel})
+        self.engine = Engine(setup, channel, history)
+        self._trouble = ""
+
+    def feed(self, frames: Frames) -> list[Event]:
+        """Record frames and decide.
+
+        Raises
+        ------
+        RefusedError
+            When the disk refuses, or the rig is not the unit's.
+        """
+        frames = whole_microseconds(frames)
+        self.log.append(frames)
+        return self._acknowledge(self.engine.feed(frames))
+
+    def command(self, command: Command, t_ns: int) -> list[Event]:
+        """Record a word of the operator and decide.
+
+        Raises
+        ------
+        RefusedError
+            When the disk refuses.
+        """
+        self.log.flush()
+        said = {"name": type(command).__name__, **asdict(command), "t_ns": t_ns}
+        self.journal.append({"kind": "command", "command": said, **self._place()})
+        return self._acknowledge(self.engine.command(command, t_ns))
+
+    def close(self) -> None:
+        """Close log and journal.
+
+        Raises
+        ------
+        RefusedError
+            When the disk refuses.
+        """
+        try:
+            self.log.close()
+        finally:
+            self.journal.close()
+
+    def _acknowledge(self, events: list[Event]) -> list[Event]:
+        for event in events:
+            repeated = event.kind == "trouble" and event.text == self._trouble
+            self._trouble = event.text if event.kind == "trouble" else ""
+            if repeated:
+                continue  # the same trouble every second would bury the rest
+            self.log.flush(sync=event.kind in DURABLE)
+            self.journal.append({"kind": "event", "event": asdict(event), **self._place()})
+        return events
+
+    def _place(self) -> dict[str, Any]:
+        return {"log": self.log.state}
+
+
+def whole_microseconds(frames: Frames) -> Frames:
+    """Frames with the times that the log keeps: live and replay must see the same."""
+    t_ns = frames.t_ns // NS_PER_US * NS_PER_US
+    return Frames(t_ns, frames.can_id, frames.length, frames.fd, frames.data)
+
+
+def header(setup: Setup) -> dict[str, Any]:
+    """First record of a journal: what the session is about."""
+    return {
+        "kind": "session",
+        "format": FORMAT,
+        "triaxcal": __version__,
+        "unit": setup.unit.name,
+        "serial": setup.unit.serial,
+        "plan": setup.plan.source,
+        "plan_sha256": setup.plan.sha256,
+        "dbc_sha256": setup.dbc.sha256,
+    }
+
+
+def refuse_other_session(path: Path, record: Record, setup: Setup) -> None:
+    """Refuse a journal that is not of this unit, plan and DBC.
+
+    Raises
+    ------
+    RefusedError
+        Naming what differs.
+    """
+    for key, value in header(setup).items():
+        if key not in {"triaxcal", "plan", "unit"} and record.get(key) != value:
+            raise RefusedError(
+                f"{path}, {key}",
+                f"found {record.get(key)}",
+                expected=f"{value}",
+                remedy="use the unit, plan and DBC that the session was started with",
+            )
+
+
+def durable_events(records: tuple[Record, ...]) -> tuple[Event, ...]:
+    """Events that a resumed session starts from."""
+    events = (r["event"] for r in records if r["kind"] == "event")
+    return tuple(_event(e) for e in events if e["kind"] in DURABLE)
+
+
+def _event(raw: dict[str, Any]) -> Event:
+    dwell, reference = raw["dwell"], raw["reference"]
+    return Event(
+        **{
+            **raw,
+            "dwell": AcceptedDwell(**_tuples(dwell)) if dwell else None,
+            "reference": Reference(**_tuples(reference)) if reference else None,
+        }
+    )
+
+
+def _tuples(raw: dict[str, Any]) -> dict[str, Any]:
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in raw.items()}
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A session played again from its log.
+
+    Attributes
+    ----------
+    log : dict
+        Lines, bytes and SHA-256 of the log; lines that were no frame.
+    """
+
+    engine: Engine
+    events: tuple[Event, ...]
+    log: dict[str, int | str]
+    bad_lines: int
+
+
+def replay(setup: Setup, log: Path, journal: Path | None = None) -> Replayed:
+    """Play a log again, with the operator's words and the restarts that its journal tells of.
+
+    Raises
+    ------
+    RefusedError
+        When a file cannot be read, the log is not the one that the journal was written beside,
+        or it is another unit's.
+    """
+    records = read_journal(journal).records if journal is not None else ()
+    if records and journal is not None:
+        refuse_other_session(journal, records[0], setup)
+        _refuse_changed_log(log, records)
+    engine = Engine(setup, str(log))
+    words = [r for r in records if r["kind"] in {"command", "resume"}]
+    events: list[Event] = []
+    lines = bad = 0
+    for parsed, frame_lines in _chunks(log, [int(r["log"]["lines"]) for r in words]):
+        while words and int(words[0]["log"]["lines"]) == lines:
+            events += _say(engine, words.pop(0))
+        events += engine.feed(parsed)
+        lines += frame_lines[0]
+        bad += frame_lines[1]
+    for word in words:
+        events += _say(engine, word)
+    return Replayed(engine, tuple(events), log_state(log), bad)
+
+
+def _say(engine: Engine, record: Record) -> list[Event]:
+    if record["kind"] == "resume":
+        # A decision that the crash kept from the journal was not taken.
+        engine.resume(int(record["durable"]))
+        return []
+    said = dict(record["command"])
+    name, t_ns = said.pop("name"), said.pop("t_ns")
+    return engine.command(Agree() if name == "Agree" else Redo(**said), t_ns)
+
+
+def _chunks(log: Path, cuts: list[int]) -> Iterator[tuple[Frames, tuple[int, int]]]:
+    """Frames of a log, cut after each of these numbers of lines; lines and bad lines of each."""
+    done = 0
+    for parsed in read_log(log):
+        inner = [c - done for c in cuts if done < c < done + parsed.lines]
+        if inner and parsed.bad_lines:
+            raise RefusedError(str(log), f"{parsed.bad_lines} lines that are no frames")
+        edges = [0, *inner, len(parsed.frames)]
+        for i, (start, end) in enumerate(pairwise(edges)):
+            bad = parsed.bad_lines if i == 0 else 0
+            yield parsed.frames.take(slice(start, end)), (end - start + bad, bad)
+        done += parsed.lines
+
+
+def _refuse_changed_log(log: Path, records: tuple[Record, ...]) -> None:
+    """Refuse a log whose beginning is not what the journal saw."""
+    last = records[-1].get("log")
+    if last is None:
+        return
+    try:
+        with log.open("rb") as file:
+            found = hashlib.sha256(file.read(int(last["bytes"]))).hexdigest()
+    except OSError as error:
+        raise RefusedError(str(log), f"cannot be read: {error.strerror}") from error
+    if found != last["sha256"]:
+        raise RefusedError(
+            str(log),
+            f"its first {last['bytes']} bytes have SHA-256 {found[:16]}...",
+            expected=f"{last['sha256'][:16]}..., as the journal recorded",
+            remedy="the log was changed or cut after the session; the journal still holds the "
+            "accepted dwells: `triaxcal rig status`",
+        )
+
+
+def log_state(log: Path) -> dict[str, int | str]:
+    """Whole lines of a log, their bytes and SHA-256."""
+    content = np.memmap(log, np.uint8, "r") if log.stat().st_size else np.zeros(0, np.uint8)
+    ends = np.flatnonzero(content == ord("\n"))
+    size = int(ends[-1]) + 1 if len(ends) else 0
+    return {
+        "lines": len(ends),
+        "bytes": size,
+        "sha256": hashlib.sha256(content[:size].tobytes()).hexdigest(),
+    }
+
+
+def session_folders(root: Path) -> list[Path]:
+    """Folders of the sessions of a unit, the oldest first."""
+    if not root.is_dir():
+        return []
+    return sorted(f for f in root.iterdir() if _NUMBERED.fullmatch(f.name) and f.is_dir())
+
+
+def next_folder(root: Path) -> Path:
+    """Folder of a new session."""
+    there = session_folders(root)
+    return root / f"{int(there[-1].name) + 1 if there else 1:03d}"

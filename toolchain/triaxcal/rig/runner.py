@@ -1,0 +1,133 @@
+"""The loop of a live session: source -> recording -> what the operator should see."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.rig.events import Command, Event
+from triaxcal.rig.frames import Frames
+from triaxcal.rig.recording import Recording
+from triaxcal.rig.session import Session
+from triaxcal.rig.simulator import SimulatedRig
+from triaxcal.rig.sources import Source
+
+_FLUSH_S = 0.05
+_RATE_WINDOW_S = 2.0
+_CLASSIC_OVERHEAD_BITS = 47 + 12
+"""Of an 11-bit frame, and a mean of stuff bits for eight bytes."""
+_NOT_DECODED_S = 3.0
+
+
+@dataclass(frozen=True)
+class Tick:
+    """What one pass of the loop brought.
+
+    Attributes
+    ----------
+    notes : tuple of str
+        About the connection; they change no decision.
+    frames_per_s : float
+        By the frames' own times.
+    bits_per_s : float
+        Load of the bus, without its gaps.
+    """
+
+    events: tuple[Event, ...]
+    notes: tuple[str, ...]
+    frames_per_s: float
+    bits_per_s: float
+
+
+class Robot:
+    """Operator of the simulated rig: does what the session wants."""
+
+    def __init__(self, rig: SimulatedRig) -> None:
+        self._rig = rig
+
+    def act(self, session: Session) -> None:
+        """Set the chamber, turn the tilter."""
+        if session.done:
+            return
+        self._rig.target_degc = session.plan.steps[session.step].temp_degc
+        if session.reseat is not None:
+            self._rig.turn_to("TP1" if session.reseat != "TP1" else "TP2")
+        elif session.wanted is not None:
+            self._rig.turn_to(session.wanted)
+
+
+def live(
+    recording: Recording,
+    source: Source,
+    words: Callable[[], Sequence[Command]],
+    robot: Robot | None = None,
+) -> Iterator[Tick]:
+    """Run until the session is done; the caller may stop at any tick.
+
+    Raises
+    ------
+    RefusedError
+        When the disk refuses, the rig is not the unit's, or the bus is lost for good.
+    """
+    session = recording.engine.session
+    meter = _Meter()
+    flushed = time.monotonic()
+    while not session.done:
+        frames = source.read()
+        events = recording.feed(frames)
+        now_ns = int(frames.t_ns[-1]) if len(frames) else time.time_ns()
+        for word in words():
+            events += recording.command(word, now_ns)
+        if time.monotonic() - flushed > _FLUSH_S:
+            recording.log.flush()
+            flushed = time.monotonic()
+        if robot is not None:
+            robot.act(session)
+        rate, bits = meter.add(frames)
+        notes = [*source.notes(), *meter.notes(session)]
+        yield Tick(tuple(events), tuple(notes), rate, bits)
+
+
+class _Meter:
+    """Frames and bits a second over the last two seconds; frames that make no samples."""
+
+    def __init__(self) -> None:
+        self._parts: deque[tuple[int, int, int]] = deque()
+        self._block_at = time.monotonic()
+        self._index: int | None = None
+        self._frames = 0
+        self._told = False
+
+    def add(self, frames: Frames) -> tuple[float, float]:
+        if len(frames):
+            bits = int(np.sum(frames.length, dtype=np.int64)) * 8
+            bits += len(frames) * _CLASSIC_OVERHEAD_BITS
+            self._parts.append((int(frames.t_ns[-1]), len(frames), bits))
+            self._frames += len(frames)
+        while self._parts and self._parts[-1][0] - self._parts[0][0] > _RATE_WINDOW_S * 1e9:
+            self._parts.popleft()
+        if len(self._parts) < 2:
+            return 0.0, 0.0
+        seconds = max((self._parts[-1][0] - self._parts[0][0]) / 1e9, 1e-3)
+        # The first part's frames came before its time stamp.
+        later = list(self._parts)[1:]
+        return sum(p[1] for p in later) / seconds, sum(p[2] for p in later) / seconds
+
+    def notes(self, session: Session) -> list[str]:
+        """One line when frames come that are not the rig's."""
+        index = session.previous.index if session.previous else None
+        if index != self._index:
+            self._index, self._block_at, self._frames = index, time.monotonic(), 0
+            self._told = False
+        if self._told or not self._frames or time.monotonic() - self._block_at < _NOT_DECODED_S:
+            return []
+        self._told = True
+        said = (
+            f"{self._frames} frames and no sample among them: wrong DBC or layout, another rig, "
+            "or two nodes with one ID; try `triaxcal rig check`"
+        )
+        return [said]

@@ -1,0 +1,271 @@
+"""The bench's own receiver for SocketCAN: a deep queue, every loss known, faults outlived.
+
+python-can reads the same sockets, but never shows the kernel's count of frames that its queue
+had no room for (SO_RXQ_OVFL), and does not outlive a device that goes away.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import socket
+import struct
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.rig.frames import Frames, empty
+from triaxcal.rig.sources import WAIT_S, can_devices
+
+QUEUE_BYTES = 4 << 20
+_SO_RCVBUFFORCE, _SO_TIMESTAMPNS, _SO_RXQ_OVFL = 33, 35, 40
+_CAN_RAW_ERR_FILTER = 2
+_CLASSIC_BYTES, _FD_BYTES = 16, 72
+_FRAME_QUEUE_BYTES = 384
+"""What the kernel charges a queue for one frame."""
+_ENOUGH_S = 0.5
+_FULL_RATE = 9000
+_BURST = 8192
+_REOPEN_S = 0.2
+_SILENCE_S = 0.9
+_TIME = struct.Struct("@qq")
+_DROPS = struct.Struct("@I")
+_HEAD = struct.Struct("@IB")
+_GONE = {errno.ENODEV, errno.ENXIO, errno.EBADF, errno.ENETUNREACH}
+
+
+class SocketSource:
+    """Frames of a CAN device of Linux.
+
+    Parameters
+    ----------
+    connect : callable
+        Gives a connected socket; raises OSError when there is no such device.
+
+    Attributes
+    ----------
+    dropped : int
+        Frames that the kernel dropped because the queue was full.
+    """
+
+    def __init__(self, name: str, connect: Callable[[], socket.socket]) -> None:
+        """Open the device.
+
+        Raises
+        ------
+        RefusedError
+            When there is no such device (names those that there are), or no permission.
+        """
+        self.name = name
+        self.dropped = 0
+        self._connect = connect
+        self._notes: list[str] = []
+        self._socket: socket.socket | None = None
+        self._counted = 0
+        self._down = self._silent = False
+        self._heard = self._tried = time.monotonic()
+        try:
+            self._open()
+        except OSError as error:
+            raise open_refusal(name, error) from error
+
+    def _open(self) -> None:
+        opened = self._connect()
+        opened.setblocking(False)
+        try:
+            opened.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, QUEUE_BYTES)
+        except OSError:  # needs CAP_NET_ADMIN
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, QUEUE_BYTES)
+        room = opened.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // _FRAME_QUEUE_BYTES
+        if room < _ENOUGH_S * _FULL_RATE:
+            self._notes.append(
+                f"{self.name}: the queue holds {room} frames, {1000 * room // _FULL_RATE} ms of a "
+                "full bus; run as root, or raise net.core.rmem_max to 4194304"
+            )
+        for option in (_SO_TIMESTAMPNS, _SO_RXQ_OVFL):
+            opened.setsockopt(socket.SOL_SOCKET, option, 1)
+        self._counted = 0
+        self._socket = opened
+
+    def read(self) -> Frames:
+        """Frames that have come; waits a little when there are none."""
+        if self._socket is None:
+            self._reopen()
+            return empty()
+        ready, _, _ = select.select([self._socket], [], [], WAIT_S)
+        rows = self._receive() if ready else []
+        self._watch(bool(rows))
+        return frames_of_rows(rows)
+
+    def _receive(self) -> list[tuple[int, bytes]]:
+        rows: list[tuple[int, bytes]] = []
+        receive = self._socket.recvmsg if self._socket else None
+        assert receive is not None
+        try:
+            while len(rows) < _BURST:
+                payload, extra, _, _ = receive(_FD_BYTES, 128)
+                if not payload:
+                    raise OSError(errno.ENODEV, "closed")
+                rows.append((self._meta(extra), payload))
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            self._fault(error)
+        return rows
+
+    def _meta(self, extra: list[tuple[int, int, bytes]]) -> int:
+        """Kernel's time of arrival in ns; takes note of the drop count."""
+        t_ns = 0
+        for level, kind, value in extra:
+            if level != socket.SOL_SOCKET:
+                continue
+            if kind == _SO_TIMESTAMPNS:
+                seconds, ns = _TIME.unpack_from(value)
+                t_ns = seconds * 10**9 + ns
+            elif kind == _SO_RXQ_OVFL:
+                (count,) = _DROPS.unpack_from(value)
+                new = (count - self._counted) % 2**32
+                if new:
+                    self._notes.append(f"{self.name}: the kernel dropped {new} frames, queue full")
+                self.dropped += new
+                self._counted = count
+        return t_ns or time.time_ns()
+
+    def _fault(self, error: OSError) -> None:
+        if error.errno == errno.ENETDOWN:
+            self._down = True
+            self._notes.append(f"{self.name}: the link is down; `ip link set {self.name} up`")
+            return
+        self._notes.append(f"{self.name}: {(error.strerror or str(error)).lower()}")
+        if error.errno in _GONE:
+            self._close()
+
+    def _reopen(self) -> None:
+        time.sleep(WAIT_S)
+        if time.monotonic() - self._tried < _REOPEN_S:
+            return
+        self._tried = time.monotonic()
+        try:
+            self._open()
+        except OSError:
+            return
+        self._notes.append(f"{self.name}: the device is back")
+
+    def _watch(self, heard: bool) -> None:
+        now = time.monotonic()
+        if heard:
+            if self._silent or self._down:
+                self._notes.append(f"{self.name}: frames come again")
+            self._heard, self._silent, self._down = now, False, False
+            return
+        if now - self._heard <= _SILENCE_S:
+            return
+        if not self._silent:
+            self._silent = True
+            self._notes.append(f"{self.name}: no frames; is the rig on, the plug in, the bus up?")
+        # A removed device says so once, and one that came back under its name never does:
+        # a socket that stays silent is made anew.
+        if now - self._tried > 1.0:
+            self._close()
+            self._tried = now - _REOPEN_S
+
+    def notes(self) -> list[str]:
+        """What happened to the connection since last asked."""
+        said, self._notes = self._notes, []
+        return said
+
+    def _close(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._close()
+
+
+def open_socketcan(device: str, fd: bool) -> SocketSource:
+    """Receiver of a CAN device.
+
+    Raises
+    ------
+    RefusedError
+        When this machine has no SocketCAN, no such device, or does not permit it.
+    """
+    return SocketSource(device, lambda: can_socket(device, fd))
+
+
+def can_socket(device: str, fd: bool) -> socket.socket:
+    """Raw socket of a CAN device, error frames included.
+
+    Raises
+    ------
+    OSError
+        When there is no such device, no SocketCAN, or no permission.
+    """
+    opened = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    try:
+        everything = struct.pack("@I", 0x1FFFFFFF)
+        opened.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, everything)
+        if fd:
+            opened.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
+        opened.bind((device,))
+    except BaseException:
+        opened.close()
+        raise
+    return opened
+
+
+def inherited(file: int) -> SocketSource:
+    """Receiver of a datagram socket that another process opened, one struct can_frame each."""
+    return SocketSource(f"socket {file}", lambda: socket.socket(fileno=os.dup(file)))
+
+
+def packed(frames: Frames) -> list[bytes]:
+    """Frames as struct can_frame or canfd_frame, to be sent."""
+    rows = zip(
+        frames.can_id.tolist(), frames.length.tolist(), frames.fd.tolist(), frames.data, strict=True
+    )
+    return [
+        _HEAD.pack(can_id, length)
+        + b"\0\0\0"
+        + data.tobytes()[: 64 if fd else 8].ljust(64 if fd else 8, b"\0")
+        for can_id, length, fd, data in rows
+    ]
+
+
+def frames_of_rows(rows: list[tuple[int, bytes]]) -> Frames:
+    """Frames of times in ns and struct can_frame or canfd_frame; what is neither is left out."""
+    rows = [row for row in rows if len(row[1]) in {_CLASSIC_BYTES, _FD_BYTES}]
+    if not rows:
+        return empty()
+    wide = any(len(payload) == _FD_BYTES for _, payload in rows)
+    size = _FD_BYTES if wide else _CLASSIC_BYTES
+    text = b"".join(payload.ljust(size, b"\0") for _, payload in rows)
+    table = np.frombuffer(text, np.uint8).reshape(len(rows), size)
+    return Frames(
+        np.array([t_ns for t_ns, _ in rows], np.int64),
+        table[:, :4].copy().view(np.uint32)[:, 0],
+        table[:, 4],
+        np.array([len(payload) == _FD_BYTES for _, payload in rows], np.bool_),
+        table[:, 8:],
+    )
+
+
+def open_refusal(name: str, error: OSError) -> RefusedError:
+    """Error of a CAN device that cannot be opened: says why, and which devices there are."""
+    if error.errno in {errno.EPERM, errno.EACCES}:
+        return RefusedError(name, "no permission", remedy="run as a user that may open CAN sockets")
+    if error.errno in {errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT}:
+        return RefusedError(
+            name, "the kernel has no SocketCAN", remedy="sudo modprobe can-raw, or another machine"
+        )
+    there = ", ".join(can_devices()) or "none"
+    return RefusedError(
+        name,
+        f"cannot be opened: {(error.strerror or str(error)).lower()}",
+        remedy=f"CAN devices of this machine: {there}",
+    )

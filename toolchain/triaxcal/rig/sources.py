@@ -1,0 +1,206 @@
+"""Where frames come from: python-can's buses, and the simulated rig on one of them."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any, Protocol
+
+import can
+import numpy as np
+
+from triaxcal.errors import RefusedError, UsageError
+from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG, Frames, empty
+from triaxcal.rig.simulator import SimulatedRig
+from triaxcal.tomltable import did_you_mean, shown
+
+WAIT_S = 0.05
+_CAN_DEVICE = "280"  # ARPHRD_CAN
+_NETWORK = Path("/sys/class/net")
+
+
+class Source(Protocol):
+    """A stream of frames.
+
+    Attributes
+    ----------
+    name : str
+        Channel, for the log and for messages.
+    """
+
+    name: str
+
+    def read(self) -> Frames:
+        """Frames that have come; waits a little when there are none."""
+
+    def notes(self) -> list[str]:
+        """What happened to the connection since last asked, one line each."""
+
+    def close(self) -> None:
+        """Give the channel back."""
+
+
+class BusSource:
+    """Any bus that python-can opens."""
+
+    def __init__(self, bus: can.BusABC, name: str) -> None:
+        self.name = name
+        self.bus = bus
+        self._notes: list[str] = []
+        self._heard = time.monotonic()
+        self._silent = False
+
+    def read(self) -> Frames:
+        """Frames that have come.
+
+        Raises
+        ------
+        RefusedError
+            When the bus cannot be read any more.
+        """
+        messages: list[can.Message] = []
+        try:
+            message = self.bus.recv(WAIT_S)
+            while message is not None and len(messages) < 4096:
+                messages.append(message)
+                message = self.bus.recv(0)
+            if message is not None:
+                messages.append(message)
+        except (can.CanError, OSError) as error:
+            raise RefusedError(
+                self.name, f"cannot be read: {error}", remedy="then `triaxcal rig resume`"
+            ) from error
+        self._watch(bool(messages))
+        return frames_of(messages)
+
+    def _watch(self, heard: bool) -> None:
+        now = time.monotonic()
+        if heard:
+            if self._silent:
+                self._notes.append(f"{self.name}: frames come again")
+            self._heard, self._silent = now, False
+        elif now - self._heard > 0.9 and not self._silent:
+            self._silent = True
+            self._notes.append(f"{self.name}: no frames; is the rig on, the plug in, the bus up?")
+
+    def notes(self) -> list[str]:
+        """What happened since last asked."""
+        said, self._notes = self._notes, []
+        return said
+
+    def close(self) -> None:
+        """Shut the bus down."""
+        self.bus.shutdown()
+
+
+class SimulatedSource:
+    """The simulated rig behind a python-can virtual bus, in a clock as fast as the machine."""
+
+    def __init__(self, rig: SimulatedRig, name: str = "virtual") -> None:
+        self.name = name
+        self.rig = rig
+        options: dict[str, Any] = {"interface": "virtual", "preserve_timestamps": True}
+        self._out = can.Bus(channel=f"triaxcal-{id(self)}", **options)
+        self._in = can.Bus(channel=f"triaxcal-{id(self)}", **options)
+
+    def read(self) -> Frames:
+        """Frames of the next second, through the bus."""
+        sent = messages_of(self.rig.advance())
+        for message in sent:
+            self._out.send(message)
+        received = [self._in.recv(1.0) for _ in sent]
+        return frames_of([m for m in received if m is not None])
+
+    def notes(self) -> list[str]:
+        """Nothing ever happens to this connection."""
+        return []
+
+    def close(self) -> None:
+        """Shut both ends down."""
+        self._in.shutdown()
+        self._out.shutdown()
+
+
+def frames_of(messages: list[can.Message]) -> Frames:
+    """Frames of python-can messages."""
+    if not messages:
+        return empty()
+    width = 64 if any(m.is_fd for m in messages) else 8
+    count = len(messages)
+    payload = b"".join(bytes(m.data).ljust(width, b"\0") for m in messages)
+    ids = [
+        m.arbitration_id
+        | (EFF_FLAG if m.is_extended_id and not m.is_error_frame else 0)
+        | (RTR_FLAG if m.is_remote_frame else 0)
+        | (ERR_FLAG if m.is_error_frame else 0)
+        for m in messages
+    ]
+    return Frames(
+        np.array([round(m.timestamp * 1e6) * 1000 for m in messages], np.int64),
+        np.array(ids, np.uint32),
+        np.array([len(m.data) for m in messages], np.uint8),
+        np.array([m.is_fd for m in messages], np.bool_),
+        np.frombuffer(payload, np.uint8).reshape(count, width),
+    )
+
+
+def messages_of(frames: Frames) -> list[can.Message]:
+    """Python-can messages of frames."""
+    rows = zip(
+        frames.t_ns.tolist(),
+        frames.can_id.tolist(),
+        frames.length.tolist(),
+        frames.fd.tolist(),
+        frames.data,
+        strict=True,
+    )
+    return [
+        can.Message(
+            timestamp=t_ns / 1e9,
+            arbitration_id=can_id & 0x1FFF_FFFF,
+            is_extended_id=bool(can_id & EFF_FLAG),
+            is_remote_frame=bool(can_id & RTR_FLAG),
+            is_error_frame=bool(can_id & ERR_FLAG),
+            is_fd=fd,
+            data=data[:length].tobytes(),
+        )
+        for t_ns, can_id, length, fd, data in rows
+    ]
+
+
+def can_devices() -> list[str]:
+    """Names of the CAN network devices of this machine."""
+    if not _NETWORK.is_dir():
+        return []
+    types = ((d.name, d / "type") for d in sorted(_NETWORK.iterdir()))
+    return [
+        name for name, kind in types if kind.is_file() and kind.read_text().strip() == _CAN_DEVICE
+    ]
+
+
+def open_bus(name: str, fd: bool) -> can.BusABC:
+    """Bus of a name such as "pcan:PCAN_USBBUS1", through python-can.
+
+    Raises
+    ------
+    UsageError
+        When python-can has no such interface.
+    RefusedError
+        When the channel cannot be opened; lists those that can be found.
+    """
+    interface, _, channel = name.partition(":")
+    if interface not in can.VALID_INTERFACES:
+        known = sorted(can.VALID_INTERFACES)
+        raise UsageError(
+            "--bus",
+            f"found {shown(interface)}{did_you_mean(interface, known)}",
+            expected="a CAN device, or interface:channel, interface one of " + ", ".join(known),
+        )
+    try:
+        return can.Bus(interface=interface, channel=channel or None, fd=fd)
+    except Exception as error:  # each driver raises what its maker chose
+        found = can.detect_available_configs(interface)
+        channels = ", ".join(str(c.get("channel")) for c in found[:20]) or "none found"
+        raise RefusedError(
+            name, f"cannot be opened: {error}", remedy=f"channels of {interface}: {channels}"
+        ) from error

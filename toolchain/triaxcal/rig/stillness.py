@@ -1,0 +1,244 @@
+"""Whether the unit rests: several detectors, for none of them sees everything.
+
+A variance sees shaking but neither slips nor creep; a slope sees creep, a step test slips. Blocks
+of one second; the noise within a block and from block to block is learned from a reference at
+rest (docs/bench.md has the thresholds and what they miss).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+from triaxcal.rig.blocks import Block
+from triaxcal.rig.plan import Stillness
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Noise at rest, learned.
+
+    Attributes
+    ----------
+    variance : tuple of three floats
+        Of one reading, code^2.
+    readings : int
+        Readings behind it.
+    block_variance : tuple of three floats
+        Of the mean of a block, code^2, from the differences of neighbours.
+    blocks : int
+        Blocks behind it.
+    """
+
+    variance: tuple[float, float, float]
+    readings: int
+    block_variance: tuple[float, float, float]
+    blocks: int
+
+
+@dataclass(frozen=True)
+class Average:
+    """Mean of a dwell and its uncertainty.
+
+    Attributes
+    ----------
+    mean_code, u_code, batch_sd_code : tuples of three floats
+        Mean; its type A uncertainty; deviation of one batch mean with the Allan floor in it, so
+        that u = batch_sd / sqrt(batches).
+    """
+
+    mean_code: tuple[float, float, float]
+    u_code: tuple[float, float, float]
+    batch_sd_code: tuple[float, float, float]
+    batches: int
+    readings: int
+
+
+def make_reference(blocks: Sequence[Block], settings: Stillness) -> Reference | int:
+    """Noise of blocks at rest, or the place of the last block that moved among them."""
+    variances = np.array([b.variance for b in blocks])
+    median = np.median(variances, axis=0)
+    limit = _moving_ratio(settings, blocks[0].count)
+    moving = np.flatnonzero((variances > limit * median).any(axis=1))
+    if len(moving):
+        return int(moving[-1])
+    pooled, readings = _pooled(blocks)
+    return Reference(
+        variance=_triple(pooled),
+        readings=readings,
+        block_variance=_triple(_neighbour_variance(_means(blocks))),
+        blocks=len(blocks),
+    )
+
+
+def motion(
+    block: Block,
+    previous: Block | None,
+    reference: Reference | None,
+    settings: Stillness,
+    micro_g_per_code: FloatArray,
+) -> str:
+    """Why a block is not at rest, in words; "" when it is."""
+    if previous is not None and previous.index == block.index - 1:
+        step = np.abs((block.mean - previous.mean) * micro_g_per_code)
+        axis = int(np.argmax(step))
+        if step[axis] > settings.moving_step_micro_g:
+            return f"moved by {step[axis]:.0f} micro-g on {AXES[axis]}"
+    if reference is not None:
+        ratio = np.array(block.variance) / _at_least(reference.variance)
+        axis = int(np.argmax(ratio))
+        if ratio[axis] > _moving_ratio(settings, block.count):
+            return f"shaken: variance on {AXES[axis]} {ratio[axis]:.1f} times that at rest"
+    return ""
+
+
+def refusals(
+    watched: Sequence[Block],
+    dwell: slice,
+    reference: Reference,
+    settings: Stillness,
+    micro_g_per_code: FloatArray,
+) -> list[str]:
+    """Why an average is not to be trusted, each in words; empty when it is.
+
+    `watched[dwell]` is averaged; what lies before and behind it is its guard: a slip near an end
+    of the dwell shows against it.
+    """
+    scale = np.abs(micro_g_per_code)
+    averaged = watched[dwell]
+    found = _slip(watched, dwell.start, reference, settings, scale)
+    if not found:
+        found = _slope(averaged, settings, scale)
+    found += _noise(averaged, reference, settings)
+    u_micro_g = np.array(average(averaged, settings, micro_g_per_code).u_code) * scale
+    axis = int(np.argmax(u_micro_g))
+    if u_micro_g[axis] > settings.u_max_micro_g:
+        found.append(
+            f"u(A) of {AXES[axis]} is {u_micro_g[axis]:.1f} micro-g, "
+            f"more than {settings.u_max_micro_g:g}"
+        )
+    return found
+
+
+def average(dwell: Sequence[Block], settings: Stillness, micro_g_per_code: FloatArray) -> Average:
+    """Mean of a dwell, u(A) from batch means (GUM 4.2 with batches as the observations).
+
+    Batches, because filtered samples are correlated: s / sqrt(n) would be far too small.
+    """
+    readings = sum(b.count for b in dwell)
+    totals = [sum(b.total[axis] for b in dwell) for axis in range(3)]
+    size = len(dwell) // settings.batches
+    means = np.array(
+        [
+            [sum(b.total[axis] for b in part) / sum(b.count for b in part) for axis in range(3)]
+            for part in (dwell[i * size : (i + 1) * size] for i in range(settings.batches))
+        ]
+    )
+    floor = settings.allan_floor_micro_g / np.abs(micro_g_per_code)
+    u_squared = np.var(means, axis=0, ddof=1) / settings.batches + floor**2
+    return Average(
+        mean_code=_triple(np.array([total / readings for total in totals])),
+        u_code=_triple(np.sqrt(u_squared)),
+        batch_sd_code=_triple(np.sqrt(u_squared * settings.batches)),
+        batches=settings.batches,
+        readings=readings,
+    )
+
+
+def slope_micro_g_per_min(
+    blocks: Sequence[Block], micro_g_per_code: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Slope of the means of three or more blocks and its t value, shapes (3,)."""
+    t_s = np.array([b.index for b in blocks], np.float64)
+    t_s -= t_s.mean()
+    means = _means(blocks) * np.abs(micro_g_per_code)
+    centred = means - means.mean(axis=0)
+    slope = t_s @ centred / (t_s @ t_s)
+    rest = centred - np.outer(t_s, slope)
+    u = np.sqrt((rest**2).sum(axis=0) / max(len(blocks) - 2, 1) / (t_s @ t_s))
+    return slope * 60.0, slope / np.maximum(u, np.finfo(float).tiny)
+
+
+def _moving_ratio(settings: Stillness, count: int) -> float:
+    """Limit of a block's variance ratio; sqrt(2 / (n - 1)) is the deviation of a variance."""
+    return float(1.0 + settings.moving_sigma * np.sqrt(2.0 / max(count - 1, 1)))
+
+
+def _slip(
+    blocks: Sequence[Block],
+    start: int,
+    reference: Reference,
+    settings: Stillness,
+    scale: FloatArray,
+) -> list[str]:
+    """The largest step between what lies before and after any moment, as a t value."""
+    means = _means(blocks)
+    n = len(means)
+    if n < 4:
+        return []
+    own = _neighbour_variance(means)
+    shared = np.array(reference.block_variance)
+    noise = _at_least((own * n + shared * reference.blocks) / (n + reference.blocks))
+    sums = np.cumsum(means - means[0], axis=0)
+    # Two blocks at least on either side: one alone is the motion detector's business.
+    split = np.arange(2, n - 1)
+    left = sums[split - 1] / split[:, None]
+    right = (sums[-1] - sums[split - 1]) / (n - split)[:, None]
+    t = np.abs(right - left) / np.sqrt(noise * (1.0 / split + 1.0 / (n - split))[:, None])
+    at, axis = np.unravel_index(int(np.argmax(t)), t.shape)
+    if t[at, axis] <= settings.slip_t:
+        return []
+    size = abs(right[at, axis] - left[at, axis]) * scale[axis]
+    moment = int(split[at]) - start
+    return [f"slip of {size:.0f} micro-g on {AXES[axis]} at {moment} s"]
+
+
+def _slope(dwell: Sequence[Block], settings: Stillness, scale: FloatArray) -> list[str]:
+    slope, t = slope_micro_g_per_min(dwell, scale)
+    axis = int(np.argmax(np.abs(t)))
+    if abs(t[axis]) <= settings.slope_t:
+        return []
+    return [f"creep of {slope[axis]:+.1f} micro-g/min on {AXES[axis]}"]
+
+
+def _noise(dwell: Sequence[Block], reference: Reference, settings: Stillness) -> list[str]:
+    pooled, readings = _pooled(dwell)
+    ratio = pooled / _at_least(reference.variance)
+    limit = 1.0 + settings.noise_sigma * np.sqrt(2.0 / readings + 2.0 / reference.readings)
+    axis = int(np.argmax(ratio))
+    if ratio[axis] > limit:
+        return [f"noise on {AXES[axis]} {ratio[axis]:.2f} times that at rest"]
+    return []
+
+
+def _means(blocks: Sequence[Block]) -> FloatArray:
+    return np.array([b.mean for b in blocks])
+
+
+def _pooled(blocks: Sequence[Block]) -> tuple[FloatArray, int]:
+    """Pooled variance of one reading, shape (3,), and its degrees of freedom."""
+    weights = np.array([b.count - 1 for b in blocks], np.float64)
+    pooled = weights @ np.array([b.variance for b in blocks]) / weights.sum()
+    return np.asarray(pooled, np.float64), int(weights.sum())
+
+
+def _neighbour_variance(means: FloatArray) -> FloatArray:
+    """Variance of a block mean from the differences of neighbours (von Neumann).
+
+    A slip, creep or drift hardly enters.
+    """
+    differences = np.diff(means, axis=0)
+    return np.asarray((differences**2).sum(axis=0) / (2.0 * len(differences)), np.float64)
+
+
+def _at_least(variance: FloatArray | tuple[float, float, float]) -> FloatArray:
+    """A variance, no smaller than that of rounding to a code: noise can hide in one code."""
+    return np.maximum(np.asarray(variance, np.float64), 1.0 / 12.0 / 1e4)
+
+
+def _triple(values: FloatArray) -> tuple[float, float, float]:
+    return (float(values[0]), float(values[1]), float(values[2]))
