@@ -1,4 +1,4 @@
-"""certificate.dcc.xml against the documented order of elements; triax_calib.a2l against the plan."""
+"""The certificate against the documented order of its elements, the A2L against the plan."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Tags(HTMLParser):
         if tag not in VOID:
             self.open.append(tag)
 
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_startendtag(self, _tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.attributes += attrs
 
     def handle_endtag(self, tag: str) -> None:
@@ -97,12 +97,12 @@ def test_page_shows_constants_hashes_and_positions(passports: dict[str, Passport
     assert page.count("<circle") == 2 * dwells + 12 * len(p.delivery.calibration.points)
 
 
-def test_a_mark_lies_where_the_error_is(passports: dict[str, Passport]) -> None:
+def test_marks_lie_where_the_values_are() -> None:
     frame = Frame((-40.0, 70.0), (-1.0, 3.0))
     assert (frame.x(-40.0), frame.x(70.0)) == (40.0, 224.0)
     assert (frame.y(3.0), frame.y(-1.0)) == (8.0, 130.0)
-    assert ticks(-0.93, 3.1, 4) == [0.0, 1.0, 2.0, 3.0] or ticks(-0.93, 3.1, 4)[1] == 1.0
-    assert passports["AT-SIM"].worst_over_temperature.shape[1] == 4
+    assert ticks(-0.93, 3.07, 4) == [0.0, 1.0, 2.0, 3.0]
+    assert ticks(-40.0, 70.0, 5) == [-25.0, 0.0, 25.0, 50.0]
 
 
 def test_json_has_the_numbers_of_the_page(passports: dict[str, Passport]) -> None:
@@ -153,7 +153,7 @@ def test_tools_and_warnings_are_shown_and_escaped(passports: dict[str, Passport]
 
 def test_digits_follow_the_uncertainty() -> None:
     assert with_uncertainty(-0.5506091236, 7.2e-6, 1e3) == ("\u2212550.6091", "0.0072")
-    assert with_uncertainty(1234.5, 96.0) == ("+1234", "96") or True
+    assert with_uncertainty(1234.6, 96.0) == ("+1235", "96")
     assert with_uncertainty(1.5, 0.0) == ("+1.500000000", "0.000000000")
     assert g_in_words(2.69e-6) == "2.69 µg"
     assert g_in_words(1e-3) == "1.00 mg"
@@ -192,9 +192,8 @@ def test_a_limit_that_is_not_met_says_by_what_factor_and_why(
         deliver(edited(tmp_path, "AT-SIM", extra))
     message = str(caught.value)
     assert why in message
-    found = re.search(
-        r"= ([\d.]+) mg in .* ([\d.e+]+) times the limit.* most ([\d.e-]+) mg", message
-    )
+    numbers = r"= ([\d.]+) mg in .* ([\d.e+]+) times the limit.* most ([\d.e-]+) mg"
+    found = re.search(numbers, message)
     assert found is not None, message
     error, factor, limit = map(float, found.groups())
     # Four and three digits.

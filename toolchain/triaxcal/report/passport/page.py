@@ -25,6 +25,9 @@ from triaxcal.report.passport.words import (
 from triaxcal.report.temperatures import degrees
 from triaxcal.uncertainty.budget import Budget, Line
 
+_NEGLIGIBLE = 1e-9
+"""Of the variance: no sensitivity is shown beside it."""
+
 
 def passport_html(p: Passport) -> bytes:
     """HTML of a passport: no network, no clock, no script."""
@@ -158,7 +161,7 @@ def _budget(b: Budget, title: str, orientation: str) -> dict[str, Any]:
 
 def _line(line: Line, unit: str) -> dict[str, Any]:
     known = line.contribution is not None
-    sensitivity = "" if not line.sensitivity else _sensitivity(line, unit)
+    sensitivity = "" if line.share < _NEGLIGIBLE else _sensitivity(line, unit)
     return {
         "name": line.name.removeprefix("the "),
         "origin": line.origin,
