@@ -6,6 +6,9 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 DEVELOPER := $(VENV)/.developer
 
+# A file stays on one core, so that its compiled fixtures are made once.
+PYTEST := $(BIN)/pytest -q -n auto --dist loadfile
+
 export UNIT
 
 # A unit is named, not given by path: the command line takes paths.
@@ -37,7 +40,7 @@ simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated un
 	@$(BIN)/triaxcal simulate "units/$$UNIT"
 
 test: $(DEVELOPER)  ## Tests (under 3 minutes)
-	@$(BIN)/pytest -q -m "not slow"
+	@$(PYTEST) -m "not slow"
 
 check: lint types test  ## What CI runs: lint, types, tests
 
@@ -49,7 +52,7 @@ types: $(DEVELOPER)
 	@$(BIN)/mypy
 
 nightly: $(DEVELOPER)  ## The slow campaigns as well
-	@$(BIN)/pytest -q
+	@$(PYTEST)
 
 golden: $(DEVELOPER)  ## Write the golden files anew; look at the difference before committing it
 	@$(BIN)/pytest -q tests/test_golden.py --update-golden

@@ -12,9 +12,9 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import can
 import numpy as np
 
-import can
 from triaxcal.rig.candump import format_frames, parse
 from triaxcal.rig.dbc import default_dbc, load_database, read_dbc
 from triaxcal.rig.frames import concatenate

@@ -177,7 +177,10 @@ def edited(tmp_path: Path, name: str, extra: str, change: Callable[[str], str] =
 @pytest.mark.parametrize(
     ("extra", "why"),
     [
-        ("\n[limits]\nat_t0_g = 1e-7\nover_range_g = 1e-6\n", "noise and placement are too large for this limit"),
+        (
+            "\n[limits]\nat_t0_g = 1e-7\nover_range_g = 1e-6\n",
+            "noise and placement are too large for this limit",
+        ),
         (
             '\n[compensation]\nmethod = "additive-simplified"\n[limits]\nover_range_g = 1e-4\n',
             "choose another compensation.method",

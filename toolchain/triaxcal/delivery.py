@@ -229,13 +229,13 @@ def _refuse_beyond_limits(delivery: Delivery) -> None:
     unit = delivery.unit
     chosen = next(m for m in delivery.methods if m.method == unit.method)
     for residual in chosen.residuals:
-        dwell = residual.dwell
+        dwell, error_g = residual.dwell, abs(residual.error_g)
         limit, key = unit.limits.at(dwell.temp_degc, unit.t0_degc)
-        if abs(residual.error_g) > limit:
+        if error_g > limit:
             raise RefusedError(
                 f"{delivery.measurements.source}, row {dwell.row}",
-                f"| |a| - g | = {abs(residual.error_g) * 1e3:.4g} mg in {dwell.position} at "
-                f"{dwell.temp_degc:.4g} degC by the compiled C, {abs(residual.error_g) / limit:.3g} "
+                f"| |a| - g | = {error_g * 1e3:.4g} mg in {dwell.position} at "
+                f"{dwell.temp_degc:.4g} degC by the compiled C, {error_g / limit:.3g} "
                 "times the limit, which the fitted model keeps",
                 expected=f"at most {limit * 1e3:g} mg ({key})",
                 remedy=(

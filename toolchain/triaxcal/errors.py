@@ -1,8 +1,9 @@
-"""The error a user can cause, told in one line.
+"""The errors a user can cause, each told in one line.
 
-A wrong command line is click's own error, exit code 2; everything else that a user can cause is a
-`RefusedError`, exit code 1. Every message says where (file, row, key), what was found, what was
-expected and what to do.
+RefusedError            the data or the result was refused: exit code 1
+  UsageError            what was asked for does not exist or fit together: exit code 2
+
+Every message says where (file, row, key), what was found, what was expected and what to do.
 """
 
 from __future__ import annotations
@@ -36,3 +37,9 @@ class RefusedError(Exception):
         if remedy:
             text += f"; {remedy}"
         super().__init__(" ".join(text.split()))
+
+
+class UsageError(RefusedError):
+    """The command line is wrong in a way that click cannot know."""
+
+    exit_code = 2

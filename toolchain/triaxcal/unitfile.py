@@ -100,6 +100,11 @@ class ThermalChoice:
     knots_degc: tuple[float, ...] | None
 
 
+def near_t0(temp_degc: float, t0_degc: float) -> bool:
+    """Whether a dwell counts as one at T0."""
+    return abs(temp_degc - t0_degc) <= T0_TOLERANCE_DEGC
+
+
 @dataclass(frozen=True)
 class Limits:
     """Largest | |a| - g | accepted after compensation, P1 (13), in g."""
@@ -109,7 +114,7 @@ class Limits:
 
     def at(self, temp_degc: float, t0_degc: float) -> tuple[float, str]:
         """Limit at a temperature, g, and its key."""
-        if abs(temp_degc - t0_degc) <= T0_TOLERANCE_DEGC:
+        if near_t0(temp_degc, t0_degc):
             return self.at_t0_g, "limits.at_t0_g"
         return self.over_range_g, "limits.over_range_g"
 

@@ -16,6 +16,7 @@ from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
+from triaxcal.unitfile import near_t0
 
 LENGTH = 3
 
@@ -108,7 +109,8 @@ class Passport:
     def acceptance(self) -> tuple[Acceptance, ...]:
         """Limits at T0 and over the range."""
         limits, u = self.delivery.unit.limits, self.uncertainty
-        at_t0 = [r for r in self.delivered.residuals if r.at_t0]
+        t0_degc = self.delivery.unit.t0_degc
+        at_t0 = [r for r in self.delivered.residuals if near_t0(r.dwell.temp_degc, t0_degc)]
         worst = int(np.argmax(u.force_u[u.t0_index, :, LENGTH]))
         t0_budget = u.force_budget(LENGTH, u.t0_index, DIRECTIONS[worst])
         return (
