@@ -84,10 +84,10 @@ $(INSTALLED): pyproject.toml constraints.txt
 	@echo "setting up $(VENV) (once, about half a minute) ..."
 	@python3 -m venv $(VENV) || { rm -rf $(VENV); \
 	    echo "make: python3 cannot make an environment; sudo apt-get install python3-venv" >&2; exit 1; }
-	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e .
 	@touch $@
 
 $(DEVELOPER): $(INSTALLED)
 	@echo "adding the developers' tools to $(VENV) (once) ..."
-	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,rig]'
+	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[dev,rig]'
 	@touch $@
