@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
-import traceback
 from pathlib import Path
 
 import click
 
 from triaxcal import __version__
 from triaxcal.cli.entry import INTERRUPTED
-from triaxcal.cli.rig import rig
-from triaxcal.cli.target import target
-from triaxcal.cli.verify import verify
 from triaxcal.errors import RefusedError
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class _Commands(click.Group):
+    """Commands of their own files are imported when they are asked for: `calib` waits for none."""
+
+    OTHERS = ("rig", "target", "verify")
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted([*super().list_commands(ctx), *self.OTHERS])
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.OTHERS:
+            return super().get_command(ctx, cmd_name)
+        command = getattr(importlib.import_module(f"triaxcal.cli.{cmd_name}"), cmd_name)
+        assert isinstance(command, click.Command)
+        return command
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="triaxcal")
 def main() -> None:
     """From tilter readings of a triaxial accelerometer to verified fixed-point C."""
@@ -58,11 +71,6 @@ def simulate(unit: Path, seed: int | None) -> None:
     click.echo(f"{write_simulated_unit(unit, seed)} written")
 
 
-main.add_command(rig)
-main.add_command(target)
-main.add_command(verify)
-
-
 def run() -> None:
     """Run the command line; one line and an exit code for whatever a user can cause."""
     try:
@@ -85,6 +93,8 @@ def run() -> None:
         _leave(f"triaxcal: {error.filename or 'output or temporary folder'}: {reason}", 1)
     except Exception as fault:
         # Nothing a user does should come here. One line all the same, with the place for a report.
+        import traceback  # noqa: PLC0415  only for this
+
         frame = traceback.extract_tb(fault.__traceback__)[-1]
         place = f"{Path(frame.filename).name}:{frame.lineno}"
         _leave(
