@@ -37,6 +37,28 @@ def publish(files: Mapping[str, bytes], target: Path) -> None:
         shutil.rmtree(staging, ignore_errors=True)
 
 
+def renew(files: Mapping[str, bytes], target: Path) -> None:
+    """Give files of the folder `target` new content, each in one step.
+
+    Raises
+    ------
+    RefusedError
+        When the disk refuses; a file is then either as it was or new.
+    """
+    for name, content in files.items():
+        try:
+            handle, staging = tempfile.mkstemp(prefix=f".{name}.", dir=target)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(content)
+                Path(staging).chmod(0o666 & ~_umask())
+                Path(staging).replace(target / name)
+            finally:
+                Path(staging).unlink(missing_ok=True)
+        except OSError as error:
+            raise _refusal(target / name, error) from error
+
+
 def _replace(staging: Path, target: Path) -> None:
     if not target.exists():
         staging.rename(target)
