@@ -8,8 +8,13 @@ DEVELOPER := $(VENV)/.developer
 
 export UNIT
 
+# A unit is named, not given by path: the command line takes paths.
+NAMED = case "$$UNIT" in \
+    "") echo "make: UNIT is missing; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; \
+    */*) echo "make: UNIT=$$UNIT is a path; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; esac
+
 .DEFAULT_GOAL := help
-.PHONY: help calib-header verify simulate test check lint types nightly bench golden clean test-targets
+.PHONY: help calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -17,16 +22,18 @@ help:  ## List the targets
 	@echo "  Units:" $$(ls units)
 
 calib-header: $(INSTALLED)  ## UNIT=<name>: fit, generate, prove and cross-check the C of a unit
-	@if [ -z "$$UNIT" ]; then \
-	    echo "make: UNIT is missing; say make calib-header UNIT=<name>, one of:" $$(ls units) >&2; exit 1; fi
+	@$(NAMED)
 	@$(BIN)/triaxcal calib "units/$$UNIT"
 
 verify: $(INSTALLED)  ## UNIT=<name>: Gappa, Frama-C, cppcheck, gcc and clang on the C of a unit
-	@if [ -z "$$UNIT" ]; then \
-	    echo "make: UNIT is missing; say make verify UNIT=<name>, one of:" $$(ls units) >&2; exit 1; fi
+	@$(NAMED)
 	@$(BIN)/triaxcal verify "units/$$UNIT"
 
+fuzz: $(DEVELOPER)  ## Images against the loaders, text against the parsers, for a minute
+	@$(BIN)/python fuzz/run.py
+
 simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated unit again
+	@$(NAMED)
 	@$(BIN)/triaxcal simulate "units/$$UNIT"
 
 test: $(DEVELOPER)  ## Tests (under 3 minutes)
@@ -53,12 +60,15 @@ bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 test-targets: $(INSTALLED)  ## The generated C on other cores under QEMU (all shapes, or UNIT=<name>)
 	@$(BIN)/triaxcal target test $${UNIT:+"units/$$UNIT"}
 
+bench-target: $(INSTALLED)  ## What a call costs on each core, beside floating point; into docs/targets.md
+	@$(BIN)/triaxcal target bench --page docs/targets.md
+
 clean:  ## Remove what make made
 	rm -rf build $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 $(INSTALLED): pyproject.toml constraints.txt
 	@command -v python3 >/dev/null || { echo "make: python3 not found; sudo apt-get install python3" >&2; exit 1; }
-	@echo "setting up $(VENV) (once) ..."
+	@echo "setting up $(VENV) (once, about half a minute) ..."
 	@python3 -m venv $(VENV) || { rm -rf $(VENV); \
 	    echo "make: python3 cannot make an environment; sudo apt-get install python3-venv" >&2; exit 1; }
 	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .

@@ -5,11 +5,14 @@
 static void run(const triax_calib_t *calib, size_t count, const int32_t *temp_code,
                 const int32_t *raw_code, int32_t *accel, uint32_t *status)
 {
+    triax_state_t state = {{{0}}};
+    uint32_t temp_status = 0;
     size_t i;
     for (i = 0; i < count; i++) {
-        triax_state_t state;
-        status[i] = triax_set_temperature(&state, calib, temp_code[i]);
-        status[i] |= triax_apply(&state, &raw_code[3 * i], &accel[3 * i]);
+        if (i == 0 || temp_code[i] != temp_code[i - 1]) {
+            temp_status = triax_set_temperature(&state, calib, temp_code[i]);
+        }
+        status[i] = temp_status | triax_apply(&state, &raw_code[3 * i], &accel[3 * i]);
     }
 }
 

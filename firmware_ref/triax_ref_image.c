@@ -107,15 +107,18 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
 uint32_t triax_ref_batch(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
                          const int32_t *raw_code, int32_t *accel, uint32_t *status)
 {
-    static triax_ref_t ref;
+    triax_ref_t ref;
+    triax_ref_state_t state = {{{0}}, {0}};
+    uint32_t temp_status = 0;
     size_t i;
     if (triax_ref_open(&ref, image, size) != TRIAX_REF_OK) {
         return TRIAX_REF_BAD_IMAGE;
     }
     for (i = 0; i < count; i++) {
-        triax_ref_state_t state;
-        status[i] = triax_ref_set_temperature(&state, &ref, temp_code[i]);
-        status[i] |= triax_ref_apply(&state, &ref, &raw_code[3 * i], &accel[3 * i]);
+        if (i == 0 || temp_code[i] != temp_code[i - 1]) {
+            temp_status = triax_ref_set_temperature(&state, &ref, temp_code[i]);
+        }
+        status[i] = temp_status | triax_ref_apply(&state, &ref, &raw_code[3 * i], &accel[3 * i]);
     }
     return TRIAX_REF_OK;
 }

@@ -47,11 +47,9 @@ MUTANTS: dict[str, list[Mutant]] = {
         Mutant("sign of a product", "+ ((int64_t)state->row[0][1]", "- ((int64_t)state->row[0][1]"),
         Mutant("wrong coefficient", "horner_step(c[1], x_q31, p)", "horner_step(c[0], x_q31, p)"),
         Mutant("Horner started low", "int32_t p = c[2];", "int32_t p = c[1];"),
-        Mutant(
-            "wrong function", "coefficient[(4u * i) + j], x_q31", "coefficient[(3u * i) + j], x_q31"
-        ),
+        Mutant("wrong function", "coefficient[4u + j], x_q31", "coefficient[3u + j], x_q31"),
         Mutant("origin forgotten", "code - segment->origin_code", "code - segment->first_code"),
-        Mutant("gain halved", "* segment->gain;", "* (segment->gain / 2);"),
+        Mutant("gain halved", "* segment->gain);", "* (segment->gain / 2));"),
     ],
     "direct-left-justified-piecewise": [
         Mutant("segment starts one late", "code >= calib->segment[i]", "code > calib->segment[i]"),

@@ -79,7 +79,7 @@ def inverted(plan: Plan, rows: Rows) -> Rows:
     k = [row[:3] for row in rows]
     u0 = [row[3] for row in rows]
     adj = [
-        [sat32(floor_of(int64(_cofactor(k, j, i)), shifts.adjugate_shift)) for j in range(3)]
+        [sat32(floor_of(int64(cofactor(k, j, i)), shifts.adjugate_shift)) for j in range(3)]
         for i in range(3)
     ]
     det = int64(sum(floor_of(int64(k[0][j] * adj[j][0]), 2) for j in range(3)))
@@ -99,7 +99,7 @@ def inverted(plan: Plan, rows: Rows) -> Rows:
     return result
 
 
-def _cofactor(k: Rows, i: int, j: int) -> int:
+def cofactor(k: Rows, i: int, j: int) -> int:
     """Signed minor of element i, j: the row and the column struck out."""
     a, b, c, d = (k[r][s] for r in range(3) if r != i for s in range(3) if s != j)
     return (-1) ** (i + j) * (a * d - b * c)
@@ -191,8 +191,8 @@ def real_gain_and_offset(plan: Plan, code: int) -> list[list[Fraction]]:
         shifts.reciprocal_log2 + 2 + shifts.determinant_shift - shifts.gain_shift
     )
     k = [row[:3] for row in rows]
-    det = sum(k[0][j] * _cofactor(k, 0, j) for j in range(3))
-    inverse = [[scale * _cofactor(k, j, i) / det for j in range(3)] for i in range(3)]
+    det = sum(k[0][j] * cofactor(k, 0, j) for j in range(3))
+    inverse = [[scale * cofactor(k, j, i) / det for j in range(3)] for i in range(3)]
     return [[*n, -sum(n[j] * rows[j][3] for j in range(3)) / 2**32] for n in inverse]
 
 

@@ -232,6 +232,9 @@ COVERING: dict[str, Shape] = {
     "direct-order-9-eight-segments": integer_shape(
         segments=8, order=9, output_shift=48, raw=(-3_000_001, 5_123_456)
     ),
+    "direct-27-bit": integer_shape(order=2, output_shift=34, raw=(-(2**26), 2**26 - 1)),
+    "direct-16-bit": integer_shape(order=4, output_shift=45, raw=(-(2**15), 2**15 - 1)),
+    "direct-16-bit-two-spare": integer_shape(order=1, output_shift=34, raw=(-40_000, 40_001)),
     "direct-saturating-32": integer_shape(order=2, output_shift=32, raw=_FULL32),
     "direct-saturating-28-order-0": integer_shape(order=0, output_shift=28, raw=(-1000, 999)),
     "direct-positive-codes": integer_shape(order=1, output_shift=33, raw=(0, 4095)),

@@ -3,8 +3,9 @@
  *
  * Reads a file of int32 in the host's order: the number of vectors and, for each, temp_code,
  * raw_code[3], accel[3], status; then the number of images and, for each, its size, the status
- * that triax_calib_load must return, and its bytes, one an int32. Returns 0 when every answer is
- * right; prints the first that is not.
+ * that triax_calib_load must return, and its bytes, one an int32; then, when that status is 0, what
+ * its constants answer to every vector: accel[3] and status. Returns 0 when every answer is right;
+ * prints the first that is not.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,10 +43,10 @@ static uint32_t run(const triax_calib_t *calib, const vector_t *v, int32_t accel
     return status | triax_apply(&state, accel, accel);
 }
 
-static int wrong(const vector_t *v, int same_array)
+static int wrong(const triax_calib_t *calib, const vector_t *v, int same_array)
 {
     int32_t accel[3];
-    const uint32_t status = run(&TRIAX_CALIB, v, accel, same_array);
+    const uint32_t status = run(calib, v, accel, same_array);
     if (status == v->status && accel[0] == v->accel[0] && accel[1] == v->accel[1] &&
         accel[2] == v->accel[2]) {
         return 0;
@@ -57,8 +58,17 @@ static int wrong(const vector_t *v, int same_array)
     return 1;
 }
 
+static void read_answer(FILE *file, vector_t *v)
+{
+    int i;
+    for (i = 0; i < 3; i++) {
+        v->accel[i] = next(file);
+    }
+    v->status = (uint32_t)next(file);
+}
+
 /* The image lies in a block of just its size, so that a sanitizer sees one byte too many read. */
-static int image_wrong(FILE *file, int number, const vector_t *vectors, int32_t count)
+static int image_wrong(FILE *file, int number, vector_t *vectors, int32_t count)
 {
     const size_t size = (size_t)next(file);
     const uint32_t expected = (uint32_t)next(file);
@@ -71,17 +81,22 @@ static int image_wrong(FILE *file, int number, const vector_t *vectors, int32_t 
     }
     found = triax_calib_load(&calib, image, size);
     free(image);
-    if (found == TRIAX_STATUS_OK) {
-        int32_t i;
-        for (i = 0; i < count; i++) {
-            int32_t accel[3];
-            (void)run(&calib, &vectors[i], accel, 0);
-        }
-    }
     if (found != expected) {
         printf("image %d: found status %lu, expected %lu\n", number, (unsigned long)found,
                (unsigned long)expected);
         return 1;
+    }
+    if (found == TRIAX_STATUS_OK) {
+        int32_t i;
+        for (i = 0; i < count; i++) {
+            read_answer(file, &vectors[i]);
+        }
+        for (i = 0; i < count; i++) {
+            if (wrong(&calib, &vectors[i], 0)) {
+                printf("with image %d\n", number);
+                return 1;
+            }
+        }
     }
     return 0;
 }
@@ -105,13 +120,10 @@ int main(int argc, char **argv)
         for (j = 0; j < 3; j++) {
             vectors[i].raw_code[j] = next(file);
         }
-        for (j = 0; j < 3; j++) {
-            vectors[i].accel[j] = next(file);
-        }
-        vectors[i].status = (uint32_t)next(file);
+        read_answer(file, &vectors[i]);
     }
     for (i = 0; i < count && !failed; i++) {
-        failed = wrong(&vectors[i], 0) || wrong(&vectors[i], 1);
+        failed = wrong(&TRIAX_CALIB, &vectors[i], 0) || wrong(&TRIAX_CALIB, &vectors[i], 1);
     }
     images = next(file);
     for (i = 0; i < images && !failed; i++) {

@@ -113,16 +113,16 @@ UNIT = "unit.toml"
 BAD_INPUT = {
     "missing position": (MEASUREMENTS, without("TP3,70"), ["TP3 missing at 70 degC"]),
     "doubled position": (MEASUREMENTS, renamed(TP3="TP4"), ["TP4 twice", "rows 18 and 19"]),
-    "unknown position": (MEASUREMENTS, renamed(TP3="TP9"), ["line 18", "'TP9'", "TP1 to TP6"]),
+    "unknown position": (MEASUREMENTS, renamed(TP3="TP9"), ["row 18", "'TP9'", "TP1 to TP6"]),
     "no T0": (
         MEASUREMENTS,
         rows(lambda lines: [line for line in lines if line[3:7] != ",20,"]),
         ["no dwells at T0 = 20 degC", "-40, 70 degC", "t0_degc"],
     ),
     "five positions": (MEASUREMENTS, without("TP6,-40"), ["TP6 missing at -40 degC"]),
-    "NaN": (MEASUREMENTS, cell("nan"), ["line 18", "ux_v", "'nan'"]),
-    "empty": (MEASUREMENTS, cell(""), ["line 18", "ux_v"]),
-    "text": (MEASUREMENTS, cell("ok"), ["line 18", "ux_v", "'ok'"]),
+    "NaN": (MEASUREMENTS, cell("nan"), ["row 18", "ux_v", "'nan'"]),
+    "empty": (MEASUREMENTS, cell(""), ["row 18", "ux_v"]),
+    "text": (MEASUREMENTS, cell("ok"), ["row 18", "ux_v", "'ok'"]),
     "exchange on an axis": (
         MEASUREMENTS,
         renamed(TP1="TP3", TP3="TP1"),
@@ -139,7 +139,7 @@ BAD_INPUT = {
         lambda text: text.replace("ux_v,uy_v,uz_v", "ux_mv,uy_mv,uz_mv"),
         ["V taken for mV"],
     ),
-    "beyond the converter": (MEASUREMENTS, cell("2.6"), ["line 18", "2.6", "2.5"]),
+    "beyond the converter": (MEASUREMENTS, cell("2.6"), ["row 18", "2.6", "2.5"]),
     "singular": (
         MEASUREMENTS,
         rows(
@@ -250,10 +250,79 @@ def test_a_refusal_leaves_the_last_result(bench: Path) -> None:
 
 
 def test_another_run_replaces_the_result(bench: Path) -> None:
+    target = bench / "build" / "AT-CHERNIAK"
     assert run("calib", "units/AT-CHERNIAK", cwd=bench).returncode == 0
-    (bench / "build" / "AT-CHERNIAK" / "stale.h").write_text("old")
+    (target / "triax_calib.h").write_text("damaged")
     assert run("calib", "units/AT-CHERNIAK", cwd=bench).returncode == 0
-    assert sorted(p.name for p in (bench / "build" / "AT-CHERNIAK").iterdir()) == FILES
+    assert "TRIAX_CALIB" in (target / "triax_calib.h").read_text()
+    assert [p.name for p in (bench / "build").iterdir()] == ["AT-CHERNIAK"]
+
+
+def test_nobody_elses_files_are_replaced(bench: Path) -> None:
+    # The unit's own folder, named as the place to build in.
+    before = sorted(p.name for p in (bench / "units" / "AT-CHERNIAK").iterdir())
+    result = run("calib", "units/AT-CHERNIAK", "--build", "units", cwd=bench)
+    assert result.returncode == 1
+    assert "units/AT-CHERNIAK: holds 'measurements.csv'" in result.stderr
+    assert sorted(p.name for p in (bench / "units" / "AT-CHERNIAK").iterdir()) == before
+    # A symbolic link.
+    (bench / "build").mkdir()
+    (bench / "build" / "AT-CHERNIAK").symlink_to(bench / "units")
+    result = run("calib", "units/AT-CHERNIAK", cwd=bench)
+    assert result.returncode == 1
+    assert "is not a folder of results" in result.stderr
+    assert (bench / "build" / "AT-CHERNIAK").is_symlink()
+
+
+def in_thermal(text: str) -> Callable[[str], str]:
+    return lambda unit: unit.replace("[thermal]", f"[thermal]\n{text}")
+
+
+def test_a_range_without_dwells(bench: Path) -> None:
+    edit(bench, UNIT, in_thermal("range_degc = [30, 40]"))
+    line = refused(bench, "calib", "units/AT-CHERNIAK")
+    assert "no dwell of" in line
+    assert "30 to 40 degC" in line
+
+
+def test_no_dwell_at_t0_is_said(bench: Path) -> None:
+    edit(bench, UNIT, in_thermal("range_degc = [30, 70]"))
+    result = run("calib", "units/AT-CHERNIAK", cwd=bench)
+    assert result.returncode == 0, result.stderr
+    assert "no dwell to check at T0" in result.stdout
+    assert "12 of the dwells lie outside the range" in " ".join(result.stdout.split())
+
+
+def test_a_wrong_reading_is_blamed_and_not_another(bench: Path) -> None:
+    # TP3 at 70 degC: 0.5484 V in z becomes 0.5584 V, 18 mg.
+    edit(bench, MEASUREMENTS, lambda text: text.replace("0.54755949", "0.55755949"))
+    line = refused(bench, "calib", "units/AT-CHERNIAK")
+    assert "rows 16 and 18" in line
+    assert "mean of TP1 and TP3" in line
+    assert "in output z" in line
+
+
+def test_coarse_output_is_blamed_on_the_settings(bench: Path) -> None:
+    # g = 1.00136: at 1/256 g a code it becomes 1, 1.36 mg off.
+    edit(bench, UNIT, lambda text: text.replace("9.80665", "9.82"))
+    edit(bench, UNIT, lambda text: text + "\n[compensation]\noutput_q = 8\n")
+    line = refused(bench, "calib", "units/AT-CHERNIAK")
+    assert "LSB is 3.91 mg" in line
+    assert "output_q" in line
+
+
+def test_a_failing_compiler(bench: Path) -> None:
+    fake = bench / "bin"
+    fake.mkdir()
+    for script, words in (
+        ("#!/bin/sh\nexit 0\n", "made no library that loads"),
+        ("#!/bin/sh\necho x.c:1: error: no >&2\nexit 1\n", "x.c:1: error: no"),
+        ("#!/nonexistent\n", "cannot be run"),
+    ):
+        (fake / "gcc").write_text(script)
+        (fake / "gcc").chmod(0o755)
+        line = refused(bench, "calib", "units/AT-CHERNIAK", environment={"PATH": f"{fake}:/bin"})
+        assert words in line
 
 
 @pytest.mark.parametrize("delay_s", [0.1, 0.4, 0.8, 1.2])

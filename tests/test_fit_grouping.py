@@ -117,8 +117,19 @@ def test_arrays_carry_the_statistics_only_when_every_dwell_has_them():
     assert arrays.variance_v2 is None
 
 
-def test_a_quiet_channel_has_the_variance_of_its_codes():
-    quiet = measured(sd_v=0.0, count=50)
-    arrays = grouped_readings(group_dwells(quiet, 20.0), volts_per_code=3e-7)
-    assert arrays.variance_v2 is not None
-    np.testing.assert_array_equal(arrays.variance_v2, 3e-7**2 / 12.0 / 50)
+def test_a_quiet_channel_has_the_rounding_of_its_codes_whatever_the_count():
+    code_v = 3e-7
+    for sd_codes, rounding in ((0.0, 1.0), (0.49, 1.0), (0.51, 0.0)):
+        data = measured(sd_v=sd_codes * code_v / np.sqrt(50), count=50)
+        arrays = grouped_readings(group_dwells(data, 20.0), volts_per_code=code_v)
+        assert arrays.variance_v2 is not None
+        expected = (sd_codes * code_v) ** 2 / 50 + rounding * code_v**2 / 12.0
+        np.testing.assert_allclose(arrays.variance_v2, expected, rtol=8 * np.finfo(float).eps)
+
+
+def test_a_drifting_temperature_is_refused():
+    temps = [20.0, 20.8, 21.6, 22.4, 23.2, 24.0]
+    base = measured((20.0,))
+    dwells = tuple(replace(d, temp_degc=t) for d, t in zip(base.dwells, temps, strict=True))
+    message = refusal(replace(base, dwells=dwells))
+    assert "4 degC between dwells that belong to one temperature (20 to 24 degC)" in message

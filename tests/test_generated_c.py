@@ -27,19 +27,27 @@ from plans import (
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.routines import Answers, Generated
+from triaxcal.codegen.render import limb_split
+from triaxcal.codegen.routines import Answers, Generated, Reference
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.resources import shipped
 
 MAIN = Path(__file__).parent / "run_vectors.c"
 STRICT = [flag for flag in FLAGS if flag != "-O2"]
 SANITIZERS = ["-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-BUILDS = {"O0": ["-O0"], "O2": ["-O2"], "Os": ["-Os"], "sanitized": SANITIZERS}
+BUILDS = {
+    "O0": ["-O0"],
+    "O2": ["-O2"],
+    "Os": ["-Os"],
+    "sanitized": SANITIZERS,
+    "limbs": [*SANITIZERS, "-DTRIAX_ARITHMETIC=1"],
+}
 JOBS = [
     (shape, build)
     for shape in (*COVERING, *GOLDEN)
     for build in BUILDS
-    if build != "Os" or shape in GOLDEN  # -Os of all shapes would take seconds more
+    # "sanitized" is -O0 too, so -O0 alone and -Os run the golden shapes only: it saves seconds.
+    if build not in ("O0", "Os") or shape in GOLDEN
 ]
 
 
@@ -63,8 +71,9 @@ def adversarial_images(plan: Plan, rng: Random) -> list[tuple[bytes, int]]:
     return images
 
 
-def input_file(plan: Plan, rng: Random) -> bytes:
+def input_file(plan: Plan, reference: Reference, rng: Random) -> bytes:
     temps, raws = vectors(plan, rng, 150)
+    codes = np.array(temps, np.int32), np.array(raws, np.int32)
     words = [len(temps)]
     for temp, raw in zip(temps, raws, strict=True):
         accel, status = oracle.run(plan, temp, raw)
@@ -73,6 +82,9 @@ def input_file(plan: Plan, rng: Random) -> bytes:
     words.append(len(images))
     for image, status in images:
         words += [len(image), status, *image]
+        if status == 0:
+            answers = reference.routine(image)(*codes)
+            words += np.column_stack(answers).astype(np.int32).ravel().tolist()
     return np.array(words, dtype=np.int32).tobytes()
 
 
@@ -87,10 +99,10 @@ def compile_program(folder: Path, name: str, flags: Sequence[str]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def programs(built: dict[str, Built]) -> dict[tuple[str, str], Path]:
+def programs(built: dict[str, Built], reference: Reference) -> dict[tuple[str, str], Path]:
     """Every shape in every build, with its input file beside it."""
     for name, b in built.items():
-        (b.folder / "vectors.bin").write_bytes(input_file(b.plan, Random(name)))
+        (b.folder / "vectors.bin").write_bytes(input_file(b.plan, reference, Random(name)))
     with ThreadPoolExecutor(2) as pool:
         made = pool.map(lambda j: compile_program(built[j[0]].folder, j[1], BUILDS[j[1]]), JOBS)
         return dict(zip(JOBS, made, strict=True))
@@ -136,11 +148,18 @@ def test_the_sanitizers_are_awake(built: dict[str, Built], tmp_path: Path) -> No
     accel, status = oracle.run(b.plan, 0, raw)
     n = -INT32_MAX  # three products of 2^62
     image = image_bytes(integer_plan(b.plan.shape, [[[n], [n], [n], [0]] * 3]))
-    words = [1, 0, *raw, *accel, status, 1, len(image), 0, *image]
+    words = [1, 0, *raw, *accel, status, 1, len(image), 0, *image, 0, 0, 0, 0]
     (tmp_path / "vectors.bin").write_bytes(np.array(words, dtype=np.int32).tobytes())
     done = run_program(program, tmp_path / "vectors.bin")
     assert (done.returncode != 0, done.stdout) == (True, "")
     assert "signed integer overflow" in done.stderr
+
+
+def test_the_shapes_split_raw_codes_in_every_way() -> None:
+    """TRIAX_LIMBS cuts a code into halves, or multiplies in int64_t where they would not do."""
+    splits = {limb_split(shape) for shape in COVERING.values()}
+    assert {0, 3, 13} <= splits
+    assert max(splits) == 13  # the most that its sums allow
 
 
 # ---- mutants ----

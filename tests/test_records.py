@@ -210,7 +210,7 @@ CELLS = [
 @pytest.mark.parametrize(("cell", "expected"), CELLS, ids=[ascii(cell)[:20] for cell, _ in CELLS])
 def test_a_wrong_cell_is_refused(tmp_path: Path, cell: str, expected: str) -> None:
     data = f"# comment\n{V_HEADER}\nTP6,20,-0.5,0,0\n\nTP5,20,{cell},0,0\n"
-    assert refusal(tmp_path, data) == f", line 5, column ux_v{expected}"
+    assert refusal(tmp_path, data) == f", row 5, column ux_v{expected}"
 
 
 @pytest.mark.parametrize(
@@ -254,13 +254,13 @@ def test_a_wrong_cell_is_refused(tmp_path: Path, cell: str, expected: str) -> No
 )
 def test_a_wrong_row_is_refused(tmp_path: Path, row: str, column: str, expected: str) -> None:
     message = refusal(tmp_path, f"{FULL_HEADER}\n{row}\n")
-    assert message.startswith(f", line 2, column {column}: {expected}")
+    assert message.startswith(f", row 2, column {column}: {expected}")
 
 
 def test_a_temperature_code_out_of_reason_shows_both(tmp_path: Path) -> None:
     message = refusal(tmp_path, "position,temp_code,ux_v,uy_v,uz_v\nTP1,128000,0.5,0,0\n")
     assert message == (
-        ", line 2, column temp_code: found '128000', which is 950 degC; expected -200 to 400 degC"
+        ", row 2, column temp_code: found '128000', which is 950 degC; expected -200 to 400 degC"
     )
 
 
@@ -302,7 +302,7 @@ HEADERS = [
 def test_a_wrong_header_is_refused(tmp_path: Path, header: str, expected: str) -> None:
     message = refusal(tmp_path, f"# comment\n{header}\nTP1,20,0.5,0,0\n")
     assert message.removesuffix("; columns: see docs/file-formats.md") == (
-        f", line 2 (header): {expected}"
+        f", row 2 (header): {expected}"
     )
 
 
@@ -330,7 +330,7 @@ def test_a_wrong_header_is_refused(tmp_path: Path, header: str, expected: str) -
 )
 def test_a_wrong_number_of_cells_is_refused(tmp_path: Path, row: str, expected: str) -> None:
     data = f"{V_HEADER}\r\nTP6,20,-0.5,0,0\r\n{row}\r\n"
-    assert refusal(tmp_path, data) == f", line 3: {expected}"
+    assert refusal(tmp_path, data) == f", row 3: {expected}"
 
 
 @pytest.mark.parametrize("data", ["", "\n\n", "# only a comment\n", "\ufeff"])
@@ -345,16 +345,16 @@ def test_a_file_without_rows_is_refused(tmp_path: Path) -> None:
 
 def test_not_utf8_names_the_line(tmp_path: Path) -> None:
     data = f"{V_HEADER}\nTP1,20,0.5,0,0\nTP2,20 °C,0.5,0,0\n".encode("latin-1")
-    assert refusal(tmp_path, data) == ", line 3: not UTF-8; save the file as CSV UTF-8"
+    assert refusal(tmp_path, data) == ", row 3: not UTF-8; save the file as CSV UTF-8"
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RefusedError) as caught:
         read_measurements(tmp_path / "measurements.csv", UNIT)
     assert str(caught.value) == (
-        f"{tmp_path}/measurements.csv: cannot be read: No such file or directory"
+        f"{tmp_path}/measurements.csv: cannot be read: no such file or directory; put the dwells there, as docs/add-a-unit.md tells"
     )
-    with pytest.raises(RefusedError, match="cannot be read: Is a directory"):
+    with pytest.raises(RefusedError, match="cannot be read: is a directory"):
         read_measurements(tmp_path, UNIT)
 
 
@@ -368,7 +368,7 @@ def test_the_declared_range_counts(tmp_path: Path) -> None:
     assert dwells[0].voltage_v.tolist() == [-2_000_000 * 2.5 / 2**23, 2_000_001 * 2.5 / 2**23, 0.0]
     message = refusal(tmp_path, f"{header}\nTP1,20,-2000001,0,0\n", unit)
     assert message == (
-        ", line 2, column ux_code: found '-2000001'; expected -2000000 to 2000001, "
+        ", row 2, column ux_code: found '-2000001'; expected -2000000 to 2000001, "
         "the range of [adc]; the ADC was saturated, or [adc] does not describe it"
     )
     message = refusal(tmp_path, f"{V_HEADER.replace('_v', '_mv')}\nTP1,20,0,0,596.5\n", unit)

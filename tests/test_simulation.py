@@ -302,7 +302,9 @@ def test_a_unit_that_was_measured_is_not_overwritten(tmp_path: Path) -> None:
     folder = copy_of(SIM, tmp_path)
     (folder / "truth.toml").unlink()
     (folder / "measurements.csv").write_text("measured", encoding="utf-8")
-    with pytest.raises(RefusedError, match=r"AT-SIM: no truth\.toml; expected one of them"):
+    with pytest.raises(
+        RefusedError, match=r"AT-SIM: no truth\.toml and no tables\.toml; expected one of the two"
+    ):
         write_simulated_unit(folder)
     assert (folder / "measurements.csv").read_text(encoding="utf-8") == "measured"
 

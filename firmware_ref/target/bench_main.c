@@ -8,7 +8,7 @@
 #include "target_io.h"
 
 static subject_state_t state;
-static subject_accel_t accel[3];
+static int32_t accel[3];
 static const int32_t LOOP_ROUNDS[] = {1, 10, 100, 1000};
 
 static void print_line(const char *name, uint32_t value)

@@ -6,7 +6,6 @@
 #include "bench_floating.h"
 typedef floating_state_t subject_state_t;
 typedef floating_calib_t subject_calib_t;
-typedef BENCH_REAL subject_accel_t;
 #define subject_set_temperature floating_set_temperature
 #define subject_apply floating_apply
 #define SUBJECT_CALIB (&FLOATING_CALIB)
@@ -14,7 +13,6 @@ typedef BENCH_REAL subject_accel_t;
 #include "triax_comp.h"
 typedef triax_state_t subject_state_t;
 typedef triax_calib_t subject_calib_t;
-typedef int32_t subject_accel_t;
 #define subject_set_temperature triax_set_temperature
 #define subject_apply triax_apply
 extern const triax_calib_t TRIAX_CALIB;

@@ -9,14 +9,13 @@ import hashlib
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-
-import numpy as np
 
 from triaxcal.codegen.compiler import Compilation
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.image_cases import check_images
 from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
 from triaxcal.codegen.routines import (
     Generated,
@@ -25,15 +24,15 @@ from triaxcal.codegen.routines import (
     start_generated,
     start_reference,
 )
-from triaxcal.codegen.tryout import MethodResult, Residual, model_error_g, run_on_dwells
+from triaxcal.codegen.tryout import MethodResult, model_error_g, run_on_dwells
 from triaxcal.errors import RefusedError
+from triaxcal.fit.acceptance import dwells_in_range, refuse_unacceptable
 from triaxcal.fit.calibrate import Calibration, calibrate
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.compensation import Compensation, compensate
-from triaxcal.model.metrological import force_from_voltage, unpack_constants
-from triaxcal.model.positions import AXES, TEST_POSITIONS
-from triaxcal.model.types import FloatArray
+from triaxcal.model.metrological import unpack_constants
+from triaxcal.model.positions import AXES
 from triaxcal.records import MEASUREMENTS_FILE, MeasurementSet, read_measurements
 from triaxcal.unitfile import METHODS, UNIT_FILE, UnitDescription, read_unit
 
@@ -87,12 +86,18 @@ def deliver(folder: Path) -> Delivery:
     with tempfile.TemporaryDirectory(prefix="triaxcal-") as name, _compilations() as started:
         work = Path(name)
         unit = read_unit(folder)
+        inputs = inputs_sha256(folder)
         started.append(start_reference(work))
         measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
         calibration = calibrate(unit, measurements)
+        refuse_unacceptable(unit, calibration, measurements)
+        dwells = dwells_in_range(unit, calibration.range_degc, measurements)
         compensation = compensation_of(unit, calibration, unit.method)
         plan = make_plan(compensation, unit)
-        inputs = inputs_sha256(folder)
+        model_error = model_error_g(unit, calibration.thermal, plan)
+        _refuse_model_error(unit, plan, model_error)
+        if inputs_sha256(folder) != inputs:
+            raise RefusedError(str(folder), "changed while it was read", remedy="run it again")
         files = _firmware_files(unit, calibration, compensation, plan, inputs)
         for file, content in files.items():
             (work / file).write_bytes(content)
@@ -102,14 +107,15 @@ def deliver(folder: Path) -> Delivery:
         reference, generated = Reference(started[0].load()), Generated(started[1].load())
         image = files[IMAGE_FILE]
         check = cross_check(plan, sets, generated, reference.routine(image), image)
+        check = replace(check, images=check_images(plan, image, generated, reference))
         _refuse_wrong_bound(unit, bound, check)
         routines = {unit.method: generated.run, **_other_routines(unit, calibration, reference)}
-        thermal, range_degc = calibration.thermal, calibration.range_degc
-        methods = run_on_dwells(unit, thermal, range_degc, measurements, routines)
+        thermal = calibration.thermal
+        methods = run_on_dwells(unit, thermal, measurements.source, dwells, routines)
         compiler = generated.compiler
     delivery = Delivery(
         unit, measurements, inputs, calibration, compensation, plan,
-        model_error_g(unit, thermal, plan), bound, check, methods, compiler, files,
+        model_error, bound, check, methods, compiler, files,
     )  # fmt: skip
     _refuse_beyond_limits(delivery)
     return delivery
@@ -196,6 +202,18 @@ def _other_routines(
     return routines
 
 
+def _refuse_model_error(unit: UnitDescription, plan: Plan, error_g: float) -> None:
+    """The order of N(T) is chosen on a grid; what counts is every temperature code."""
+    limit_g = unit.model_error_max_micro_g * 1e-6
+    if unit.method == "matrix" and error_g > limit_g:
+        raise RefusedError(
+            f"{unit.name}/unit.toml, [compensation] model_error_max_micro_g",
+            f"N(T) of order {plan.shape.order} is {error_g * 1e6:.4g} micro-g off the fitted model",
+            expected=f"at most {limit_g * 1e6:g} micro-g",
+            remedy='choose method = "inverse", or allow more',
+        )
+
+
 def _refuse_wrong_bound(unit: UnitDescription, bound: Bound, check: CrossCheck) -> None:
     if check.largest_error_lsb > bound.lsb:
         raise RefusedError(
@@ -207,54 +225,23 @@ def _refuse_wrong_bound(unit: UnitDescription, bound: Bound, check: CrossCheck) 
 
 
 def _refuse_beyond_limits(delivery: Delivery) -> None:
-    """P1 (13): the residual of the unit's own method against its limits."""
-    chosen = next(m for m in delivery.methods if m.method == delivery.unit.method)
-    limits = delivery.unit.limits
+    """P1 (13) for the compiled C; the fitted model passed, so it is the method or the formats."""
+    unit = delivery.unit
+    chosen = next(m for m in delivery.methods if m.method == unit.method)
     for residual in chosen.residuals:
-        at_t0 = residual.at_t0
-        limit, key = (
-            (limits.at_t0_g, "limits.at_t0_g")
-            if at_t0
-            else (limits.over_range_g, "limits.over_range_g")
-        )
+        dwell = residual.dwell
+        limit, key = unit.limits.at(dwell.temp_degc, unit.t0_degc)
         if abs(residual.error_g) > limit:
             raise RefusedError(
-                f"{delivery.measurements.source}, row {residual.dwell.row}",
-                f"| |a| - g | = {abs(residual.error_g) * 1e3:.3f} mg in {residual.dwell.position} "
-                f"at {residual.dwell.temp_degc:.1f} degC after compensation, "
-                f"{abs(residual.error_g) / limit:.3g} times the limit",
+                f"{delivery.measurements.source}, row {dwell.row}",
+                f"| |a| - g | = {abs(residual.error_g) * 1e3:.3f} mg in {dwell.position} at "
+                f"{dwell.temp_degc:.4g} degC by the compiled C, "
+                f"{abs(residual.error_g) / limit:.3g} times the limit, while the fitted model is "
+                "within it",
                 expected=f"at most {limit * 1e3:g} mg ({key})",
-                remedy=_why(delivery, residual),
+                remedy=(
+                    f"method {unit.method} is within {delivery.model_error_g * 1e3:.3g} mg of the "
+                    f"model, its LSB is {1e3 / 2**unit.output_q:.3g} mg: choose another "
+                    "compensation.method, a higher output_q or more adc.bits"
+                ),
             )
-
-
-def _why(delivery: Delivery, residual: Residual) -> str:
-    """What the residual comes from, and what to do about it.
-
-    The same dwell is compensated with the constants of its own temperature alone, then with the
-    fitted curves and no error of the method: the first step that leaves most of it is to blame.
-    """
-    calibration, dwell = delivery.calibration, residual.dwell
-    gravity_g, error_g = delivery.unit.gravity_g, abs(residual.error_g)
-
-    def length_error_g(constants: FloatArray) -> float:
-        force = force_from_voltage(constants, dwell.voltage_v)
-        return abs(float(np.linalg.norm(force)) - gravity_g)
-
-    point = min(calibration.points, key=lambda p: abs(p.temp_degc - dwell.temp_degc))
-    own_g = length_error_g(point.constants)
-    curve_g = length_error_g(calibration.thermal.constants_at(dwell.temp_degc))
-    if dwell.position in TEST_POSITIONS and own_g > 0.5 * error_g:
-        return (
-            f"noise or placement: the constants of this temperature alone leave "
-            f"{own_g * 1e3:.3g} mg; measure that dwell again"
-        )
-    if curve_g > 0.5 * error_g:
-        return (
-            f"the thermal function: the fitted curves ({calibration.shape.label}) leave "
-            f"{curve_g * 1e3:.3g} mg; choose a better one, or measure at more temperatures"
-        )
-    return (
-        f"the method {delivery.unit.method}: the fitted curves alone leave {curve_g * 1e3:.3g} mg; "
-        'choose method = "matrix", or lower model_error_max_micro_g'
-    )

@@ -1,9 +1,8 @@
-"""The errors a user can cause, each told in one line.
+"""The error a user can cause, told in one line.
 
-RefusedError            the data or the result was refused: exit code 1
-  UsageError            the command line is wrong: exit code 2
-
-Every message says where (file, row, key), what was found, what was expected and what to do.
+A wrong command line is click's own error, exit code 2; everything else that a user can cause is a
+`RefusedError`, exit code 1. Every message says where (file, row, key), what was found, what was
+expected and what to do.
 """
 
 from __future__ import annotations
@@ -37,9 +36,3 @@ class RefusedError(Exception):
         if remedy:
             text += f"; {remedy}"
         super().__init__(" ".join(text.split()))
-
-
-class UsageError(RefusedError):
-    """The command line is wrong."""
-
-    exit_code = 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -11,7 +12,15 @@ import numpy as np
 from triaxcal.errors import RefusedError
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.types import FloatArray
-from triaxcal.records_csv import DEVIATIONS, READINGS, Header, Row, read_rows, write_measurements
+from triaxcal.records_csv import (
+    DEVIATIONS,
+    READINGS,
+    Header,
+    Row,
+    is_number,
+    read_rows,
+    write_measurements,
+)
 from triaxcal.tomltable import did_you_mean, shown
 from triaxcal.unitfile import PLAUSIBLE_DEGC, Adc, UnitDescription
 
@@ -77,10 +86,11 @@ def read_measurements(path: Path, unit: UnitDescription) -> MeasurementSet:
     Raises
     ------
     RefusedError
-        When the file breaks a rule of docs/file-formats.md; names line and column.
+        When the file breaks a rule of docs/file-formats.md; names row and column.
     """
     header, rows = read_rows(path)
-    dwells = tuple(_dwell(row, header, unit) for row in rows)
+    peak = _peak(header, rows)
+    dwells = tuple(_dwell(row, header, unit, peak) for row in rows)
     _refuse_wrong_unit(str(path), header, dwells, unit.adc)
     return MeasurementSet(source=str(path), dwells=dwells)
 
@@ -92,7 +102,13 @@ def volts(values: RealT, reading_unit: str, adc: Adc) -> RealT:
     return values / 1000.0 if reading_unit == "mv" else values
 
 
-def _dwell(row: Row, header: Header, unit: UnitDescription) -> Dwell:
+def _peak(header: Header, rows: Sequence[Row]) -> float:
+    """Largest reading of the file, as written; cells that are no numbers are told later."""
+    cells = [row.cells[column] for row in rows for column in READINGS[header.reading_unit]]
+    return max((abs(float(c)) for c in cells if is_number(c)), default=0.0)
+
+
+def _dwell(row: Row, header: Header, unit: UnitDescription, peak: float) -> Dwell:
     position = row.cells["position"]
     if position not in _POSITIONS:
         expected = "TP1 to TP6 (fitted) or CP1 to CP6 (only checked)"
@@ -100,11 +116,12 @@ def _dwell(row: Row, header: Header, unit: UnitDescription) -> Dwell:
     sd_v = None
     if header.has_deviations:
         sd_v = _frozen([_deviation(row, c, header, unit) for c in DEVIATIONS[header.reading_unit]])
+    columns = READINGS[header.reading_unit]
     return Dwell(
         row=row.line,
         position=position,
         temp_degc=_temperature(row, header, unit),
-        voltage_v=_frozen([_reading(row, c, header, unit) for c in READINGS[header.reading_unit]]),
+        voltage_v=_frozen([_reading(row, c, header, unit, peak) for c in columns]),
         count=row.whole("count", 1, _COUNT_MAX) if header.has_count else None,
         sd_v=sd_v,
     )
@@ -132,7 +149,7 @@ def _temperature(row: Row, header: Header, unit: UnitDescription) -> float:
     return temp_degc
 
 
-def _reading(row: Row, column: str, header: Header, unit: UnitDescription) -> float:
+def _reading(row: Row, column: str, header: Header, unit: UnitDescription, peak: float) -> float:
     """Reading in V, refused beyond the declared codes of the ADC."""
     adc = unit.adc
     value = row.number(column)
@@ -147,16 +164,19 @@ def _reading(row: Row, column: str, header: Header, unit: UnitDescription) -> fl
         "mv": f"{low * 1000.0:.10g} to {high * 1000.0:.10g} mV",
         "code": f"{adc.code_min} to {adc.code_max}",
     }[header.reading_unit]
-    remedy = _range_remedy(value, header.reading_unit, adc)
+    remedy = _range_remedy(peak, header.reading_unit, adc)
     raise row.refuse(column, expected + ", the range of [adc]", remedy)
 
 
-def _range_remedy(value: float, reading_unit: str, adc: Adc) -> str:
-    # A little too large is a large reading; far too large is another unit.
-    if abs(volts(value, reading_unit, adc)) > 2.0 * adc.full_scale_v:
-        if reading_unit == "v" and abs(value) / 1000.0 <= adc.full_scale_v:
+def _range_remedy(peak: float, reading_unit: str, adc: Adc) -> str:
+    """What to do about a reading out of range, by the largest one of the file.
+
+    A little too large is a large reading; far too large is another unit.
+    """
+    if volts(peak, reading_unit, adc) > 2.0 * adc.full_scale_v:
+        if reading_unit == "v" and peak / 1000.0 <= adc.full_scale_v:
             return "mV taken for V? if it is in mV, name the columns ux_mv, uy_mv, uz_mv"
-        if reading_unit != "code" and adc.code_min <= value <= adc.code_max:
+        if reading_unit != "code" and peak <= max(-adc.code_min, adc.code_max):
             return "if it is a code, name the columns ux_code, uy_code, uz_code"
     return "the ADC was saturated, or [adc] does not describe it"
 

@@ -69,7 +69,7 @@ class Row:
 
     def where(self, column: str) -> str:
         """Place of a cell as messages name it."""
-        return f"{self.source}, line {self.line}, column {column}"
+        return f"{self.source}, row {self.line}, column {column}"
 
     def refuse(self, column: str, expected: str, remedy: str = "") -> RefusedError:
         """Error that names a cell's text and what should be there."""
@@ -86,10 +86,8 @@ class Row:
             For anything else; tells a decimal comma and a thousands separator apart from text.
         """
         text = self.cells[column]
-        if _NUMBER.fullmatch(text):
-            value = float(text)
-            if math.isfinite(value):
-                return value
+        if is_number(text):
+            return float(text)
         raise self.refuse(column, "a number such as -0.54859", _number_remedy(text))
 
     def whole(self, column: str, low: int, high: int) -> int:
@@ -98,6 +96,11 @@ class Row:
         if not value.is_integer() or not low <= value <= high:
             raise self.refuse(column, f"a whole number from {low} to {high}")
         return int(value)
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell is a finite decimal number."""
+    return _NUMBER.fullmatch(text) is not None and math.isfinite(float(text))
 
 
 def _number_remedy(text: str) -> str:
@@ -139,13 +142,18 @@ def _text(path: Path) -> str:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise RefusedError(str(path), f"cannot be read: {error.strerror}") from error
+        reason = (error.strerror or str(error)).lower()
+        raise RefusedError(
+            str(path),
+            f"cannot be read: {reason}",
+            remedy="put the dwells there, as docs/add-a-unit.md tells",
+        ) from error
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise RefusedError(
-            f"{path}, line {line}", "not UTF-8", remedy="save the file as CSV UTF-8"
+            f"{path}, row {line}", "not UTF-8", remedy="save the file as CSV UTF-8"
         ) from error
 
 
@@ -164,7 +172,7 @@ def _records(source: str, text: str) -> Iterator[tuple[int, list[str]]]:
         try:
             yield number, next(csv.reader([line], skipinitialspace=True, strict=True))
         except csv.Error as error:
-            raise RefusedError(f"{source}, line {number}", f"not CSV: {error}") from error
+            raise RefusedError(f"{source}, row {number}", f"not CSV: {error}") from error
 
 
 def _cells(source: str, line: int, cells: list[str], columns: tuple[str, ...]) -> dict[str, str]:
@@ -179,7 +187,7 @@ def _cells(source: str, line: int, cells: list[str], columns: tuple[str, ...]) -
     else:
         remedy = ""
     raise RefusedError(
-        f"{source}, line {line}",
+        f"{source}, row {line}",
         f"{len(cells)} cell{'s' if len(cells) > 1 else ''}",
         expected=f"{len(columns)}, as in the header",
         remedy=remedy,
@@ -187,7 +195,7 @@ def _cells(source: str, line: int, cells: list[str], columns: tuple[str, ...]) -
 
 
 def _header(source: str, line: int, columns: tuple[str, ...]) -> Header:
-    where = f"{source}, line {line} (header)"
+    where = f"{source}, row {line} (header)"
     for separator, name in ((";", "semicolons"), ("\t", "tabs")):
         if len(columns) == 1 and separator in columns[0]:
             raise RefusedError(where, f"cells separated by {name}", expected="commas")

@@ -122,7 +122,7 @@ class Table:
     def number(self, key: str, low: float, high: float) -> float:
         """Finite number from `low` to `high`."""
         value = _finite(self.values[key])
-        if value is None or not low <= value <= high:
+        if value is None or not low <= float(value) <= high:
             raise self.refuse(key, f"a number from {low:g} to {high:g}")
         return float(value)
 

@@ -18,6 +18,8 @@ METHODS = ("matrix", "inverse", "additive", "additive-simplified", "additive-fir
 
 FORMAT = 1
 UNIT_FILE = "unit.toml"
+T0_TOLERANCE_DEGC = 2.0
+"""A dwell this near to T0 counts as one at T0."""
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
 PLAUSIBLE_DEGC = (-200.0, 400.0)
 """Temperatures outside these are mistakes: no electronic accelerometer works there."""
@@ -104,6 +106,12 @@ class Limits:
 
     at_t0_g: float
     over_range_g: float
+
+    def at(self, temp_degc: float, t0_degc: float) -> tuple[float, str]:
+        """Limit at a temperature, g, and its key."""
+        if abs(temp_degc - t0_degc) <= T0_TOLERANCE_DEGC:
+            return self.at_t0_g, "limits.at_t0_g"
+        return self.over_range_g, "limits.over_range_g"
 
 
 @dataclass(frozen=True)

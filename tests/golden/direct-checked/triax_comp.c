@@ -18,23 +18,47 @@ static int32_t s32(uint32_t bits)
     return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits : (-1 - (int32_t)inverted);
 }
 
+#if TRIAX_ARITHMETIC != TRIAX_LIMBS
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
 static int32_t high_word(int64_t value)
 {
     return (value < 0) ? (-1 - (int32_t)(~value >> 32)) : (int32_t)(value >> 32);
 }
+#endif
 
+#if TRIAX_ARITHMETIC != TRIAX_THUMB2
 /* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
 static int32_t asr32(int32_t value, uint32_t shift)
 {
     return (value < 0) ? (~(~value >> shift)) : (value >> shift);
 }
+#endif
+
+#if TRIAX_ARITHMETIC == TRIAX_LIMBS
+/* value = high_half 2^16 + low_half, 0 <= low_half < 2^16. */
+static int32_t high_half(int32_t value)
+{
+    return asr32(value, 16u);
+}
+
+static int32_t low_bits(int32_t value, uint32_t mask)
+{
+    const uint32_t bits = (uint32_t)value & mask;
+    return (int32_t)bits;
+}
+
+static int32_t low_half(int32_t value)
+{
+    return low_bits(value, 0xFFFFu);
+}
+#endif
 
 static int64_t magnitude(int32_t value)
 {
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
+#if TRIAX_ARITHMETIC != TRIAX_LIMBS
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
@@ -48,6 +72,71 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
     p = horner_step(c[0], x_q31, p);
     return p;
 }
+
+/* A column at a time: the loop's overhead is shared by three functions. */
+static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+{
+    uint32_t j;
+    for (j = 0u; j < 4u; j++) {
+        row[0][j] = evaluate(segment->coefficient[j], x_q31);
+        row[1][j] = evaluate(segment->coefficient[4u + j], x_q31);
+        row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
+    }
+}
+#else
+/* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
+static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
+{
+    return c + ((x_high * high_half(p)) + high_half(x_high * low_half(p)));
+}
+
+/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
+static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
+{
+    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
+    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
+    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
+    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
+}
+
+static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
+{
+    int32_t p = c[2];
+    p = short_step(c[1], x_high, p);
+    p = short_step(c[0], x_high, p);
+    return p;
+}
+
+static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, int32_t x_low)
+{
+    int32_t p = c[2];
+    p = long_step(c[1], x_high, x_low, p);
+    p = long_step(c[0], x_high, x_low, p);
+    return p;
+}
+
+/* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
+static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+{
+    const int32_t x_high = high_half(x_q31);
+    const int32_t x_low = low_half(x_q31);
+    uint32_t j;
+
+    if (x_low == 0) {
+        for (j = 0u; j < 4u; j++) {
+            row[0][j] = short_evaluate(segment->coefficient[j], x_high);
+            row[1][j] = short_evaluate(segment->coefficient[4u + j], x_high);
+            row[2][j] = short_evaluate(segment->coefficient[8u + j], x_high);
+        }
+    } else {
+        for (j = 0u; j < 4u; j++) {
+            row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
+            row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
+            row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
+        }
+    }
+}
+#endif
 
 static int32_t clamp_raw(int32_t code)
 {
@@ -66,9 +155,6 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
-    int32_t x_q31;
-    uint32_t i;
-    uint32_t j;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -78,14 +164,99 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    x_q31 = (code - segment->origin_code) * segment->gain;
-    for (i = 0u; i < 3u; i++) {
-        for (j = 0u; j < 4u; j++) {
-            state->row[i][j] = evaluate(segment->coefficient[(4u * i) + j], x_q31);
-        }
-    }
+    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
     return status;
 }
+
+#if TRIAX_ARITHMETIC == TRIAX_PORTABLE
+/* The offset holds half an output LSB; floor(floor(v / 2^32) / 2^3) = floor(v / 2^35). */
+static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
+{
+    const int64_t sum_x = ((int64_t)state->row[0][0] * ux) + ((int64_t)state->row[0][1] * uy) +
+            ((int64_t)state->row[0][2] * uz);
+    const int64_t sum_y = ((int64_t)state->row[1][0] * ux) + ((int64_t)state->row[1][1] * uy) +
+            ((int64_t)state->row[1][2] * uz);
+    const int64_t sum_z = ((int64_t)state->row[2][0] * ux) + ((int64_t)state->row[2][1] * uy) +
+            ((int64_t)state->row[2][2] * uz);
+    const int32_t x = asr32(high_word(sum_x) + state->row[0][3], 3u);
+    const int32_t y = asr32(high_word(sum_y) + state->row[1][3], 3u);
+    const int32_t z = asr32(high_word(sum_z) + state->row[2][3], 3u);
+    accel[0] = x;
+    accel[1] = y;
+    accel[2] = z;
+}
+#elif TRIAX_ARITHMETIC == TRIAX_LIMBS
+/*
+ * The same from halves of the raw codes, high 2^11 + low, and of the gains, high 2^16 + low: every
+ * sum of three products stays within int32_t, so that no carry has to be kept. h is
+ * floor(sum / 2^32) + b modulo 2^32, and that fits int32_t (docs/targets.md).
+ */
+static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
+{
+    const int32_t x_low = low_bits(ux, 2047u);
+    const int32_t y_low = low_bits(uy, 2047u);
+    const int32_t z_low = low_bits(uz, 2047u);
+    const int32_t x_high = asr32(ux, 11u);
+    const int32_t y_high = asr32(uy, 11u);
+    const int32_t z_high = asr32(uz, 11u);
+    uint32_t i;
+    for (i = 0u; i < 3u; i++) {
+        const int32_t *const row = state->row[i];
+        int32_t low = low_half(row[0]);
+        int32_t high = high_half(row[0]);
+        int32_t low_low = low * x_low;
+        int32_t low_high = low * x_high;
+        int32_t high_low = high * x_low;
+        int32_t high_high = high * x_high;
+        uint32_t h;
+        low = low_half(row[1]);
+        high = high_half(row[1]);
+        low_low += low * y_low;
+        low_high += low * y_high;
+        high_low += high * y_low;
+        high_high += high * y_high;
+        low = low_half(row[2]);
+        high = high_half(row[2]);
+        low_low += low * z_low;
+        low_high += low * z_high;
+        high_low += high * z_low;
+        high_high += high * z_high;
+        high_low += asr32(low_high + asr32(low_low, 11u), 5u);
+        high_low = asr32(high_low, 8u);
+        h = ((uint32_t)high_high * 8u) + (uint32_t)high_low + (uint32_t)row[3];
+        accel[i] = asr32(s32(h), 3u);
+    }
+}
+#else
+/* The portable form in registers. r0 to r4 are left to the operands, r7 to a frame pointer. */
+static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
+{
+    const int32_t *row = state->row[0];
+    __asm__ volatile(
+        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
+        "smull r8, r12, r8, %[ux]\n\t"
+        "smlal r8, r12, r9, %[uy]\n\t"
+        "smlal r8, r12, r10, %[uz]\n\t"
+        "add r5, r11, r12\n\t"
+        "asr r5, r5, #3\n\t"
+        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
+        "smull r8, r12, r8, %[ux]\n\t"
+        "smlal r8, r12, r9, %[uy]\n\t"
+        "smlal r8, r12, r10, %[uz]\n\t"
+        "add r6, r11, r12\n\t"
+        "asr r6, r6, #3\n\t"
+        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
+        "smull r8, r12, r8, %[ux]\n\t"
+        "smlal r8, r12, r9, %[uy]\n\t"
+        "smlal r8, r12, r10, %[uz]\n\t"
+        "add r12, r11, r12\n\t"
+        "asr r12, r12, #3\n\t"
+        "stmia %[accel], {r5, r6, r12}"
+        : [row] "+&r"(row)
+        : [ux] "r"(ux), [uy] "r"(uy), [uz] "r"(uz), [accel] "r"(accel)
+        : "r5", "r6", "r8", "r9", "r10", "r11", "r12", "memory");
+}
+#endif
 
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3])
 {
@@ -93,12 +264,6 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
     int32_t ux = raw_code[0];
     int32_t uy = raw_code[1];
     int32_t uz = raw_code[2];
-    int64_t sum_x;
-    int64_t sum_y;
-    int64_t sum_z;
-    int32_t x;
-    int32_t y;
-    int32_t z;
 
     /* The range is 2^n codes: one test sees a code outside it on any axis. */
     if (((((uint32_t)ux - (uint32_t)TRIAX_RAW_MIN) | ((uint32_t)uy - (uint32_t)TRIAX_RAW_MIN)) |
@@ -108,23 +273,13 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
         uz = clamp_raw(uz);
         status = TRIAX_STATUS_RAW_RANGE;
     }
+#if TRIAX_ARITHMETIC != TRIAX_LIMBS
     /* Left-justified: |u| 2^8 <= 2^31. */
     ux *= 256;
     uy *= 256;
     uz *= 256;
-    sum_x = ((int64_t)state->row[0][0] * ux) + ((int64_t)state->row[0][1] * uy) +
-            ((int64_t)state->row[0][2] * uz);
-    sum_y = ((int64_t)state->row[1][0] * ux) + ((int64_t)state->row[1][1] * uy) +
-            ((int64_t)state->row[1][2] * uz);
-    sum_z = ((int64_t)state->row[2][0] * ux) + ((int64_t)state->row[2][1] * uy) +
-            ((int64_t)state->row[2][2] * uz);
-    /* The offset holds half an output LSB; floor(floor(v / 2^32) / 2^3) = floor(v / 2^35). */
-    x = asr32(high_word(sum_x) + state->row[0][3], 3u);
-    y = asr32(high_word(sum_y) + state->row[1][3], 3u);
-    z = asr32(high_word(sum_z) + state->row[2][3], 3u);
-    accel[0] = x;
-    accel[1] = y;
-    accel[2] = z;
+#endif
+    apply_rows(state, ux, uy, uz, accel);
     return status;
 }
 
@@ -174,8 +329,9 @@ static uint32_t x_fits(const triax_segment_t *segment, int32_t first, int32_t la
     const int64_t above = (int64_t)last - segment->origin_code;
     const int64_t reach = (below > above) ? below : above;
     uint32_t fits = 0u;
+    /* reach < 2^32 and gain < 2^31: the product fits. */
     if ((segment->gain > 0) && (first <= last)) {
-        if (reach <= ((int64_t)INT32_MAX / segment->gain)) {
+        if ((reach * segment->gain) <= (int64_t)INT32_MAX) {
             fits = 1u;
         }
     }

@@ -18,11 +18,13 @@ static int32_t s32(uint32_t bits)
     return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits : (-1 - (int32_t)inverted);
 }
 
+#if TRIAX_ARITHMETIC != TRIAX_LIMBS
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
 static int32_t high_word(int64_t value)
 {
     return (value < 0) ? (-1 - (int32_t)(~value >> 32)) : (int32_t)(value >> 32);
 }
+#endif
 
 /* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
 static int64_t asr64(int64_t value, uint32_t shift)
@@ -42,11 +44,37 @@ static int32_t saturate32(int64_t value)
     return (int32_t)result;
 }
 
+#if TRIAX_ARITHMETIC == TRIAX_LIMBS
+/* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
+static int32_t asr32(int32_t value, uint32_t shift)
+{
+    return (value < 0) ? (~(~value >> shift)) : (value >> shift);
+}
+
+/* value = high_half 2^16 + low_half, 0 <= low_half < 2^16. */
+static int32_t high_half(int32_t value)
+{
+    return asr32(value, 16u);
+}
+
+static int32_t low_bits(int32_t value, uint32_t mask)
+{
+    const uint32_t bits = (uint32_t)value & mask;
+    return (int32_t)bits;
+}
+
+static int32_t low_half(int32_t value)
+{
+    return low_bits(value, 0xFFFFu);
+}
+#endif
+
 static int64_t magnitude(int32_t value)
 {
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
+#if TRIAX_ARITHMETIC != TRIAX_LIMBS
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
@@ -60,6 +88,71 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
     p = horner_step(c[0], x_q31, p);
     return p;
 }
+
+/* A column at a time: the loop's overhead is shared by three functions. */
+static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+{
+    uint32_t j;
+    for (j = 0u; j < 4u; j++) {
+        row[0][j] = evaluate(segment->coefficient[j], x_q31);
+        row[1][j] = evaluate(segment->coefficient[4u + j], x_q31);
+        row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
+    }
+}
+#else
+/* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
+static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
+{
+    return c + ((x_high * high_half(p)) + high_half(x_high * low_half(p)));
+}
+
+/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
+static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
+{
+    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
+    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
+    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
+    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
+}
+
+static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
+{
+    int32_t p = c[2];
+    p = short_step(c[1], x_high, p);
+    p = short_step(c[0], x_high, p);
+    return p;
+}
+
+static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, int32_t x_low)
+{
+    int32_t p = c[2];
+    p = long_step(c[1], x_high, x_low, p);
+    p = long_step(c[0], x_high, x_low, p);
+    return p;
+}
+
+/* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
+static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+{
+    const int32_t x_high = high_half(x_q31);
+    const int32_t x_low = low_half(x_q31);
+    uint32_t j;
+
+    if (x_low == 0) {
+        for (j = 0u; j < 4u; j++) {
+            row[0][j] = short_evaluate(segment->coefficient[j], x_high);
+            row[1][j] = short_evaluate(segment->coefficient[4u + j], x_high);
+            row[2][j] = short_evaluate(segment->coefficient[8u + j], x_high);
+        }
+    } else {
+        for (j = 0u; j < 4u; j++) {
+            row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
+            row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
+            row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
+        }
+    }
+}
+#endif
 
 /* a d - b c; |a|, |b|, |c|, |d| < 2^31, so the result stays below 2^63. */
 static int64_t minor_of(int32_t a, int32_t b, int32_t c, int32_t d)
@@ -140,9 +233,6 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
-    int32_t x_q31;
-    uint32_t i;
-    uint32_t j;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -152,16 +242,13 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    x_q31 = (code - segment->origin_code) * segment->gain;
-    for (i = 0u; i < 3u; i++) {
-        for (j = 0u; j < 4u; j++) {
-            state->row[i][j] = evaluate(segment->coefficient[(4u * i) + j], x_q31);
-        }
-    }
+    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
     if (invert(state->row) == 0u) {
-        for (i = 0u; i < 3u; i++) {
-            for (j = 0u; j < 4u; j++) {
-                state->row[i][j] = 0;
+        uint32_t axis;
+        uint32_t column;
+        for (axis = 0u; axis < 3u; axis++) {
+            for (column = 0u; column < 4u; column++) {
+                state->row[axis][column] = 0;
             }
         }
         status |= TRIAX_STATUS_BAD_IMAGE;
@@ -264,8 +351,9 @@ static uint32_t x_fits(const triax_segment_t *segment, int32_t first, int32_t la
     const int64_t above = (int64_t)last - segment->origin_code;
     const int64_t reach = (below > above) ? below : above;
     uint32_t fits = 0u;
+    /* reach < 2^32 and gain < 2^31: the product fits. */
     if ((segment->gain > 0) && (first <= last)) {
-        if (reach <= ((int64_t)INT32_MAX / segment->gain)) {
+        if ((reach * segment->gain) <= (int64_t)INT32_MAX) {
             fits = 1u;
         }
     }

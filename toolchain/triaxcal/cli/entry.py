@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 
 INTERRUPTED = "triaxcal: interrupted; nothing half-written was left"
@@ -10,6 +11,9 @@ INTERRUPTED = "triaxcal: interrupted; nothing half-written was left"
 def entry() -> None:
     """Run the command line."""
     try:
+        # The same clean way out for a closed terminal and a polite kill as for Ctrl-C.
+        for name in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(name, signal.default_int_handler)
         from triaxcal.cli.main import run  # noqa: PLC0415
 
         run()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import traceback
 from pathlib import Path
 
 import click
@@ -34,7 +35,7 @@ def calib(unit: Path, build: Path) -> None:
     """Calibrate UNIT, a folder with unit.toml and measurements.csv, and write its C."""
     from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.publish import publish  # noqa: PLC0415
-    from triaxcal.report.files import all_files  # noqa: PLC0415
+    from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415
 
@@ -42,7 +43,7 @@ def calib(unit: Path, build: Path) -> None:
     made = passport(delivery, {})
     files = all_files(delivery, made)
     target = build / delivery.unit.name
-    publish(files, target)
+    publish(files, target, SOMETIMES)
     click.echo(summary(made, files, str(target)))
 
 
@@ -79,7 +80,16 @@ def run() -> None:
         sys.exit(0)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        _leave(f"triaxcal: {error.filename or 'output'}: {reason}", 1)
+        _leave(f"triaxcal: {error.filename or 'output or temporary folder'}: {reason}", 1)
+    except Exception as fault:
+        # Nothing a user does should come here. One line all the same, with the place for a report.
+        frame = traceback.extract_tb(fault.__traceback__)[-1]
+        place = f"{Path(frame.filename).name}:{frame.lineno}"
+        _leave(
+            f"triaxcal: fault in triaxcal {__version__} at {place}: "
+            f"{type(fault).__name__}: {fault}; please report it with the unit's folder",
+            1,
+        )
 
 
 def _leave(message: str, code: int) -> None:

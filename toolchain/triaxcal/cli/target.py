@@ -52,3 +52,48 @@ def test(unit: Path | None, build: Path) -> None:
     click.echo(matrix_table(outcomes))
     if counts(outcomes)[PASSED] != len(outcomes):
         sys.exit(1)
+
+
+@target.command()
+@click.option(
+    "--build",
+    type=click.Path(path_type=Path),
+    default=Path("build/target-bench"),
+    show_default=True,
+    help="Folder that receives bench.json and bench.md.",
+)
+@click.option(
+    "--page",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="Markdown page whose generated table is replaced.",
+)
+def bench(build: Path, page: Path | None) -> None:
+    """Count instructions, flash, RAM and stack of a call on every core, beside floating point.
+
+    Exit code 1 unless everything was measured.
+    """
+    from triaxcal.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
+    from triaxcal.targets.bench import Cost, compiler_versions, run_bench  # noqa: PLC0415
+    from triaxcal.targets.bench_table import (  # noqa: PLC0415
+        bench_json,
+        markdown,
+        put_between_markers,
+    )
+    from triaxcal.targets.shapes import shipped_cases  # noqa: PLC0415
+
+    def progress(cost: Cost) -> None:
+        click.echo(
+            f"{cost.failure or 'measured'}: {cost.subject.label}, {cost.core.name}", err=True
+        )
+
+    costs = run_bench(shipped_cases(Path("units")), progress)
+    compilers = compiler_versions()
+    table = markdown(costs, compilers)
+    files = {"bench.json": bench_json(costs, compilers), "bench.md": table + "\n"}
+    publish({name: text.encode() for name, text in files.items()}, build)
+    if page:
+        text = page.read_text(encoding="utf-8")
+        page.write_text(put_between_markers(text, table, str(page)), encoding="utf-8")
+    click.echo(table)
+    if any(c.failure for c in costs):
+        sys.exit(1)

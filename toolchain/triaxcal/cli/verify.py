@@ -26,7 +26,7 @@ def verify(unit: Path, build: Path) -> None:
     """
     from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.publish import publish, renew  # noqa: PLC0415
-    from triaxcal.report.files import all_files, passport_files  # noqa: PLC0415
+    from triaxcal.report.files import SOMETIMES, all_files, passport_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.verify.campaign import (  # noqa: PLC0415
         delivery_outcomes,
@@ -40,7 +40,7 @@ def verify(unit: Path, build: Path) -> None:
     target = build / delivery.unit.name
     files = all_files(delivery)
     if not is_delivered(target, files):
-        publish(files, target)
+        publish(files, target, SOMETIMES)
     with tempfile.TemporaryDirectory(prefix="triaxcal-verify-") as folder:
         outcomes = verify_files(Path(folder), delivery.files, delivery.plan, delivery.bound)
     record(target, outcomes)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,12 +36,6 @@ def find_compiler() -> str:
     return found
 
 
-def compiler_version() -> str:
-    """First line of gcc --version."""
-    command = [find_compiler(), "--version"]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n")[0]
-
-
 @dataclass(frozen=True)
 class Compilation:
     """A compilation under way."""
@@ -56,6 +52,8 @@ class Compilation:
             When the compiler refused: its first complaint.
         """
         complaints, _ = self.process.communicate()
+        if self.process.returncode == -signal.SIGINT:
+            raise KeyboardInterrupt
         if self.process.returncode != 0:
             lines = [line for line in complaints.splitlines() if "error" in line.lower()]
             raise RefusedError(
@@ -63,12 +61,19 @@ class Compilation:
                 (lines or complaints.splitlines() or ["failed without a word"])[0],
                 remedy="check the compiler with a small program, and the space in the temp folder",
             )
-        return ctypes.CDLL(str(self.library))
+        try:
+            return ctypes.CDLL(str(self.library))
+        except OSError as error:
+            raise RefusedError(
+                "gcc",
+                f"said nothing and made no library that loads ({error})",
+                remedy="check that the gcc on PATH is a C compiler for this machine",
+            ) from error
 
     def cancel(self) -> None:
         """Stop it, if it still runs."""
         if self.process.returncode is None:
-            self.process.kill()
+            self.process.terminate()  # not kill: gcc removes its temporary files
             self.process.communicate()
 
 
@@ -86,5 +91,18 @@ def compile_library(
         str(library),
         *map(str, sources),
     ]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=os.environ | {"TMPDIR": str(library.parent)},
+        )
+    except OSError as error:
+        raise RefusedError(
+            command[0],
+            f"cannot be run: {(error.strerror or str(error)).lower()}",
+            remedy="install gcc: sudo apt-get install gcc libc6-dev",
+        ) from error
     return Compilation(process, library)

@@ -58,10 +58,13 @@ class CrossCheck:
         Number of vectors by set.
     largest_error_lsb : float
         Largest error seen against the real-valued plan over the exhaustive sets, in output LSB.
+    images : int
+        Images that the loader rightly accepted or refused.
     """
 
     vectors: dict[str, int]
     largest_error_lsb: float
+    images: int = 0
 
     @property
     def total(self) -> int:
@@ -74,14 +77,15 @@ def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[Vector
     rng = np.random.Generator(np.random.PCG64(SEED))
     shape = plan.shape
     low, high = plan.temp_min_code, plan.temp_max_code
+    # Sorted temperatures: set_temperature runs once for equal codes, as on the device.
     in_range = (
-        rng.integers(low, high, random_vectors, dtype=np.int32, endpoint=True),
+        np.sort(rng.integers(low, high, random_vectors, dtype=np.int32, endpoint=True)),
         rng.integers(
             shape.raw_min, shape.raw_max, (random_vectors, 3), dtype=np.int32, endpoint=True
         ),
     )
     anything = (
-        rng.integers(INT32_MIN, INT32_MAX, random_vectors, dtype=np.int32, endpoint=True),
+        np.sort(rng.integers(INT32_MIN, INT32_MAX, random_vectors, dtype=np.int32, endpoint=True)),
         rng.integers(INT32_MIN, INT32_MAX, (random_vectors, 3), dtype=np.int32, endpoint=True),
     )
     return [

@@ -12,7 +12,7 @@ import jinja2
 from triaxcal import __version__
 from triaxcal.codegen.image import HEADER_NAMES, header_words, image_size
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
-from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.plan import Plan, Shape
 from triaxcal.model.compensation import INVERSE
 from triaxcal.resources import shipped
 from triaxcal.unitfile import TemperatureSensor
@@ -43,7 +43,7 @@ class Provenance:
 @cache
 def environment() -> jinja2.Environment:
     """Jinja environment of every template: undefined names are errors, blocks leave no trace."""
-    environment = jinja2.Environment(
+    return jinja2.Environment(
         loader=jinja2.FileSystemLoader(shipped("templates")),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -51,13 +51,16 @@ def environment() -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    environment.filters["int32"] = int32_literal
-    return environment
 
 
 def int32_literal(value: int) -> str:
     """C literal of an int32; INT32_MIN has none of its own."""
     return "(-2147483647 - 1)" if value == -(2**31) else str(value)
+
+
+def macro_literal(value: int) -> str:
+    """The same for a macro's body."""
+    return f"({value})" if -(2**31) < value < 0 else int32_literal(value)
 
 
 def shape_id(plan: Plan) -> str:
@@ -105,9 +108,11 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "checked": span != 2**32 - 1,
         "raw_span": span,
         "raw_span_is_mask": span & (span + 1) == 0,
-        "raw_min": int32_literal(shape.raw_min),
-        "raw_max": int32_literal(shape.raw_max),
+        "raw_min": macro_literal(shape.raw_min),
+        "raw_max": macro_literal(shape.raw_max),
         "raw_scale": 1 << shape.raw_shift,
+        "limb_split": limb_split(shape),
+        "limb_mask": (1 << limb_split(shape)) - 1,
         "orders_down": list(range(shape.order - 1, -1, -1)),
         "lsb_micro_g": f"{1e6 / 2**shape.output_q:.4g}",
         "function_order": ", ".join(names[:4]) + ", ... " + names[11],
@@ -115,6 +120,20 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "header": header_words(plan),
         "header_names": HEADER_NAMES,
     }
+
+
+def limb_split(shape: Shape) -> int:
+    """Bits of the lower half of a raw code for TRIAX_LIMBS; 0 when the sums would not fit int32.
+
+    With k = 16 + spare - raw_shift the halves of a code are below 2^k and at most 2^(15 - spare),
+    and the high halves of a row of gains sum to at most 2^16 + 3. Then three products of two low
+    halves stay below 3 * 2^(16 + k), of a low gain and a high code below 3 * 2^(31 - spare), and of
+    a high gain and a low code below (2^16 + 3) * 2^k: with what is carried into them all are below
+    2^31 for spare >= 2 and k <= 13.
+    """
+    spare = shape.output_shift - 32
+    split = 16 + spare - shape.raw_shift
+    return split if spare >= 2 and shape.raw_shift <= 16 and 1 <= split <= 13 else 0
 
 
 def _code(code: int, sensor: TemperatureSensor) -> dict[str, str]:

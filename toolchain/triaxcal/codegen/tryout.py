@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +15,10 @@ from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.thermal import ThermalModel
 from triaxcal.model.types import FloatArray
-from triaxcal.records import Dwell, MeasurementSet
+from triaxcal.records import Dwell
 from triaxcal.unitfile import UnitDescription
 
 BEFORE = "before"
-T0_TOLERANCE_DEGC = 2.0
-"""A dwell this near to T0 counts as one at T0, for the limits of P1 (13)."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,6 @@ class Residual:
     """|a| - g at one dwell, in g."""
 
     dwell: Dwell
-    at_t0: bool
     error_g: float
 
 
@@ -44,25 +41,20 @@ class MethodResult:
 def run_on_dwells(
     unit: UnitDescription,
     thermal: ThermalModel,
-    range_degc: tuple[float, float],
-    measurements: MeasurementSet,
+    source: str,
+    dwells: Sequence[Dwell],
     routines: Mapping[str, Routine | RefusedError],
 ) -> tuple[MethodResult, ...]:
     """Residuals before compensation (constants of T0), then of each routine.
 
-    Dwells outside the working range are left out.
+    `dwells` of the file `source` lie in the working range.
 
     Raises
     ------
     RefusedError
-        When a routine flags one of the unit's own dwells.
+        When the unit's own method flags one of its dwells.
     """
     sensor = unit.temperature_sensor
-    half_code = 0.5 * sensor.degc_per_code
-    dwells = [
-        d for d in measurements.dwells
-        if range_degc[0] - half_code <= d.temp_degc <= range_degc[1] + half_code
-    ]  # fmt: skip
     voltages = np.array([d.voltage_v for d in dwells])
     raw = np.rint(voltages / unit.adc.volts_per_code).clip(unit.adc.code_min, unit.adc.code_max)
     temp = np.array([sensor.code(d.temp_degc) for d in dwells])
@@ -74,38 +66,41 @@ def run_on_dwells(
             results.append(MethodResult(method, (), str(routine)))
             continue
         accel, status = routine(*codes)
-        _refuse_flags(measurements.source, method, dwells, status)
+        flagged = _flagged(source, method, dwells, status)
+        if flagged is not None and method == unit.method:
+            raise flagged
+        if flagged is not None:
+            results.append(MethodResult(method, (), str(flagged)))
+            continue
         results.append(
             _result(method, unit, dwells, accel.astype(np.float64) * 2.0**-unit.output_q)
         )
     return tuple(results)
 
 
-def _refuse_flags(
+def _flagged(
     source: str,
     method: str,
-    dwells: list[Dwell],
+    dwells: Sequence[Dwell],
     status: np.ndarray[tuple[int, ...], np.dtype[np.uint32]],
-) -> None:
+) -> RefusedError | None:
     # A dwell half a code beyond an end of the range is clamped to it by intention.
     flagged = np.flatnonzero(status & ~np.uint32(3))
-    if len(flagged):
-        raise RefusedError(
-            f"{source}, row {dwells[int(flagged[0])].row}",
-            f"the compiled C flags this dwell with status {status[flagged[0]]} (method {method})",
-            expected=f"status {STATUS_OK}",
-            remedy="check adc.code_min, adc.code_max and compensation.output_q",
-        )
+    if not len(flagged):
+        return None
+    return RefusedError(
+        f"{source}, row {dwells[int(flagged[0])].row}",
+        f"the compiled C flags this dwell with status {status[flagged[0]]} (method {method})",
+        expected=f"status {STATUS_OK}",
+        remedy="check adc.code_min, adc.code_max and compensation.output_q",
+    )
 
 
 def _result(
-    method: str, unit: UnitDescription, dwells: list[Dwell], force_g: FloatArray
+    method: str, unit: UnitDescription, dwells: Sequence[Dwell], force_g: FloatArray
 ) -> MethodResult:
     errors = np.linalg.norm(force_g, axis=1) - unit.gravity_g
-    residuals = tuple(
-        Residual(d, abs(d.temp_degc - unit.t0_degc) <= T0_TOLERANCE_DEGC, float(e))
-        for d, e in zip(dwells, errors, strict=True)
-    )
+    residuals = tuple(Residual(d, float(e)) for d, e in zip(dwells, errors, strict=True))
     return MethodResult(method, residuals, "")
 
 

@@ -178,7 +178,9 @@ def _select(
     asked_for = unit.thermal.model == PIECEWISE_LINEAR or unit.thermal.order is not None
     if asked_for:
         refuse_undetermined(where, shapes[0], temps)
-    return select(data, estimators, shapes, checks, asked_for=asked_for)
+    return select(
+        data, estimators, shapes, checks, asked_for=asked_for, limit_g=unit.limits.over_range_g
+    )
 
 
 def _calibration(
@@ -248,10 +250,16 @@ def _variance(
     if readings.variance_v2 is not None:
         allowed = np.mean(readings.variance_v2, axis=(0, 1))
         ratio = math.sqrt(float(np.mean(pooled / allowed)))
-        return readings.variance_v2, (
+        source = (
             "the dwells' own statistics, sd^2 / count; readings scatter over the positions "
             f"{ratio:.2f} times what they allow (1 is noise alone, more is placement)"
         )
+        # Three standard deviations of a mean square with 2 * groups degrees of freedom.
+        if np.any(pooled > allowed * (1.0 + 3.0 / math.sqrt(groups))):
+            source += "; the excess is added to every reading's variance"
+            excess: FloatArray = np.maximum(pooled - allowed, 0.0)
+            return readings.variance_v2 + excess, source
+        return readings.variance_v2, source
     without = [
         d.row
         for d in measurements.dwells

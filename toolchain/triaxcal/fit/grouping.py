@@ -87,6 +87,7 @@ def group_dwells(measurements: MeasurementSet, t0_degc: float) -> tuple[Temperat
     clusters = _clusters(rows)
     for cluster in clusters:
         _refuse_doubled(source, cluster)
+        _refuse_drift(source, cluster)
     # The smallest first: one row with a wrong temperature spoils two groups, and shows there.
     for cluster in sorted(clusters, key=len):
         _refuse_incomplete(source, cluster)
@@ -103,6 +104,19 @@ def group_dwells(measurements: MeasurementSet, t0_degc: float) -> tuple[Temperat
     return groups
 
 
+def _refuse_drift(source: str, cluster: list[Dwell]) -> None:
+    first, last = cluster[0], cluster[-1]
+    spread = last.temp_degc - first.temp_degc
+    if spread > GROUP_GAP_DEGC:
+        raise RefusedError(
+            f"{source}, rows {first.row} and {last.row}",
+            f"{spread:.3g} degC between dwells that belong to one temperature "
+            f"({first.temp_degc:.4g} to {last.temp_degc:.4g} degC)",
+            expected=f"at most {GROUP_GAP_DEGC:g} degC over the six positions",
+            remedy="wait for the chamber to settle, and measure that temperature again",
+        )
+
+
 def check_position_dwells(measurements: MeasurementSet) -> tuple[Dwell, ...]:
     """Dwells in check positions, in the order of the file; each stands by itself."""
     return tuple(d for d in measurements.dwells if d.position in CHECK_POSITIONS)
@@ -113,13 +127,12 @@ def grouped_readings(
 ) -> GroupedReadings:
     """Arrays of the groups.
 
-    A reading never scatters less than the rounding to codes, variance code^2 / 12: a recorded
-    standard deviation below that (a quiet channel shows the same code throughout) is raised to
-    it, or its weight would be infinite.
+    The variance of a mean is sd^2 / count. Readings that scatter by less than half a code are
+    rounded alike, which no count averages out: code^2 / 12 is added whole.
     """
-    least = volts_per_code**2 / 12.0
+    rounding = volts_per_code**2 / 12.0
     variances = [
-        np.maximum(d.sd_v**2, least) / d.count
+        d.sd_v**2 / d.count + np.where(d.sd_v < 0.5 * volts_per_code, rounding, 0.0)
         for group in groups
         for d in group.dwells
         if d.sd_v is not None and d.count is not None

@@ -117,6 +117,7 @@ def select(
     checks: Sequence[Dwell],
     *,
     asked_for: bool,
+    limit_g: float,
 ) -> Selection:
     """Score every shape with every estimator and choose.
 
@@ -128,13 +129,17 @@ def select(
         Check dwells.
     asked_for : bool
         Whether unit.toml names the thermal function, so that there is one shape.
+    limit_g : float
+        A candidate that misses its own fitted readings by more (rms) would be refused afterwards,
+        P1 (13), and is not chosen while another is left.
     """
     low, high = data.readings.temps_degc[0], data.readings.temps_degc[-1]
     scored = [d for d in checks if low - EDGE_DEGC <= d.temp_degc <= high + EDGE_DEGC]
     folds = _folds(data)
     rows = [row for shape in shapes for row in _score_shape(data, estimators, shape, folds, scored)]
     values = 18 * len(folds) + len(scored)
-    best = _choose(rows, values)
+    able = [r for r in rows if r.fit_residual_g <= limit_g] or rows
+    best = _choose(able, values)
     reason = _reason(rows, best, len(folds), len(scored), len(data.readings.temps_degc))
     if asked_for:
         reason = f"{best.title}: thermal function from unit.toml; {reason}"

@@ -137,6 +137,8 @@ def piecewise_linear_shape(
         knots.insert(0, low)
     if high - knots[-1] > GROUP_GAP_DEGC:
         knots.append(high)
+    if len(knots) == 1:  # both ends are near the only knot: the farther one makes the segment
+        knots = sorted([knots[0], low if knots[0] - low > high - knots[0] else high])
     return ThermalShape(PIECEWISE_LINEAR, t0_degc, (low, high), 1, tuple(knots))
 
 

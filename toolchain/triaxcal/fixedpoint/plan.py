@@ -25,8 +25,10 @@ from triaxcal.model.compensation import INVERSE, Compensation
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unitfile import TemperatureSensor, UnitDescription
 
-MAX_TEMPERATURE_CODES = 2**20
-"""The proof visits every temperature code; beyond this it would take minutes."""
+MAX_TEMPERATURE_CODES = 2**17
+"""Proof and cross-check visit every temperature code: this many take some seconds."""
+MAX_SEGMENTS = 64
+"""Of the reference C; a piecewise-linear model with more knots follows noise."""
 
 MAX_RAW_SHIFT = 30
 """The C multiplies by 2^raw_shift in int32."""
@@ -153,6 +155,13 @@ def make_plan(compensation: Compensation, unit: UnitDescription) -> Plan:
     low, high = _temperature_codes(compensation, unit.temperature_sensor, where)
     bits = max(unit.adc.code_max.bit_length(), (-unit.adc.code_min - 1).bit_length())
     raw_shift = min(31 - bits, MAX_RAW_SHIFT)
+    if len(compensation.curves.origins_degc) > MAX_SEGMENTS:
+        raise RefusedError(
+            where,
+            f"{len(compensation.curves.origins_degc)} segments",
+            expected=f"at most {MAX_SEGMENTS}",
+            remedy="choose fewer knots in thermal.knots_degc",
+        )
     volts_per_lsb = unit.adc.volts_per_code / 2.0**raw_shift
     real, frames = _device_polynomials(compensation, unit, low, high, volts_per_lsb)
     shape = Shape(

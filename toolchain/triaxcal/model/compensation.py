@@ -86,8 +86,8 @@ def compensate(
     """Functions that the device evaluates for a fitted thermal model.
 
     For "matrix" the order of N(T) is the lowest whose error against K(T)^-1 (U - U0(T)) stays
-    within `error_max_g` over the range and the box |U_j| <= voltage_max_v, or `MAX_ORDER`; what
-    was reached is measured on the result, by `worst_force_error_g`, at every temperature code.
+    within `error_max_g` over the range and the box |U_j| <= voltage_max_v, or `MAX_ORDER`: the
+    caller measures what was reached, by `worst_force_error_g`, at every temperature code.
     """
     curves = _restrict(thermal.curves, range_degc)
     if method == "inverse":
@@ -115,10 +115,10 @@ def _fit_inverse(
     thermal: ThermalModel, breaks: tuple[float, ...], voltage_max_v: float, error_max_g: float
 ) -> PiecewisePolynomial:
     """N(T) and b(T) by interpolation at Chebyshev points, one polynomial a segment."""
-    result = _chebyshev(thermal, breaks, 1)
     for order in range(1, MAX_ORDER + 1):
         result = _chebyshev(thermal, breaks, order)
-        if _sampled_error_g(thermal, result, voltage_max_v) <= error_max_g:
+        # A tenth is left for the codes between the samples.
+        if _sampled_error_g(thermal, result, voltage_max_v) <= 0.9 * error_max_g:
             break
     return result
 

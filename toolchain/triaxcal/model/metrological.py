@@ -17,8 +17,6 @@ CONSTANT_NAMES: tuple[str, ...] = (
 K_ij is the output of axis i (V) for 1 g along axis j; U0_i the bias of axis i (V).
 """
 
-SCALE_FACTORS = (0, 4, 8)
-CROSS_SENSITIVITIES = (1, 2, 3, 5, 6, 7)
 BIASES = (9, 10, 11)
 
 

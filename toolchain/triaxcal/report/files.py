@@ -12,6 +12,8 @@ from triaxcal.report.residual_plot import residuals_svg
 from triaxcal.report.results import calibration_json, verification_json
 
 CERTIFICATE = "certificate.dcc.xml"
+SOMETIMES = (CERTIFICATE,)
+"""Files that a delivery may or may not have."""
 
 
 def passport_files(made: Passport) -> dict[str, bytes]:

@@ -13,6 +13,7 @@ from triaxcal.report.temperatures import by_temperature, degrees
 WIDTH = 960.0
 LEFT, RIGHT, TOP, GAP = 64.0, 16.0, 84.0, 8.0
 PANEL_HEIGHT, ROW_HEIGHT = 230.0, 290.0
+PANELS_PER_ROW = 8
 FLOOR_MG = 1e-5
 """Errors below this are drawn on the lowest line: a code of a 24-bit converter is more."""
 
@@ -45,14 +46,17 @@ def residuals_svg(delivery: Delivery) -> bytes:
     One line a method, on a logarithmic axis in mg.
     """
     methods = [m for m in delivery.methods if m.residuals]
+    limits = delivery.unit.limits
     largest_mg = max(abs(r.error_g) * 1e3 for m in methods for r in m.residuals)
-    high = math.ceil(math.log10(max(largest_mg, 1.0)))
+    largest_mg = max(largest_mg, 1.0, limits.at_t0_g * 1e3, limits.over_range_g * 1e3)
+    high = math.ceil(math.log10(largest_mg))
     rows: list[dict[str, object]] = []
     for prefix, title in (("TP", "test positions, fitted"), ("CP", "check positions, held out")):
         groups = by_temperature(methods[0], prefix)
-        if groups:
+        for first in range(0, len(groups), PANELS_PER_ROW):
             scale = _Scale(round(math.log10(FLOOR_MG)), high, TOP + len(rows) * ROW_HEIGHT)
-            rows.append({"title": title, **_row(groups, delivery, scale)})
+            row = _row(groups[first : first + PANELS_PER_ROW], delivery, scale)
+            rows.append({"title": title, **row})
     context = {
         "title": f"{delivery.unit.name}: | |a| - g | before and after compensation, mg",
         "width": WIDTH,
@@ -60,7 +64,7 @@ def residuals_svg(delivery: Delivery) -> bytes:
         "left": LEFT,
         "right": WIDTH - RIGHT,
         "panel_height": PANEL_HEIGHT,
-        "floor": f"{FLOOR_MG:g}",
+        "floor": f"{FLOOR_MG:.5f}",
         "rows": rows,
         "legend": _legend(methods, delivery.unit.method),
     }
@@ -76,7 +80,7 @@ def _row(
         "top": scale.top,
         "bottom": scale.top + PANEL_HEIGHT,
         "ticks": [
-            {"y": scale.y(10.0**e), "label": f"{10.0**e:g}"}
+            {"y": scale.y(10.0**e), "label": f"{10.0**e:f}".rstrip("0").rstrip(".")}
             for e in range(scale.low, scale.high + 1)
         ],
         "panels": [

@@ -89,6 +89,7 @@ def verification_json(delivery: Delivery) -> bytes:
         "cross_check": {
             "implementations": ["Python integer model", "reference C", "generated C"],
             "vectors": check.vectors,
+            "images": check.images,
             "mismatches": 0,
         },
         "residuals_g": {

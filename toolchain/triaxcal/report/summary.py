@@ -65,6 +65,9 @@ def _head(delivery: Delivery) -> str:
     measured = f"{len(delivery.measurements.dwells)} dwells: six positions at {temps} degC"
     if checks:
         measured += f"; {checks} check dwells"
+    outside = len(delivery.measurements.dwells) - len(delivery.methods[0].residuals)
+    if outside:
+        measured += f"; {outside} of the dwells lie outside the range and are not in the residuals"
     method = f"{delivery.unit.method}: {_method_words(delivery)}"
     return "\n".join(
         [
@@ -175,8 +178,11 @@ def _verdict(delivery: Delivery) -> str:
     bound, check, limits = delivery.bound, delivery.check, delivery.unit.limits
     q = delivery.plan.shape.output_q
     chosen = next(m for m in delivery.methods if m.method == delivery.unit.method)
-    at_t0 = max((abs(r.error_g) for r in chosen.residuals if r.at_t0), default=0.0)
-    over = max(abs(r.error_g) for r in chosen.residuals)
+    by_key: dict[str, float] = {}
+    for r in chosen.residuals:
+        _, key = limits.at(r.dwell.temp_degc, delivery.unit.t0_degc)
+        by_key[key] = max(by_key.get(key, 0.0), abs(r.error_g))
+    at_t0 = by_key.get("limits.at_t0_g")
     return "\n".join(
         [
             _entry(
@@ -191,8 +197,14 @@ def _verdict(delivery: Delivery) -> str:
             ),
             _entry(
                 "passed",
-                f"{at_t0 * 1e3:.4f} mg at T0 (limit {limits.at_t0_g * 1e3:g}), "
-                f"{over * 1e3:.4f} mg over the range (limit {limits.over_range_g * 1e3:g})",
+                f"{_passed(at_t0, limits.at_t0_g)} at T0, "
+                f"{_passed(by_key.get('limits.over_range_g'), limits.over_range_g)} elsewhere",
             ),
         ]
     )
+
+
+def _passed(largest_g: float | None, limit_g: float) -> str:
+    if largest_g is None:
+        return "no dwell to check"
+    return f"{largest_g * 1e3:.4f} mg (limit {limit_g * 1e3:g})"

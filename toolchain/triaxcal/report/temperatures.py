@@ -17,7 +17,7 @@ def by_temperature(result: MethodResult, prefix: str) -> list[tuple[float, list[
     }
     groups: list[list[int]] = []
     for i in sorted(temps, key=lambda i: temps[i]):
-        if groups and temps[i] - temps[groups[-1][-1]] < SAME_TEMPERATURE_DEGC:
+        if groups and temps[i] - temps[groups[-1][0]] < SAME_TEMPERATURE_DEGC:
             groups[-1].append(i)
         else:
             groups.append([i])

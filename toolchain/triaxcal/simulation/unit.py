@@ -29,9 +29,14 @@ def write_simulated_unit(folder: Path, seed: int | None = None) -> Path:
     unit = read_unit(folder)
     has_truth, has_tables = (folder / TRUTH_FILE).exists(), (folder / TABLES_FILE).exists()
     if has_truth == has_tables:
-        found = "both truth.toml and tables.toml" if has_truth else "no truth.toml"
+        found = (
+            "both truth.toml and tables.toml" if has_truth else "no truth.toml and no tables.toml"
+        )
         raise RefusedError(
-            str(folder), found, expected="one of them, as docs/file-formats.md describes"
+            str(folder),
+            found,
+            expected="one of the two, as docs/file-formats.md describes",
+            remedy="only simulated units have one: real measurements are not made anew",
         )
     if has_tables:
         if seed is not None:

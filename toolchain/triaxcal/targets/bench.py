@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.resources import shipped
-from triaxcal.targets.bench_case import case_header, floating_tables
-from triaxcal.targets.build import TargetError, Toolset, build
+from triaxcal.targets.bench_case import case_header, floating_macros, floating_tables
+from triaxcal.targets.build import TargetError, Toolset, build, run
 from triaxcal.targets.cores import CORES, Core, install_advice, missing_tools
 from triaxcal.targets.counting import Counts, build_plugin, measure
 from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB2
@@ -79,7 +79,7 @@ def run_bench(
         (subject, core)
         for subject in subjects(wanted)
         for core in CORES
-        if not core.hosted and (subject.arithmetic != THUMB2 or core.thumb2_multiply)
+        if not core.hosted and _meant_for(subject.arithmetic, core)
     ]
     with tempfile.TemporaryDirectory(prefix="triaxcal-bench-") as name:
         work = Path(name)
@@ -94,6 +94,19 @@ def run_bench(
                 costs[futures[future]] = future.result()
                 progress(future.result())
     return [costs[i] for i in range(len(plan))]
+
+
+def _meant_for(arithmetic: int, core: Core) -> bool:
+    if arithmetic == LIMBS:
+        return core.no_long_multiply
+    return arithmetic != THUMB2 or core.thumb2_multiply
+
+
+def compiler_versions() -> list[str]:
+    """First line of --version of every cross compiler that is installed."""
+    compilers = dict.fromkeys(core.gcc for core in CORES if not core.hosted)
+    installed = [c for c in compilers if not missing_tools([c])]
+    return [run([c, "--version"]).splitlines()[0] for c in installed]
 
 
 def _cost(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
@@ -116,9 +129,7 @@ def _cost(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
     return Cost(subject, core, counts, flash, "")
 
 
-def _write_subject(
-    subject: Subject, work: Path
-) -> tuple[list[Path], list[Path], tuple[str, ...]]:
+def _write_subject(subject: Subject, work: Path) -> tuple[list[Path], list[Path], tuple[str, ...]]:
     """Sources, include folders and macros of a subject."""
     target = shipped("firmware_ref") / "target"
     case = subject.case
@@ -126,7 +137,7 @@ def _write_subject(
     (work / "bench_case.h").write_text(case_header(case.plan))
     if subject.real:
         (work / "floating_tables.c").write_text(floating_tables(case.plan, subject.real))
-        defines = (f"-DBENCH_REAL={subject.real}", f"-DBENCH_ORDER={case.plan.shape.order}")
+        defines = floating_macros(case.plan, subject.real)
         return [target / "bench_floating.c", work / "floating_tables.c"], [work], defines
     for name, text in case.files.items():
         (work / name).write_text(text)

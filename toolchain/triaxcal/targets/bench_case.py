@@ -53,23 +53,33 @@ def _table(name: str, dimension: str, values: list[str]) -> str:
 
 
 def floating_tables(plan: Plan, real: str) -> str:
-    """Text of floating_tables.c: the plan's first segment in floats, g and g per raw code."""
+    """Text of floating_tables.c: the first segment in output LSB and LSB per raw code."""
     suffix = "f" if real == "float" else ""
     segment = plan.segments[0]
-    shape = plan.shape
-    g_per_lsb = 2.0 ** -(shape.output_q + shape.output_shift)
-    scale = np.array([2.0**shape.raw_shift] * 3 + [2.0**32]) * g_per_lsb
+    spare = plan.shape.output_shift - 32
+    scale = [2.0 ** (plan.shape.raw_shift - plan.shape.output_shift)] * 3 + [2.0**-spare]
     rows = [
         "{" + ", ".join(f"{value * scale[f % 4]!r}{suffix}" for value in row) + "}"
         for f, row in enumerate(plan.real[0].tolist())
     ]
-    return "\n".join(
-        [
-            '#include "bench_floating.h"',
-            "const floating_calib_t FLOATING_CALIB = {",
-            f"    {segment.origin_code}, {segment.gain / 2.0**31!r}{suffix},",
-            "    {" + ",\n     ".join(rows).replace("np.float64(", "").replace(")", "") + "},",
-            "};",
-            "",
-        ]
+    codes = (plan.temp_min_code, plan.temp_max_code, segment.origin_code)
+    lines = [
+        '#include "bench_floating.h"',
+        "const floating_calib_t FLOATING_CALIB = {",
+        f"    {', '.join(map(int32_literal, codes))}, {segment.gain / 2.0**31!r}{suffix},",
+        "    {" + ",\n     ".join(rows) + "},",
+        "};",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def floating_macros(plan: Plan, real: str) -> tuple[str, ...]:
+    """Macros of bench_floating.h."""
+    low, high = plan.shape.raw_min, plan.shape.raw_max
+    return (
+        f"-DBENCH_REAL={real}",
+        f"-DBENCH_ORDER={plan.shape.order}",
+        f"-DBENCH_CHECKED={int(high - low != 2**32 - 1)}",
+        f"-DBENCH_RAW_MIN={int32_literal(low)}",
+        f"-DBENCH_RAW_MAX={int32_literal(high)}",
     )

@@ -43,7 +43,9 @@ class Core:
     memory : dict
         Origins and lengths for the linker script; empty for a hosted program.
     thumb2_multiply : bool
-        Whether it has Thumb-2 with 32x32->64 multiplications, which TRIAX_ARITHMETIC 2 needs.
+        Whether it has Thumb-2 with 32x32->64 multiplications, which TRIAX_THUMB2 needs.
+    no_long_multiply : bool
+        Whether it has no 32x32->64 multiplication, so that TRIAX_LIMBS is meant for it.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Core:
     emulator: tuple[str, ...]
     memory: dict[str, int]
     thumb2_multiply: bool = False
+    no_long_multiply: bool = False
 
     @property
     def hosted(self) -> bool:
@@ -90,7 +93,8 @@ def _cortex(name: str, cpu: str, machine: str, *fpu: str, flash: int = 0, ram: i
         (f"-mcpu={cpu}", "-mthumb", *floats),
         ("qemu-system-arm", "-M", machine, *_SEMIHOSTING, "-kernel"),
         memory,
-        thumb2,
+        thumb2_multiply=thumb2,
+        no_long_multiply=not thumb2,
     )
 
 

@@ -16,10 +16,11 @@ LOOP_ROUNDS = (1, 10, 100, 1000)
 
 @dataclass(frozen=True)
 class Span:
-    """Least and most instructions of a call over the inputs of a section."""
+    """Least, most and mean instructions of a call over the inputs of a section."""
 
     least: int
     most: int
+    mean: float
 
 
 @dataclass(frozen=True)
@@ -91,4 +92,5 @@ def measure(core: Core, program: Path, plugin: Path) -> Counts:
 
 
 def _span(counts: list[int], overhead: int) -> Span:
-    return Span(min(counts) - overhead, max(counts) - overhead)
+    mean = sum(counts) / len(counts) - overhead
+    return Span(min(counts) - overhead, max(counts) - overhead, round(mean, 1))

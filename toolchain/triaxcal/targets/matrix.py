@@ -21,6 +21,7 @@ ARITHMETIC_NAMES = ("portable", "limbs", "thumb2")
 
 COMPILERS = ("gcc", "clang")
 OPTIMISATIONS = ("-O0", "-O1", "-O2", "-O3", "-Os")
+EVERY_WAY = tuple((c, o) for c in COMPILERS for o in OPTIMISATIONS)
 PASSED, FAILED, NOT_DONE = "passed", "failed", "not done"
 
 
@@ -52,28 +53,32 @@ class Outcome:
 
 def shipped_builds(cases: Sequence[Case]) -> list[Build]:
     """Every core, compiler and optimisation for the cubic; two of them for the other shapes."""
-    builds: list[Build] = []
-    for case in cases:
-        combinations = (
-            [(c, o) for c in COMPILERS for o in OPTIMISATIONS]
-            if case.name == CUBIC
-            else [("gcc", "-O2"), ("clang", "-Os")]
+    return [
+        b
+        for case in cases
+        for b in _builds(
+            case, EVERY_WAY if case.name == CUBIC else (("gcc", "-O2"), ("clang", "-Os"))
         )
-        builds += _builds(case, combinations)
-    return builds
+    ]
 
 
 def unit_builds(case: Case) -> list[Build]:
     """Every core, compiler and optimisation for a unit's own shape."""
-    return list(_builds(case, [(c, o) for c in COMPILERS for o in OPTIMISATIONS]))
+    return list(_builds(case, EVERY_WAY))
 
 
-def _builds(case: Case, combinations: Sequence[tuple[str, str]]) -> Iterator[Build]:
+def _builds(case: Case, ways: Sequence[tuple[str, str]]) -> Iterator[Build]:
+    """The portable form everywhere, the limb and assembly forms where they are meant to be used.
+
+    The limb form is tried in one more way on every core, because it is portable too.
+    """
     for core in CORES:
-        forms = (PORTABLE,)
-        for arithmetic in forms:
-            for compiler, optimisation in combinations:
-                yield Build(case, Toolset(core, compiler, optimisation, arithmetic))
+        for compiler, optimisation in ways:
+            yield Build(case, Toolset(core, compiler, optimisation, PORTABLE))
+        for compiler, optimisation in ways if core.no_long_multiply else ways[2:3]:
+            yield Build(case, Toolset(core, compiler, optimisation, LIMBS))
+        for compiler, optimisation in ways if core.thumb2_multiply else ():
+            yield Build(case, Toolset(core, compiler, optimisation, THUMB2))
 
 
 def run_builds(

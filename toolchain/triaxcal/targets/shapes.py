@@ -66,8 +66,8 @@ _SHAPES: tuple[tuple[str, str, str, Change], ...] = (
     ("odd range", "AT-SIM", "raw codes -8000000 to 8000000", _odd_range),
     ("16 bits", "AT-SIM", "16-bit raw codes", lambda u: replace(u, adc=replace(
         u.adc, bits=16, code_min=-(2**15), code_max=2**15 - 1))),
-    ("fine thermometer", "AT-SIM", "366667 temperature codes", lambda u: replace(
-        u, temperature_sensor=replace(u.temperature_sensor, degc_per_code=0.0003))),
+    ("fine thermometer", "AT-SIM", "110000 temperature codes", lambda u: replace(
+        u, temperature_sensor=replace(u.temperature_sensor, degc_per_code=0.001))),
 )  # fmt: skip
 
 

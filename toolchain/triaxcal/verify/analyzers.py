@@ -13,7 +13,7 @@ from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
 from triaxcal.resources import shipped
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.tools import Answer, MissingToolError, Tool, run
-from triaxcal.verify.workspace import IMAGE, ROUTINE, Workspace
+from triaxcal.verify.workspace import FORMS, IMAGE, ROUTINE, Workspace
 
 GCC = Tool("gcc", "gcc libc6-dev")
 CLANG = Tool("clang", "clang libclang-rt-dev")
@@ -55,55 +55,78 @@ SANITIZERS = (
 
 
 def check_gcc_analyzer(work: Workspace) -> Outcome:
-    """gcc -fanalyzer with every warning an error."""
-    command = [GCC.find(), *FLAGS, "-fanalyzer", "-c", "-o", "verify_analyzer.o", ROUTINE]
-    answer = run(command, work.folder)
-    complaints = complaints_of(answer)
-    good = answer.code == 0 and not complaints
+    """gcc -fanalyzer with every warning an error, on both forms."""
+    complaints: list[str] = []
+    good = True
+    for name, form in FORMS.items():
+        flags = [*FLAGS, *form, "-fanalyzer", "-c", "-o", f"verify_analyzer_{name}.o"]
+        answer = run([GCC.find(), *flags, ROUTINE], work.folder)
+        complaints += complaints_of(answer)
+        good = good and answer.code == 0
     figures = {"version": GCC.version(), "findings": len(complaints)}
-    finding = f"{len(complaints)} findings"
     return judged(
         "gcc_analyzer",
         "gcc -fanalyzer",
-        good=good,
-        finding=finding,
+        good=good and not complaints,
+        finding=f"{len(complaints)} findings",
         figures=figures,
         details=complaints,
     )
 
 
 def check_sanitizer(work: Workspace, sanitizer: Sanitizer) -> Outcome:
-    """Boundary and random vectors under a sanitizer: no complaint, and Python's answers.
+    """Boundary and random vectors under a sanitizer, both forms: no complaint, Python's answers.
 
     Raises
     ------
     MissingToolError
         When the compiler, or its sanitizer's library, is not installed.
     """
-    program = work.folder / f"verify_{sanitizer.key}"
-    _build(work, sanitizer, program)
+    _probe(work, sanitizer)
     vectors = vector_sets(work.plan, RANDOM_VECTORS)
     count = sum(len(v.temp) for v in vectors)
-    given = work.folder / f"{program.name}.in"
+    given = work.folder / f"verify_{sanitizer.key}.in"
     given.write_bytes(b"".join(_bytes_of(v) for v in vectors))
-    found = work.folder / f"{program.name}.out"
-    command = [str(program), given.name, found.name, IMAGE]
-    answer = run(command, work.folder, {"UBSAN_OPTIONS": "print_stacktrace=0"})
-    complaints = complaints_of(answer)
-    if not complaints and answer.code:
-        complaints = [f"exit code {answer.code}: {answer.text.strip()[-200:]}"]
-    if not complaints and found.read_bytes() != _expected(work, vectors):
-        complaints = ["answers differ from those of the Python model"]
+    expected = _expected(work, vectors)
+    complaints = [
+        f"{name} form: {complaint}"
+        for name, form in FORMS.items()
+        for complaint in _run_form(work, sanitizer, form, given, expected)
+    ]
     figures = {"version": sanitizer.tool.version(), "vectors": count, "findings": len(complaints)}
-    finding = f"{len(complaints)} findings on {count} vectors, compiled-in constants and image"
     return judged(
         sanitizer.key,
         sanitizer.title,
         good=not complaints,
-        finding=finding,
+        finding=f"{len(complaints)} findings on {count} vectors, constants and image, both forms",
         figures=figures,
         details=complaints,
     )
+
+
+def _run_form(
+    work: Workspace, sanitizer: Sanitizer, form: tuple[str, ...], given: Path, expected: bytes
+) -> list[str]:
+    """Complaints of one form, or that its answers differ."""
+    program = work.folder / f"verify_{sanitizer.key}"
+    driver = work.render(f"{program.name}.c", "verify_driver.c.j2", {})
+    batch = shipped("firmware_ref")
+    command = [
+        sanitizer.tool.find(), "-std=c99", "-O1", "-g", *form, *sanitizer.flags,
+        f"-I{work.folder}", f"-I{batch}",
+        "-o", str(program), driver.name, ROUTINE, str(batch / "triax_batch.c"),
+    ]  # fmt: skip
+    built = run(command, work.folder)
+    if built.code:
+        return complaints_of(built) or [built.text[-200:]]
+    found = given.with_suffix(".out")
+    answer = run([str(program), given.name, found.name, IMAGE], work.folder)
+    complaints = complaints_of(answer)
+    if not complaints and answer.code:
+        return [f"exit code {answer.code}: {answer.text.strip()[-200:]}"]
+    if not complaints and found.read_bytes() != expected:
+        return ["answers differ from those of the Python model"]
+    return complaints
 
 
 def complaints_of(answer: Answer) -> list[str]:
@@ -112,25 +135,17 @@ def complaints_of(answer: Answer) -> list[str]:
     return [match.group() for match in found if match]
 
 
-def _build(work: Workspace, sanitizer: Sanitizer, program: Path) -> None:
+def _probe(work: Workspace, sanitizer: Sanitizer) -> None:
+    """Link nothing but the sanitizer's own library."""
     compiler = sanitizer.tool.find()
-    probe = work.folder / f"{program.name}_probe.c"
+    probe = work.folder / f"verify_{sanitizer.key}_probe.c"
     probe.write_text("int main(void) { return 0; }\n")
-    linked = run([compiler, *sanitizer.flags, "-o", f"{program}_probe", probe.name], work.folder)
-    if linked.code:
+    program = str(probe.with_suffix(""))
+    if run([compiler, *sanitizer.flags, "-o", program, probe.name], work.folder).code:
         raise MissingToolError(
             f"{sanitizer.tool.program} has no {sanitizer.flags[0]}; "
             f"sudo apt-get install {sanitizer.tool.package}"
         )
-    driver = work.render(f"{program.name}.c", "verify_driver.c.j2", {})
-    batch = shipped("firmware_ref")
-    command = [
-        compiler, "-std=c99", "-O1", "-g", *sanitizer.flags, f"-I{work.folder}", f"-I{batch}",
-        "-o", str(program), driver.name, ROUTINE, str(batch / "triax_batch.c"),
-    ]  # fmt: skip
-    built = run(command, work.folder)
-    if built.code:
-        raise RuntimeError(built.text)
 
 
 def _bytes_of(vectors: VectorSet) -> bytes:

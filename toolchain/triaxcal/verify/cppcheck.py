@@ -20,6 +20,9 @@ OPTIONS = (
     "--template={file}\t{line}\t{id}\t{message}", "--error-exitcode=0",
 )  # fmt: skip
 
+FORMS = ("-DTRIAX_ARITHMETIC=0", "-DTRIAX_ARITHMETIC=1", "-DTRIAX_ARITHMETIC=2")
+"""Each form by itself; without them cppcheck looks at the portable one only."""
+
 _RULE = re.compile(r"misra-c2012-(\d+\.\d+)")
 _MACRO = re.compile(r"#define (\w+)")
 _FUNCTION = re.compile(r"[A-Za-z_][\w\s*]*?(\w+)\([^;]*$")
@@ -89,12 +92,14 @@ def find_all(work: Workspace) -> list[Finding]:
     MissingToolError, BrokenToolError
     """
     (work.folder / USER).write_text(f'#include "{CONSTANTS}"\n')
-    command = [CPPCHECK.find(), *OPTIONS, ROUTINE, USER]
-    answer = run(command, work.folder)
-    if answer.code:
-        raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
+    lines: dict[str, None] = {}
+    for form in FORMS:
+        answer = run([CPPCHECK.find(), *OPTIONS, form, ROUTINE, USER], work.folder)
+        if answer.code:
+            raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
+        lines |= dict.fromkeys(answer.text.splitlines())
     findings = []
-    for line in answer.text.splitlines():
+    for line in lines:
         file, number, identity, text = [*line.split("\t", 3), "", "", ""][:4]
         if not number.isdigit():
             raise BrokenToolError(f"cppcheck: {line[:200]}")

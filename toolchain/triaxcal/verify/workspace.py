@@ -14,6 +14,10 @@ from triaxcal.fixedpoint.proof import Bound
 ROUTINE = "triax_comp.c"
 CONSTANTS = "triax_calib.h"
 IMAGE = "triax_calib.bin"
+PORTABLE: tuple[str, ...] = ()
+LIMBS: tuple[str, ...] = ("-DTRIAX_ARITHMETIC=1",)
+FORMS = {"portable": PORTABLE, "limbs": LIMBS}
+"""Flags of the forms of the routine that a host can run; the assembly form needs its core."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
+from triaxcal.unitfile import T0_TOLERANCE_DEGC
 
 LENGTH = 3
 
@@ -107,15 +108,15 @@ class Passport:
     @cached_property
     def acceptance(self) -> tuple[Acceptance, ...]:
         """Limits at T0 and over the range."""
-        limits, u = self.delivery.unit.limits, self.uncertainty
-        at_t0 = [r for r in self.delivered.residuals if r.at_t0]
+        unit, u = self.delivery.unit, self.uncertainty
+        limits, residuals = unit.limits, self.delivered.residuals
+        at_t0 = [r for r in residuals if abs(r.dwell.temp_degc - unit.t0_degc) <= T0_TOLERANCE_DEGC]
+        others = [r for r in residuals if abs(r.dwell.temp_degc - unit.t0_degc) > T0_TOLERANCE_DEGC]
         worst = int(np.argmax(u.force_u[u.t0_index, :, LENGTH]))
         t0_budget = u.force_budget(LENGTH, u.t0_index, DIRECTIONS[worst])
         return (
             _acceptance("at T0", limits.at_t0_g, at_t0, t0_budget),
-            _acceptance(
-                "over the range", limits.over_range_g, self.delivered.residuals, self.length_budget
-            ),
+            _acceptance("over the range", limits.over_range_g, others, self.length_budget),
         )
 
     @property
@@ -139,7 +140,7 @@ def passport(delivery: Delivery, tools: Mapping[str, Any]) -> Passport:
 
 
 def _acceptance(
-    where: str, limit_g: float, residuals: tuple[Residual, ...] | list[Residual], budget: Budget
+    where: str, limit_g: float, residuals: list[Residual], budget: Budget
 ) -> Acceptance:
     worst = next(line for line in budget.lines if line.contribution is not None)
     largest = max((abs(r.error_g) for r in residuals), default=0.0)

@@ -154,7 +154,7 @@ def _budget(b: Budget, title: str, orientation: str) -> dict[str, Any]:
         "expanded": in_unit(b.expanded, b.unit),
         "factor": f"{b.factor:.2f}",
         "dof": _dof(b.dof),
-        "verdict": b.verdict.replace(" at -", " at \u2212"),
+        "verdict": signed(b.verdict),
         "lines": [_line(line, b.unit) for line in b.lines],
     }
 

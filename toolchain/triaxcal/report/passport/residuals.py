@@ -52,14 +52,13 @@ def _row(
         x0 = LEFT + k * span
         step = (span - 10.0) / len(indices)
         ordered = sorted(indices, key=lambda i: before[i].dwell.position)
-        at_t0 = before[ordered[0]].at_t0
         columns.append(
             {
                 "x": round(x0, 2),
                 "middle": round(x0 + span / 2, 2),
                 "end": round(x0 + span, 2),
                 "title": signed(degrees(temp)) + " °C",
-                "limit": axis.y(limits.at_t0_g if at_t0 else limits.over_range_g),
+                "limit": axis.y(limits.at(temp, p.delivery.unit.t0_degc)[0]),
                 "marks": [
                     {
                         "x": round(x0 + 5.0 + step * (n + 0.5), 2),

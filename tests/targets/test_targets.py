@@ -1,0 +1,236 @@
+"""The target room: vectors, digests, verdicts. What needs a cross compiler is skipped by name."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from triaxcal.codegen.image import image_bytes
+from triaxcal.errors import RefusedError
+from triaxcal.resources import shipped
+from triaxcal.targets import bench_table, cores, counting, matrix
+from triaxcal.targets.build import TargetError, Toolset, build, emulate
+from triaxcal.targets.counting import build_plugin, measure
+from triaxcal.targets.matrix import FAILED, NOT_DONE, PASSED, Build, compare, run_builds
+from triaxcal.targets.shapes import CUBIC, Case, shipped_cases, unit_case
+from triaxcal.targets.table import counts, matrix_table
+from triaxcal.targets.vectors import VECTORS, draw, expected_lines, raw_boundaries, vectors
+
+ROOT = Path(__file__).parents[2]
+FIRMWARE = shipped("firmware_ref")
+CASES = shipped_cases(ROOT / "units")
+M3 = next(core for core in cores.CORES if core.name == "Cortex-M3")
+
+
+def case_named(name: str) -> Case:
+    return next(c for c in CASES if c.name == name)
+
+
+def need(*tools: str) -> None:
+    missing = cores.missing_tools(tools)
+    if missing:
+        pytest.skip(f"{', '.join(missing)} not found: {cores.install_advice(missing)}")
+
+
+def run_on_host(case: Case, folder: Path, arithmetic: int = 0) -> str:
+    """test_main.c as a program of this machine."""
+    _, expected = matrix._write_cases([Build(case, Toolset(M3, "gcc", "-O1"))], folder)[case.name]
+    assert expected == expected_lines(case)
+    source = folder / "case-0"
+    target = FIRMWARE / "target"
+    program = folder / "program"
+    files = [source / "triax_comp.c", FIRMWARE / "triax_ref.c", FIRMWARE / "triax_ref_image.c"]
+    command = ["gcc", "-std=c99", "-O1", "-DTARGET_HOSTED", f"-DTRIAX_ARITHMETIC={arithmetic}"]
+    command += [f"-I{d}" for d in (source, FIRMWARE, target)]
+    command += map(str, [*files, target / "test_main.c", target / "target_io.c"])
+    subprocess.run([*command, "-o", str(program)], check=True)
+    return subprocess.run([program], capture_output=True, text=True, check=True).stdout
+
+
+def test_draw_is_the_finaliser_of_murmurhash3() -> None:
+    # By hand for counter 1, in Python's own integers.
+    x = 0x9E3779B9
+    x = (x ^ (x >> 16)) * 0x85EBCA6B % 2**32
+    x = (x ^ (x >> 13)) * 0xC2B2AE35 % 2**32
+    assert draw(np.array([1], np.uint32))[0] == x ^ (x >> 16)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda c: c.name)
+def test_vectors_meet_every_boundary_and_stay_where_they_should(case: Case) -> None:
+    temp, raw = vectors(case.plan)
+    shape = case.plan.shape
+    assert temp.shape == (VECTORS,)
+    in_range = np.arange(VECTORS) % 4 < 2
+    assert (raw[in_range] >= shape.raw_min).all()
+    assert (raw[in_range] <= shape.raw_max).all()
+    assert (temp[in_range] >= case.plan.temp_min_code).all()
+    assert (temp[in_range] <= case.plan.temp_max_code).all()
+    for axis in range(3):
+        assert set(raw_boundaries(case.plan)) <= set(raw[3::4, axis].tolist())
+
+
+QUICK = (CUBIC, "inverse", "fine thermometer")
+
+
+@pytest.mark.parametrize("arithmetic", [0, 1])
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(c, marks=() if c.name in QUICK else pytest.mark.slow, id=c.name) for c in CASES],
+)
+def test_host_prints_what_python_expects(case: Case, arithmetic: int, tmp_path: Path) -> None:
+    assert compare(run_on_host(case, tmp_path, arithmetic), expected_lines(case)) == ""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("high_word(sum_z)", "high_word(sum_z + 4294967296)", "generated"),
+        ("status = TRIAX_STATUS_RAW_RANGE;", ";", "generated"),
+        ("if (crc32(image", "if (0u && crc32(image", "refused"),
+    ],
+)
+def test_a_fault_in_the_generated_c_is_seen(old: str, new: str, line: str, tmp_path: Path) -> None:
+    case = case_named(CUBIC)
+    text = case.files["triax_comp.c"]
+    assert old in text
+    broken = replace(case, files={**case.files, "triax_comp.c": text.replace(old, new, 1)})
+    assert compare(run_on_host(broken, tmp_path), expected_lines(case)).startswith(
+        f"printed '{line} "
+    )
+
+
+def test_a_fault_in_the_limb_form_is_seen(tmp_path: Path) -> None:
+    case = case_named("fine thermometer")
+    text = case.files["triax_comp.c"]
+    old = "(int32_t)(low >> 16)"
+    assert old in text
+    broken = replace(case, files={**case.files, "triax_comp.c": text.replace(old, "0", 1)})
+    assert compare(run_on_host(broken, tmp_path, 1), expected_lines(case)).startswith("printed")
+
+
+def test_compare_names_the_first_difference() -> None:
+    expected = {"generated": 1, "load": 0}
+    assert compare("generated 00000001\nload 00000000\n", expected) == ""
+    assert compare("generated 00000002\nload 00000000\n", expected) == (
+        "printed 'generated 00000002', expected 'generated 00000001'"
+    )
+    assert compare("generated 00000001\n", expected) == "printed 1 lines, expected 2"
+
+
+def test_missing_tool_is_named_and_not_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "which", lambda _tool: None)
+    outcomes = run_builds([Build(case_named(CUBIC), Toolset(M3, "clang", "-O2"))])
+    assert outcomes[0].status == NOT_DONE
+    assert outcomes[0].detail == (
+        "clang, arm-none-eabi-gcc, qemu-system-arm not found: "
+        "sudo apt-get install clang gcc-arm-none-eabi qemu-system-arm"
+    )
+    assert counts(outcomes) == {PASSED: 0, FAILED: 0, NOT_DONE: 1}
+    table = matrix_table(outcomes)
+    assert "0/1 undone" in table
+    assert "not done, 1 builds: clang, arm-none-eabi-gcc" in table
+
+
+def test_every_tool_has_a_package() -> None:
+    for core in cores.CORES:
+        for compiler in matrix.COMPILERS:
+            assert set(core.tools(compiler)) <= set(cores.PACKAGES)
+
+
+def test_matrix_is_as_large_as_promised() -> None:
+    builds = matrix.shipped_builds(CASES)
+    cubic = [b for b in builds if b.case.name == CUBIC and b.toolset.arithmetic == 0]
+    assert len(cubic) == 7 * 2 * 5
+    assert {b.toolset.core.name for b in builds} == {core.name for core in cores.CORES}
+    assert VECTORS >= 20000
+
+
+def test_unit_case_is_the_shipped_shape() -> None:
+    assert unit_case(ROOT / "units" / "AT-SIM").image == image_bytes(case_named("AT-SIM").plan)
+
+
+def test_a_core_under_qemu() -> None:
+    need(*M3.tools("gcc"))
+    case = case_named("AT-CHERNIAK")
+    ways = [Toolset(M3, "gcc", "-O2", arithmetic) for arithmetic in (0, 1, 2)]
+    assert [o.detail for o in run_builds([Build(case, way) for way in ways])] == ["", "", ""]
+
+
+def test_program_that_does_not_build_is_a_failure() -> None:
+    need(*M3.tools("gcc"))
+    case = case_named(CUBIC)
+    broken = replace(case, files={**case.files, "triax_comp.c": "#error broken\n"})
+    outcome = run_builds([Build(broken, Toolset(M3, "gcc", "-O2"))])[0]
+    assert outcome.status == FAILED
+    assert "#error broken" in outcome.detail
+
+
+def known_program(tmp_path: Path, rounds: str) -> Path:
+    """The benchmark program of the cubic with other loops than `counting.LOOP_ROUNDS`."""
+    from triaxcal.targets.bench import Subject, _write_subject
+
+    sources, include, _ = _write_subject(Subject(case_named(CUBIC), 0, ""), tmp_path / "work")
+    target = FIRMWARE / "target"
+    main = tmp_path / "bench_main.c"
+    text = (target / "bench_main.c").read_text()
+    assert "{1, 10, 100, 1000}" in text
+    main.write_text(text.replace("{1, 10, 100, 1000}", rounds))
+    harness = [main, target / "bench_call.c", target / "bench_known.S"]
+    program = tmp_path / "program.elf"
+    build(Toolset(M3, "gcc", "-O2"), [*sources, *harness], include, program)
+    return program
+
+
+def test_counter_counts_known_loops_or_refuses(tmp_path: Path) -> None:
+    need(*M3.tools("gcc"))
+    plugin = build_plugin(tmp_path)
+    found = measure(M3, known_program(tmp_path / "right", "{1, 10, 100, 1000}"), plugin)
+    assert found.set.least == found.set.most > 12 * 3 * 2  # a multiplication and an addition a step
+    assert found.apply.least == found.apply.most > 9  # a product each
+    with pytest.raises(TargetError, match=r"were counted as \[3, 21, 201, 2003\]"):
+        measure(M3, known_program(tmp_path / "wrong", "{1, 10, 100, 1001}"), plugin)
+    assert counting.LOOP_ROUNDS == (1, 10, 100, 1000)
+
+
+def test_a_program_that_fails_is_reported(tmp_path: Path) -> None:
+    need(*M3.tools("gcc"))
+    source = tmp_path / "main.c"
+    source.write_text("int main(void)\n{\n    return 1;\n}\n")
+    program = tmp_path / "program.elf"
+    build(Toolset(M3, "gcc", "-O2"), [source], [], program)
+    with pytest.raises(TargetError, match="qemu-system-arm: exit code 1"):
+        emulate(M3, program)
+
+
+def test_table_goes_between_the_markers() -> None:
+    page = f"before\n{bench_table.BEGIN}\nold\n{bench_table.END}\nafter\n"
+    once = bench_table.put_between_markers(page, "new", "page.md")
+    assert once == f"before\n{bench_table.BEGIN}\n\nnew\n\n{bench_table.END}\nafter\n"
+    assert bench_table.put_between_markers(once, "new", "page.md") == once
+    with pytest.raises(RefusedError, match=r"page\.md: no markers of the generated table"):
+        bench_table.put_between_markers("nothing", "new", "page.md")
+
+
+def test_example_firmware(tmp_path: Path) -> None:
+    need("arm-none-eabi-gcc", "qemu-system-arm", "gcc")
+    case = case_named("AT-SIM")
+    generated = tmp_path / "generated"
+    generated.mkdir()
+    for name, text in case.files.items():
+        (generated / name).write_text(text)
+    (generated / "triax_calib.bin").write_bytes(case.image)
+    make = ["make", "-C", str(ROOT / "examples" / "cortex-m3"), "test"]
+    make += [f"GENERATED={generated}", f"BUILD={tmp_path / 'build'}"]
+    done = subprocess.run(make, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "check: 8 lines as expected" in done.stdout
+    # A damaged image in flash is refused, and the test of the example says so.
+    (generated / "triax_calib.bin").write_bytes(bytes([case.image[0] ^ 1]) + case.image[1:])
+    done = subprocess.run(make, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "calibration refused" in done.stderr + done.stdout or "refused" in done.stderr

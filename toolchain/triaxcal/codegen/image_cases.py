@@ -1,0 +1,293 @@
+"""Images that the loader must accept or refuse, at and just beyond every limit of step R.
+
+What is accepted is decided here from docs/fixed-point.md, step R, in Python's unbounded integers,
+not by the code that plans or proves. Accepted images, however wild their constants, must give the
+same answers in the generated C and in the reference C.
+"""
+
+from __future__ import annotations
+
+import itertools
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from random import Random
+
+import numpy as np
+
+from triaxcal.codegen.image import HEADER_NAMES
+from triaxcal.codegen.inverse_edges import inverse_edges
+from triaxcal.codegen.routines import Generated, Reference
+from triaxcal.errors import RefusedError
+from triaxcal.fixedpoint.integer_model import STATUS_BAD_IMAGE, STATUS_OK
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.compensation import INVERSE
+
+INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
+ROW_LIMIT = 2**32 - 8
+SEED = 20130527
+WILD_IMAGES = 48
+_TEMP_MIN, _TEMP_MAX = len(HEADER_NAMES), len(HEADER_NAMES) + 1
+_FIRST, _ORIGIN, _GAIN, _COEFFICIENTS = range(4)
+
+
+@dataclass(frozen=True)
+class ImageCase:
+    """An image and whether the loader has to accept it."""
+
+    name: str
+    image: bytes
+    accepted: bool
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the words of an image of one shape stand, and step R for them."""
+
+    segments: int
+    order: int
+    inverse: bool
+
+    def segment(self, s: int) -> int:
+        """Index of the first word of a segment."""
+        return _TEMP_MAX + 1 + s * (_COEFFICIENTS + 12 * (self.order + 1))
+
+    def coefficient(self, s: int, f: int, k: int) -> int:
+        """Index of c_k of a function."""
+        return self.segment(s) + _COEFFICIENTS + f * (self.order + 1) + k
+
+    def is_safe(self, words: list[int]) -> bool:
+        """Step R: whether no arithmetic can overflow with these constants."""
+        low, high = words[_TEMP_MIN], words[_TEMP_MAX]
+        firsts = [words[self.segment(s)] for s in range(self.segments)]
+        if firsts[0] != low or any(not low < f <= high for f in firsts[1:]):
+            return False
+        lasts = [f - 1 for f in firsts[1:]] + [high]
+        return all(self._segment_is_safe(words, s, lasts[s]) for s in range(self.segments))
+
+    def _segment_is_safe(self, words: list[int], s: int, last: int) -> bool:
+        at = self.segment(s)
+        first, origin, gain = words[at : at + 3]
+        if gain <= 0 or first > last:
+            return False
+        if max(abs(first - origin), abs(last - origin)) * gain > INT32_MAX:
+            return False
+        ends = []
+        for f in range(12):
+            bound = 0
+            for k in range(self.order, -1, -1):
+                halved = 0 if k == self.order else bound // 2 + 1
+                bound = abs(words[self.coefficient(s, f, k)]) + halved
+                if bound > INT32_MAX:
+                    return False
+            ends.append(bound)
+        rows = [sum(ends[4 * i : 4 * i + 3]) + 2 * ends[4 * i + 3] for i in range(3)]
+        return self.inverse or max(rows) < ROW_LIMIT
+
+
+def check_images(plan: Plan, image: bytes, generated: Generated, reference: Reference) -> int:
+    """Load every case, run the accepted ones, and return how many cases there were.
+
+    Raises
+    ------
+    RefusedError
+        At the first image that is wrongly accepted or refused, or answered in two ways.
+    """
+    cases = image_cases(plan, image)
+    temp, raw = case_vectors(plan)
+    for case in cases:
+        status, answers = generated.run_image(case.image, temp, raw)
+        expected = STATUS_OK if case.accepted else STATUS_BAD_IMAGE
+        if status != expected:
+            raise RefusedError(
+                f"triax_calib_load, image '{case.name}'",
+                f"status {status}",
+                expected=f"status {expected}",
+                remedy="do not use this build, report it",
+            )
+        if case.accepted:
+            expected_accel, expected_status = reference.routine(case.image)(temp, raw)
+            differs = (answers[0] != expected_accel).any(axis=1) | (answers[1] != expected_status)
+            if differs.any():
+                i = int(differs.argmax())
+                raise RefusedError(
+                    f"image '{case.name}', temp_code {temp[i]}, raw_code {raw[i].tolist()}",
+                    f"generated C gives {answers[0][i].tolist()} status {answers[1][i]}",
+                    expected=f"{expected_accel[i].tolist()} status {expected_status[i]}",
+                    remedy="do not use this build, report it",
+                )
+    return len(cases)
+
+
+def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
+    """Damaged images, images at the limits of step R, and wild ones."""
+    shape = plan.shape
+    layout = Layout(shape.segments, shape.order, shape.form == INVERSE)
+    words = list(struct.unpack(f"<{len(image) // 4}i", image))[:-1]
+    cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image)]
+    changes = itertools.chain(
+        _temperature_edges(layout, words), _coefficient_edges(layout, words),
+        _row_edges(layout), _wild(layout), _inverse_edges(layout, plan),
+    )  # fmt: skip
+    for name, change in changes:
+        if not all(INT32_MIN <= value <= INT32_MAX for value in change.values()):
+            continue  # beyond what a word holds: no image says so
+        changed = words.copy()
+        for index, value in change.items():
+            changed[index] = value
+        cases.append(ImageCase(name, _sealed(changed), layout.is_safe(changed)))
+    return cases
+
+
+Change = tuple[str, dict[int, int]]
+"""A name, and words by index."""
+
+
+def _sealed(words: list[int]) -> bytes:
+    payload = struct.pack(f"<{len(words)}i", *words)
+    return payload + struct.pack("<I", zlib.crc32(payload))
+
+
+def _damaged(image: bytes) -> Iterator[tuple[str, bytes]]:
+    for size in (0, 4, len(image) - 4, len(image) - 1):
+        yield f"cut to {size} bytes", image[:size]
+    for more in (1, 4):
+        yield f"{more} bytes too long", image + bytes(more)
+    for at in range(len(image)):
+        yield f"bit of byte {at}", image[:at] + bytes([image[at] ^ 1 << at % 8]) + image[at + 1 :]
+    words = list(struct.unpack(f"<{len(image) // 4}i", image))[:-1]
+    for at, name in enumerate(HEADER_NAMES):
+        for bit in (1, INT32_MIN):
+            yield f"{name}, CRC right", _sealed([*words[:at], words[at] ^ bit, *words[at + 1 :]])
+
+
+def _temperature_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
+    low, high = words[_TEMP_MIN], words[_TEMP_MAX]
+    starts = [layout.segment(s) for s in range(layout.segments)]
+    for value in (low - 1, low + 1):
+        yield "temp_min_code", {_TEMP_MIN: value}
+        yield "first_code", {starts[0]: value}
+    last_origin, last_gain = words[starts[-1] + _ORIGIN], words[starts[-1] + _GAIN]
+    reach = INT32_MAX // last_gain
+    for value in (last_origin + reach, last_origin + reach + 1, low, low - 1, INT32_MAX, INT32_MIN):
+        yield f"temp_max_code {value}", {_TEMP_MAX: value}
+    reach = INT32_MAX // words[starts[0] + _GAIN]
+    for beyond in (0, 1):
+        value = words[starts[0] + _ORIGIN] - reach - beyond
+        yield f"temp_min_code {value}", {_TEMP_MIN: value, starts[0]: value}
+    firsts = [words[at] for at in starts]
+    lasts = [f - 1 for f in firsts[1:]] + [high]
+    for s, at in enumerate(starts):
+        reach = max(words[at + _ORIGIN] - firsts[s], lasts[s] - words[at + _ORIGIN])
+        fullest = INT32_MAX // max(reach, 1)
+        for gain in (INT32_MIN, -1, 0, 1, fullest, fullest + 1, INT32_MAX):
+            yield f"gain {gain} of segment {s}", {at + _GAIN: gain}
+        for origin in (INT32_MIN, INT32_MAX, firsts[s], lasts[s]):
+            yield f"origin {origin} of segment {s}", {at + _ORIGIN: origin}
+        # A point: reach 0, so that any gain fits; and the order of the segments.
+        if s:
+            for first in (low, low + 1, firsts[s - 1], firsts[s - 1] + 1, high, high + 1):
+                yield f"first_code {first} of segment {s}", {
+                    at: first, at + _GAIN: 1, starts[s - 1] + _GAIN: 1
+                }  # fmt: skip
+
+
+def _coefficient_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
+    """Every stage of Horner's rule at the largest bound that fits, and one beyond."""
+    for s, f, k in itertools.product(range(layout.segments), range(12), range(layout.order + 1)):
+        here = layout.coefficient(s, f, k)
+        above = 0
+        for higher in range(layout.order, k, -1):
+            halved = 0 if higher == layout.order else above // 2 + 1
+            above = abs(words[layout.coefficient(s, f, higher)]) + halved
+        room = INT32_MAX - (0 if k == layout.order else above // 2 + 1)
+        others = {layout.coefficient(s, f, lower): 0 for lower in range(k)}
+        # The rest of the row is nil, so that only this function decides.
+        for g in range(4 * (f // 4), 4 * (f // 4) + 4):
+            if g != f:
+                others |= {layout.coefficient(s, g, n): 0 for n in range(layout.order + 1)}
+        for value in (room, room + 1, -room, -room - 1):
+            yield f"c_{k} = {value}, function {f}, segment {s}", {**others, here: value}
+    at = layout.coefficient(0, 0, 0)
+    yield "INT32_MIN", {at: INT32_MIN}
+
+
+def _row_edges(layout: Layout) -> Iterator[Change]:
+    """Rows whose sum is just below the limit and at it, each function in turn deciding."""
+    floors = sum_of_floors(layout.order)
+    for s, row, last in itertools.product(range(layout.segments), range(3), range(4)):
+        for excess in (-1, 0):
+            left = ROW_LIMIT + excess
+            weights = [1, 1, 1, 2]
+            change = {
+                layout.coefficient(s, 4 * row + j, k): 0
+                for j in range(4)
+                for k in range(layout.order + 1)
+            }
+            left -= sum(w * floors for w in weights)
+            order = [j for j in range(4) if j != last] + [last]
+            for j in order:
+                most = INT32_MAX - floors
+                share = min(most, left // weights[j]) if j == last else min(most, left // 4)
+                change[layout.coefficient(s, 4 * row + j, 0)] = share if j % 2 else -share
+                left -= weights[j] * share
+            # What the last cannot take (it is too much, or odd) goes to the first gain.
+            first = layout.coefficient(s, 4 * row + (0 if last else 1), 0)
+            change[first] += left if change[first] > 0 else -left
+            yield f"row {row} at {ROW_LIMIT + excess}, segment {s}", change
+
+
+def sum_of_floors(order: int) -> int:
+    """B_0 of a function whose coefficients are all nil."""
+    bound = 0
+    for _ in range(order):
+        bound = bound // 2 + 1
+    return bound
+
+
+def _wild(layout: Layout) -> Iterator[Change]:
+    """Random constants of all sizes: nearly singular K, saturating inverses, full rows."""
+    rng = Random(SEED)
+    for number in range(WILD_IMAGES):
+        size = 1 << rng.randrange(1, 31)
+        change = {}
+        for s, f in itertools.product(range(layout.segments), range(12)):
+            for k in range(layout.order + 1):
+                limit = max(1, (size if rng.random() < 0.8 else 2) >> (k + 1))
+                change[layout.coefficient(s, f, k)] = rng.randint(-limit, limit)
+        if number % 4 == 0 and layout.inverse:
+            # Two equal rows of K: a determinant of nothing but rounding.
+            for s, j, k in itertools.product(
+                range(layout.segments), range(3), range(layout.order + 1)
+            ):
+                change[layout.coefficient(s, 4 + j, k)] = change[layout.coefficient(s, j, k)]
+        yield f"wild {number}", change
+
+
+def _inverse_edges(layout: Layout, plan: Plan) -> Iterator[Change]:
+    shape = plan.shape
+    if shape.inverse is None:
+        return
+    largest = INT32_MAX - sum_of_floors(layout.order)
+    for name, k00, k01, u0 in inverse_edges(shape.inverse, largest, shape.rounding_in_offset):
+        constant = {0: k00, 1: k01, 3: u0, 5: largest, 10: largest}
+        yield (
+            name,
+            {
+                layout.coefficient(s, f, n): constant.get(f, 0) if n == 0 else 0
+                for s, f, n in itertools.product(
+                    range(layout.segments), range(12), range(layout.order + 1)
+                )
+            },
+        )
+
+
+def case_vectors(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
+    """Ends and middle of the temperature range and int32's ends x a few raw codes."""
+    shape = plan.shape
+    middle = (plan.temp_min_code + plan.temp_max_code) // 2
+    temps = [INT32_MIN, plan.temp_min_code, middle, plan.temp_max_code, INT32_MAX]
+    raws = [INT32_MIN, 1, shape.raw_max // 3, shape.raw_max]
+    rows = np.array(list(itertools.product(temps, raws, raws, raws)), dtype=np.int32)
+    return np.ascontiguousarray(rows[:, 0]), np.ascontiguousarray(rows[:, 1:])

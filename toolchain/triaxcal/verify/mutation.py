@@ -1,0 +1,264 @@
+"""Mutation testing: the shipped vector set has to find every small mistake in C and constants.
+
+Every mutant of triax_comp.c, of each integer in triax_calib.h and of each word of the image is
+compiled (or loaded) and run on the very vectors and images of the cross-check. One that no vector
+finds gets a second chance under sanitizers, as `triaxcal verify` runs them: reading out of bounds
+need not change a result. What still survives must be on file as equivalent, with a reason.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import subprocess
+import tomllib
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
+from triaxcal.codegen.image_cases import case_vectors, image_cases
+from triaxcal.codegen.routines import Reference, start_reference
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.verify.analyzers import GCC, SANITIZERS
+from triaxcal.verify.c_mutants import Mutant, mutants_of
+from triaxcal.verify.tools import BrokenToolError, run
+from triaxcal.verify.workspace import CONSTANTS, FORMS, IMAGE, ROUTINE, Workspace
+
+EQUIVALENTS = Path(__file__).with_name("equivalent_mutants.toml")
+KILLED = "killed by the vectors"
+BY_SANITIZER = "killed under sanitizers"
+EQUIVALENT = "equivalent"
+ELSEWHERE = "for another core"
+STILLBORN = "does not compile"
+SURVIVED = "survived"
+FATES = (KILLED, BY_SANITIZER, EQUIVALENT, ELSEWHERE, STILLBORN, SURVIVED)
+FLAGS = ("-std=c99", "-O1", "-fwrapv", "-w", "-DCPU_SECONDS=5")
+SANITIZED = (*FLAGS[:-1], "-g", *SANITIZERS[0].flags, "-DCPU_SECONDS=60")
+"""-fwrapv: what a mutant does shall not depend on what the compiler makes of an overflow."""
+
+_INTEGER = re.compile(r"^ +(\(-2147483647 - 1\)|-?\d+), /\*", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a mutant."""
+
+    mutant: Mutant
+    fate: str
+
+
+@dataclass(frozen=True)
+class Equivalent:
+    """A change on file that no input can show; "*" stands for any text.
+
+    Attributes
+    ----------
+    function : str
+        Where it is.
+    before, after : str
+        Line without and with the change.
+    reason : str
+        Why no input shows it.
+    """
+
+    function: str
+    before: str
+    after: tuple[str, ...]
+    reason: str
+
+    def covers(self, mutant: Mutant) -> bool:
+        """Whether the mutant is this one."""
+        return (
+            mutant.function == self.function
+            and _like(self.before, mutant.before)
+            and any(_like(after, mutant.after) for after in self.after)
+        )
+
+
+def _like(pattern: str, text: str) -> bool:
+    return re.fullmatch(".*".join(map(re.escape, pattern.split("*~"))), text) is not None
+
+
+def read_equivalents() -> tuple[Equivalent, ...]:
+    """The equivalent mutants on file."""
+    entries = tomllib.loads(EQUIVALENTS.read_text()).get("equivalent", [])
+    return tuple(
+        Equivalent(e["function"], e["before"], tuple(e["after"]), " ".join(e["reason"].split()))
+        for e in entries
+    )
+
+
+class Bench:
+    """One shape's vectors, answers and images on disk, and what runs mutants on them."""
+
+    def __init__(self, work: Workspace) -> None:
+        self.work = work
+        folder = work.folder / "bench"
+        folder.mkdir()
+        # Away from the unit's files, or it would include those rather than the mutant's.
+        self.harness = work.render("bench/verify_mutant.c", "verify_mutant.c.j2", {})
+        self.vectors, self.answers, self.images = (
+            folder / f"verify_mutant.{name}" for name in ("vectors", "answers", "images")
+        )
+        _write_vectors(work.plan, self.vectors, self.answers)
+        _write_images(work, self.images)
+
+    def survives(self, folder: Path, flags: Sequence[str] = FLAGS) -> bool | None:
+        """Run what is in `folder`, changed or not, in both forms; None when it does not compile."""
+        fates = []
+        for form in FORMS.values():
+            fates.append(self._survives(folder, [*flags, *form], None))
+            if fates[-1] is False:
+                return False
+        return True if True in fates else None
+
+    def survives_image(self, folder: Path, image: Path) -> bool | None:
+        """The same for an image, of which the form is no matter."""
+        return self._survives(folder, FLAGS, image)
+
+    def _survives(self, folder: Path, flags: Sequence[str], image: Path | None) -> bool | None:
+        program = folder / "mutant"
+        command = [
+            GCC.find(), *flags, f"-I{folder}", "-o", str(program),
+            str(self.harness), str(folder / ROUTINE),
+        ]  # fmt: skip
+        if run(command, folder).code:
+            return None
+        arguments = [program, self.vectors, self.answers, self.images, *([image] if image else [])]
+        code = subprocess.run(arguments, capture_output=True, check=False).returncode
+        if code == 2:
+            raise BrokenToolError("the harness of the mutants was called wrongly")
+        return code == 0
+
+    def is_seen(self, folder: Path) -> bool:
+        """Whether a change reaches this host's compiler: assembly for another core does not."""
+        return any(
+            _preprocessed(folder, form) != _preprocessed(self.work.folder, form)
+            for form in FORMS.values()
+        )
+
+
+def _preprocessed(folder: Path, form: Sequence[str]) -> str:
+    return run([GCC.find(), "-E", "-P", *form, ROUTINE], folder).text
+
+
+def c_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
+    """Mutants of triax_comp.c, each `every`-th."""
+    source = (bench.work.folder / ROUTINE).read_text()
+    return _campaign(bench, mutants_of(source)[::every], ROUTINE)
+
+
+def constants_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
+    """Each integer of triax_calib.h one up and one down."""
+    source = (bench.work.folder / CONSTANTS).read_text()
+    mutants = []
+    for match in _INTEGER.finditer(source):
+        value = -(2**31) if match.group(1).startswith("(") else int(match.group(1))
+        for other in (value - 1, value + 1):
+            if not -(2**31) < other < 2**31:
+                continue
+            changed = source[: match.start(1)] + str(other) + source[match.end(1) :]
+            line = source.count("\n", 0, match.start(1)) + 1
+            mutants.append(Mutant("TRIAX_CALIB", line, str(value), str(other), changed))
+    return _campaign(bench, mutants[::every], CONSTANTS)
+
+
+def image_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
+    """Each word of the image one up and one down, the CRC made right again."""
+    image = bench.work.image
+    words = struct.unpack(f"<{len(image) // 4}I", image)[:-1]
+    folder = bench.work.folder / "image"
+    _fill(folder, bench.work)
+    verdicts = []
+    for at, word in list(enumerate(words))[::every]:
+        for other in ((word + 1) % 2**32, (word - 1) % 2**32):
+            payload = struct.pack(f"<{len(words)}I", *words[:at], other, *words[at + 1 :])
+            path = folder / "changed.bin"
+            path.write_bytes(payload + struct.pack("<I", zlib.crc32(payload)))
+            mutant = Mutant(IMAGE, at, str(word), str(other), "")
+            fate = SURVIVED if bench.survives_image(folder, path) else KILLED
+            verdicts.append(Verdict(mutant, fate))
+    return verdicts
+
+
+def _campaign(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdict]:
+    equivalents = read_equivalents()
+
+    def judge(item: tuple[int, Mutant]) -> Verdict:
+        number, mutant = item
+        folder = bench.work.folder / f"mutant_{file}_{number}"
+        _fill(folder, bench.work)
+        (folder / file).write_text(mutant.source)
+        survives = bench.survives(folder)
+        if survives is None:
+            fate = STILLBORN
+        elif not survives:
+            fate = KILLED
+        elif any(e.covers(mutant) for e in equivalents):
+            fate = EQUIVALENT
+        elif not bench.survives(folder, SANITIZED):
+            fate = BY_SANITIZER
+        elif file == ROUTINE and not bench.is_seen(folder):
+            fate = ELSEWHERE
+        else:
+            fate = SURVIVED
+        for path in folder.iterdir():
+            path.unlink()
+        folder.rmdir()
+        return Verdict(mutant, fate)
+
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(judge, enumerate(mutants)))
+
+
+def _fill(folder: Path, work: Workspace) -> None:
+    folder.mkdir(exist_ok=True)
+    for name in (ROUTINE, CONSTANTS, "triax_comp.h"):
+        (folder / name).write_bytes((work.folder / name).read_bytes())
+
+
+def _write_vectors(plan: Plan, vectors: Path, answers: Path) -> None:
+    """The cross-check's vectors, those of the images first, and Python's answers."""
+    temp, raw = case_vectors(plan)
+    sets = vector_sets(plan)
+    order = sorted(sets, key=lambda v: v.name != "boundaries")
+    routine = python_routine(plan)
+    with vectors.open("wb") as given, answers.open("wb") as expected:
+        for v in (VectorSet("images", temp, raw), *order):
+            accel, status = routine(v.temp, v.raw)
+            given.write(_rows(v.temp, v.raw))
+            expected.write(_rows(accel, status.view(np.int32)))
+
+
+def _write_images(work: Workspace, path: Path) -> None:
+    """Images of the cross-check with the status and the answers of the reference C."""
+    reference = Reference(start_reference(work.folder).load())
+    temp, raw = case_vectors(work.plan)
+    with path.open("wb") as file:
+        file.write(struct.pack("=I", len(temp)))
+        for case in image_cases(work.plan, work.image):
+            size = len(case.image)
+            file.write(struct.pack("=II", size, 0 if case.accepted else 16))
+            file.write(case.image + bytes(-size % 4))
+            if case.accepted:
+                accel, status = reference.routine(case.image)(temp, raw)
+                file.write(_rows(accel, status.view(np.int32)))
+
+
+def _rows(*columns: np.ndarray[tuple[int, ...], np.dtype[np.int32]]) -> bytes:
+    return np.column_stack(columns).astype(np.int32).tobytes()
+
+
+Campaign = Callable[[Bench, int], list[Verdict]]
+
+CAMPAIGNS: Mapping[str, Campaign] = {
+    "triax_comp.c": c_campaign,
+    "triax_calib.h": constants_campaign,
+    "triax_calib.bin": image_campaign,
+}
+"""What is mutated, and how."""
