@@ -22,7 +22,7 @@ from triaxcal.uncertainty.coverage import coverage_factor, effective_dof, studen
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
 from triaxcal.uncertainty.heldout import held_out, thermal_error
-from triaxcal.uncertainty.orientation import DIRECTIONS, weights
+from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance, weights
 from triaxcal.uncertainty.propagation import ROWS, propagation, rows_of
 from triaxcal.uncertainty.scatter import scatter
 from triaxcal.unitfile import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
@@ -362,3 +362,12 @@ def test_a_rotation_moves_no_length_and_gravity_scales_it() -> None:
 def test_empty_budget_says_so() -> None:
     line = Line("a", "the source", 0.0, "V", "normal", 1.0, None, None, 0.0, "", "")
     assert budget("q", "V", [(line, 0.0)]).verdict == "Nothing that is known contributes."
+
+
+def test_fast_variances_are_the_quadratic_forms() -> None:
+    random = np.random.default_rng(1)
+    factor = random.standard_normal((2, 5, 12, 3))
+    covariance = factor @ np.swapaxes(factor, -1, -2)
+    W = weights(DIRECTIONS)
+    expected = np.einsum("dqa,snab,dqb->sndq", W, covariance, W, optimize=True)
+    np.testing.assert_allclose(force_variance(covariance, DIRECTIONS), expected, rtol=1e-12)

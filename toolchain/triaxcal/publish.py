@@ -6,16 +6,17 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from triaxcal.errors import RefusedError
 
 
-def publish(files: Mapping[str, bytes], target: Path) -> None:
+def publish(files: Mapping[str, bytes], target: Path, sometimes: Collection[str] = ()) -> None:
     """Make the folder `target` hold exactly these files.
 
-    They are written to a folder beside it, which takes its place when it is complete.
+    They are written to a folder beside it, which takes its place when it is complete. `sometimes`
+    names files that an earlier delivery may have had besides.
 
     Raises
     ------
@@ -23,7 +24,7 @@ def publish(files: Mapping[str, bytes], target: Path) -> None:
         When the disk refuses, or `target` holds anything but an earlier delivery; `target` is then
         as it was.
     """
-    _refuse_foreign(target, files)
+    _refuse_foreign(target, {*files, *sometimes})
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
@@ -40,7 +41,29 @@ def publish(files: Mapping[str, bytes], target: Path) -> None:
         shutil.rmtree(staging, ignore_errors=True)
 
 
-def _refuse_foreign(target: Path, files: Mapping[str, bytes]) -> None:
+def renew(files: Mapping[str, bytes], target: Path) -> None:
+    """Give files of the folder `target` new content, each in one step.
+
+    Raises
+    ------
+    RefusedError
+        When the disk refuses; a file is then either as it was or new.
+    """
+    for name, content in files.items():
+        try:
+            handle, staging = tempfile.mkstemp(prefix=f".{name}.", dir=target)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(content)
+                Path(staging).chmod(0o666 & ~_umask())
+                Path(staging).replace(target / name)
+            finally:
+                Path(staging).unlink(missing_ok=True)
+        except OSError as error:
+            raise _refusal(target / name, error) from error
+
+
+def _refuse_foreign(target: Path, files: Collection[str]) -> None:
     """Nobody's own files are replaced: only what an earlier run wrote."""
     if target.is_symlink() or (target.exists() and not target.is_dir()):
         raise RefusedError(

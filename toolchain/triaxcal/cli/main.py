@@ -49,7 +49,7 @@ def calib(unit: Path, build: Path) -> None:
     """Calibrate UNIT, a folder with unit.toml and measurements.csv, and write its C."""
     from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.publish import publish  # noqa: PLC0415
-    from triaxcal.report.files import all_files  # noqa: PLC0415
+    from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415
 
@@ -57,7 +57,7 @@ def calib(unit: Path, build: Path) -> None:
     made = passport(delivery, {})
     files = all_files(delivery, made)
     target = build / delivery.unit.name
-    publish(files, target)
+    publish(files, target, SOMETIMES)
     click.echo(summary(made, files, str(target)))
 
 

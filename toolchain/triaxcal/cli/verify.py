@@ -25,8 +25,9 @@ def verify(unit: Path, build: Path) -> None:
     a check failed; tools that are not installed are named, and their checks count as not done.
     """
     from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
-    from triaxcal.publish import publish  # noqa: PLC0415
-    from triaxcal.report.files import all_files  # noqa: PLC0415
+    from triaxcal.publish import publish, renew  # noqa: PLC0415
+    from triaxcal.report.files import SOMETIMES, all_files, passport_files  # noqa: PLC0415
+    from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.verify.campaign import (  # noqa: PLC0415
         delivery_outcomes,
         exit_code,
@@ -39,10 +40,12 @@ def verify(unit: Path, build: Path) -> None:
     target = build / delivery.unit.name
     files = all_files(delivery)
     if not is_delivered(target, files):
-        publish(files, target)
+        publish(files, target, SOMETIMES)
     with tempfile.TemporaryDirectory(prefix="triaxcal-verify-") as folder:
         outcomes = verify_files(Path(folder), delivery.files, delivery.plan, delivery.bound)
     record(target, outcomes)
+    made = passport(delivery, {outcome.key: outcome.json() for outcome in outcomes})
+    renew(passport_files(made), target)
     click.echo(f"unit {delivery.unit.name}\n")
     click.echo(table([*delivery_outcomes(delivery.bound, delivery.check), *outcomes]))
     click.echo(f"\nresults in {target / 'verification.json'}; what they mean: docs/verification.md")

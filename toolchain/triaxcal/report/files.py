@@ -12,6 +12,13 @@ from triaxcal.report.residual_plot import residuals_svg
 from triaxcal.report.results import calibration_json, verification_json
 
 CERTIFICATE = "certificate.dcc.xml"
+SOMETIMES = (CERTIFICATE,)
+"""Files that a delivery may or may not have."""
+
+
+def passport_files(made: Passport) -> dict[str, bytes]:
+    """The passport for people and for machines."""
+    return {"passport.html": passport_html(made), "passport.json": passport_json(made)}
 
 
 def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, bytes]:
@@ -27,8 +34,7 @@ def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, byt
         "calibration.json": calibration_json(delivery),
         "verification.json": verification_json(delivery),
         "residuals.svg": residuals_svg(delivery),
-        "passport.html": passport_html(unit_passport),
-        "passport.json": passport_json(unit_passport),
+        **passport_files(unit_passport),
         "triax_calib.a2l": calib_a2l(delivery),
         **certificate,
     }

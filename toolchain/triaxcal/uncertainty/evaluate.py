@@ -24,7 +24,7 @@ from triaxcal.uncertainty.device_sources import (
     temperature_code,
 )
 from triaxcal.uncertainty.model_sources import thermal_model
-from triaxcal.uncertainty.orientation import DIRECTIONS, QUANTITIES, weights
+from triaxcal.uncertainty.orientation import DIRECTIONS, QUANTITIES, force_variance, weights
 from triaxcal.uncertainty.propagation import ROWS, propagation
 from triaxcal.uncertainty.rig_sources import (
     gravity,
@@ -78,9 +78,10 @@ class Uncertainty:
 
         The four are its components x, y, z and its length; directions are `DIRECTIONS`.
         """
-        W = weights(DIRECTIONS)
         sources = [s for s in self.sources if s.force is not None]
-        each = np.stack([_projected(s.force, W) for s in sources])
+        covariances = np.stack([s.force for s in sources if s.force is not None])
+        variance = force_variance(covariances, DIRECTIONS)
+        each = np.sqrt(np.maximum(variance, 0.0))
         return _expanded(each, [s.dof for s in sources])
 
     def _of_constants(self) -> list[Source]:
@@ -181,15 +182,6 @@ def _sd(covariance: FloatArray | None) -> FloatArray:
     return result
 
 
-def _projected(covariance: FloatArray | None, W: FloatArray) -> FloatArray:
-    """Standard deviations (n, directions, 4) of a covariance of D (n, 12, 12)."""
-    assert covariance is not None
-    flat = W.reshape(-1, 12)
-    variance = np.einsum("nqa,qa->nq", flat @ covariance, flat)
-    result: FloatArray = np.sqrt(np.maximum(variance, 0.0)).reshape(-1, *W.shape[:2])
-    return result
-
-
 def _expanded(each: FloatArray, dofs: list[float]) -> FloatArray:
     """k u of standard uncertainties (sources, ...), by Welch-Satterthwaite."""
     variance = np.sum(each**2, axis=0)
@@ -197,8 +189,8 @@ def _expanded(each: FloatArray, dofs: list[float]) -> FloatArray:
     # Scaled so that no fourth power underflows.
     loss = np.tensordot(1.0 / np.array(dofs), (each / scale) ** 4, axes=1)
     dof = (variance / scale**2) ** 2 / np.maximum(loss, 1e-300)
-    factors = {d: coverage_factor(d) for d in np.unique(np.floor(np.minimum(dof, 1e9))).tolist()}
-    k = np.vectorize(factors.__getitem__)(np.floor(np.minimum(dof, 1e9)))
+    different, index = np.unique(np.floor(np.minimum(dof, 1e9)), return_inverse=True)
+    k = np.array([coverage_factor(d) for d in different.tolist()])[index.reshape(dof.shape)]
     result: FloatArray = k * np.sqrt(variance)
     return result
 

@@ -27,6 +27,31 @@ def weights(directions: FloatArray) -> FloatArray:
     return W.reshape(count, 4, 12)
 
 
+def force_variance(covariance: FloatArray, directions: FloatArray) -> FloatArray:
+    """Variances of `QUANTITIES`, shape (..., directions, 4), of covariances of D (..., 12, 12).
+
+    The quadratic forms of `weights` as products of matrices; those of a component use its own
+    block alone.
+    """
+    lead = covariance.shape[:-2]
+    affine = np.column_stack([directions, np.ones(len(directions))])
+    pairs = (affine[:, :, None] * affine[:, None, :]).reshape(-1, 16).T
+    blocks = covariance.reshape(*lead, 3, 4, 3, 4)
+    result = np.empty((*lead, len(directions), 4))
+    for i in range(3):
+        own = blocks[..., i, :, i, :].reshape(-1, 16)
+        result[..., i] = (own @ pairs).reshape(*lead, -1)
+    w = weights(directions)[:, 3]
+    upper = np.triu_indices(12)
+    # Off the diagonal each pair of entries counts twice.
+    twice = np.where(upper[0] == upper[1], 1.0, 2.0)
+    squares = (w[:, upper[0]] * w[:, upper[1]] * twice).T
+    result[..., 3] = (covariance[..., upper[0], upper[1]].reshape(-1, 78) @ squares).reshape(
+        *lead, -1
+    )
+    return result
+
+
 def _directions() -> FloatArray:
     """Unit vectors: axes, edges and corners of the cube, and a Fibonacci spiral between them."""
     lattice = [v for v in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(v)]

@@ -107,23 +107,33 @@ class Passport:
 
     @cached_property
     def acceptance(self) -> tuple[Acceptance, ...]:
-        """Limits at T0 and over the range."""
-        limits, u = self.delivery.unit.limits, self.uncertainty
-        t0_degc = self.delivery.unit.t0_degc
-        at_t0 = [r for r in self.delivered.residuals if near_t0(r.dwell.temp_degc, t0_degc)]
+        """Limits at T0 and over the range, as far as there are dwells to check them on."""
+        unit, u = self.delivery.unit, self.uncertainty
+        limits, residuals = unit.limits, self.delivered.residuals
+        at_t0 = [r for r in residuals if near_t0(r.dwell.temp_degc, unit.t0_degc)]
+        others = [r for r in residuals if not near_t0(r.dwell.temp_degc, unit.t0_degc)]
         worst = int(np.argmax(u.force_u[u.t0_index, :, LENGTH]))
         t0_budget = u.force_budget(LENGTH, u.t0_index, DIRECTIONS[worst])
-        return (
-            _acceptance("at T0", limits.at_t0_g, at_t0, t0_budget),
-            _acceptance(
-                "over the range", limits.over_range_g, self.delivered.residuals, self.length_budget
-            ),
+        return tuple(
+            _acceptance(where, limit_g, dwells, budget)
+            for where, limit_g, dwells, budget in (
+                ("at T0", limits.at_t0_g, at_t0, t0_budget),
+                ("over the range", limits.over_range_g, others, self.length_budget),
+            )
+            if dwells
         )
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Limits that no dwell of the working range could be held against."""
+        checked = {a.where for a in self.acceptance}
+        return tuple(where for where in ("at T0", "over the range") if where not in checked)
 
     @property
     def shown(self) -> bool:
         """Whether both limits hold with the uncertainty inside them, and nothing is unknown."""
-        return all(a.shown for a in self.acceptance) and not self.length_budget.unknown
+        checked = all(a.shown for a in self.acceptance) and not self.unchecked
+        return checked and not self.length_budget.unknown
 
     @cached_property
     def worst_over_temperature(self) -> FloatArray:
@@ -141,8 +151,8 @@ def passport(delivery: Delivery, tools: Mapping[str, Any]) -> Passport:
 
 
 def _acceptance(
-    where: str, limit_g: float, residuals: tuple[Residual, ...] | list[Residual], budget: Budget
+    where: str, limit_g: float, residuals: list[Residual], budget: Budget
 ) -> Acceptance:
     worst = next(line for line in budget.lines if line.contribution is not None)
-    largest = max((abs(r.error_g) for r in residuals), default=0.0)
+    largest = max(abs(r.error_g) for r in residuals)
     return Acceptance(where, limit_g, largest, budget.expanded, worst.name, worst.advice)

@@ -42,6 +42,7 @@ def passport_json(p: Passport) -> bytes:
             }
             for a in p.acceptance
         ],
+        "limits_without_dwells": list(p.unchecked),
         "constants_at_t0": [
             {
                 "name": CONSTANT_NAMES[c],

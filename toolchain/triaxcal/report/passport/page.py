@@ -35,6 +35,7 @@ def passport_html(p: Passport) -> bytes:
         "identity": _identity(p),
         "shown": p.shown,
         "acceptance": [_acceptance(a) for a in p.acceptance],
+        "unchecked": p.unchecked,
         "warnings": p.uncertainty.warnings,
         "constants": _constants(p),
         "t0": signed(f"{p.delivery.calibration.thermal.t0_degc:g}"),
@@ -154,7 +155,7 @@ def _budget(b: Budget, title: str, orientation: str) -> dict[str, Any]:
         "expanded": in_unit(b.expanded, b.unit),
         "factor": f"{b.factor:.2f}",
         "dof": _dof(b.dof),
-        "verdict": b.verdict.replace(" at -", " at \u2212"),
+        "verdict": signed(b.verdict),
         "lines": [_line(line, b.unit) for line in b.lines],
     }
 

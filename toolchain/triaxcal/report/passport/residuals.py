@@ -45,21 +45,20 @@ def residual_panels(p: Passport) -> list[dict[str, Any]]:
 def _row(
     p: Passport, before: tuple[Residual, ...], groups: list[tuple[float, list[int]]], axis: _Axis
 ) -> dict[str, Any]:
-    unit = p.delivery.unit
+    limits = p.delivery.unit.limits
     span = (WIDTH - LEFT - RIGHT) / len(groups)
     columns = []
     for k, (temp, indices) in enumerate(groups):
         x0 = LEFT + k * span
         step = (span - 10.0) / len(indices)
         ordered = sorted(indices, key=lambda i: before[i].dwell.position)
-        limit_g, _ = unit.limits.at(before[ordered[0]].dwell.temp_degc, unit.t0_degc)
         columns.append(
             {
                 "x": round(x0, 2),
                 "middle": round(x0 + span / 2, 2),
                 "end": round(x0 + span, 2),
                 "title": signed(degrees(temp)) + " °C",
-                "limit": axis.y(limit_g),
+                "limit": axis.y(limits.at(temp, p.delivery.unit.t0_degc)[0]),
                 "marks": [
                     {
                         "x": round(x0 + 5.0 + step * (n + 0.5), 2),

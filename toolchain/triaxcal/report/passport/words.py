@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 _NOTHING_G = 1e-12
 """Residuals below this are the rounding of floating point."""
@@ -24,8 +25,8 @@ def with_uncertainty(value: float, expanded: float, scale: float = 1.0) -> tuple
 
 
 def signed(text: str) -> str:
-    """Number with a true minus sign."""
-    return text.replace("-", MINUS)
+    """Text whose numbers have a true minus sign; hyphens stay."""
+    return re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
 
 
 def significant(value: float, digits: int = 2) -> str:
