@@ -16,7 +16,8 @@ import pytest
 from triaxcal.delivery import Delivery, deliver
 from triaxcal.errors import RefusedError
 from triaxcal.model.metrological import CONSTANT_NAMES
-from triaxcal.report.files import all_files
+from triaxcal.publish import publish, renew
+from triaxcal.report.files import CERTIFICATE, SOMETIMES, all_files
 from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.passport.curves import Frame, ticks
 from triaxcal.report.passport.document import passport_json
@@ -199,3 +200,24 @@ def test_a_limit_that_is_not_met_says_by_what_factor_and_why(
     if one is not None:  # three decimals of one, three digits of the other
         error, limit = map(float, one.groups())
         assert float(found.group(1)) == pytest.approx(error / limit, rel=0.01, abs=6e-4 / limit)
+
+
+# ---- files in place ----
+
+
+def test_a_certificate_that_is_no_longer_asked_for_goes_away(tmp_path: Path) -> None:
+    target = tmp_path / "AT-SIM"
+    publish({"a": b"1", CERTIFICATE: b"2"}, target)
+    publish({"a": b"3"}, target, SOMETIMES)
+    assert {p.name: p.read_bytes() for p in target.iterdir()} == {"a": b"3"}
+    with pytest.raises(RefusedError, match="'a', which no delivery has"):
+        publish({"b": b"4"}, target, SOMETIMES)
+
+
+def test_files_are_renewed_and_others_left(tmp_path: Path) -> None:
+    publish({"a": b"1", "b": b"2"}, tmp_path / "AT-SIM")
+    renew({"b": b"3"}, tmp_path / "AT-SIM")
+    found = {p.name: p.read_bytes() for p in (tmp_path / "AT-SIM").iterdir()}
+    assert found == {"a": b"1", "b": b"3"}
+    with pytest.raises(RefusedError, match="cannot be written"):
+        renew({"b": b"3"}, tmp_path / "nowhere")
