@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 DEVELOPER := $(VENV)/.developer
 
-export UNIT
+export UNIT EVERY
 
 # A unit is named, not given by path: the command line takes paths.
 NAMED = case "$$UNIT" in \
@@ -31,6 +31,9 @@ verify: $(INSTALLED)  ## UNIT=<name>: Gappa, Frama-C, cppcheck, gcc and clang on
 
 fuzz: $(DEVELOPER)  ## Images against the loaders, text against the parsers, for a minute
 	@$(BIN)/python fuzz/run.py
+
+mutation: $(DEVELOPER)  ## EVERY=<n>: does the vector set find each n-th mutant of the generated C?
+	@$(BIN)/python fuzz/mutation.py --every "$${EVERY:-1}"
 
 simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated unit again
 	@$(NAMED)

@@ -12,7 +12,7 @@ import argparse
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from triaxcal.verify.mutation import (
@@ -38,13 +38,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--shape", choices=list(SHAPES), action="append")
     parser.add_argument("--units", type=Path, default=HERE.parent / "units")
     given = parser.parse_args(arguments)
-    verdicts: list[Verdict] = []
-    for shape in given.shape or SHAPES:
-        verdicts += _shape(shape, given.units, given.every)
+    by_shape = {s: _shape(s, given.units, given.every) for s in given.shape or SHAPES}
+    verdicts = [v for found in by_shape.values() for v in found]
     survivors = [v.mutant for v in verdicts if v.fate == SURVIVED]
-    for mutant in survivors:
-        print(f"survived: {mutant}")
-    stale = _stale(verdicts) if given.every == 1 and not given.shape else []
+    stale = _stale(by_shape) if given.every == 1 and not given.shape else []
     for entry in stale:
         print(f"{EQUIVALENTS.name}: no mutant is this one: {entry}")
     print(f"{len(verdicts)} mutants, {len(survivors)} survived")
@@ -55,22 +52,28 @@ def _shape(shape: str, units: Path, every: int) -> list[Verdict]:
     made = subject(shape, units)
     verdicts: list[Verdict] = []
     with tempfile.TemporaryDirectory(prefix="triaxcal-mutants-") as folder:
-        bench = Bench(Workspace.create(Path(folder), made.files, made.plan, made.bound))
+        bench = Bench(Workspace.create(Path(folder), made.files, made.plan, made.bound), shape)
         for file, campaign in CAMPAIGNS.items():
             found = campaign(bench, every)
             counts = Counter(v.fate for v in found)
             told = ", ".join(f"{counts[fate]} {fate}" for fate in FATES if counts[fate])
             print(f"{shape}, {file}: {told}", flush=True)
+            for verdict in found:
+                if verdict.fate == SURVIVED:
+                    print(f"  survived: {verdict.mutant}", flush=True)
             verdicts += found
     return verdicts
 
 
-def _stale(verdicts: Sequence[Verdict]) -> list[str]:
-    equivalent = [v.mutant for v in verdicts if v.fate == EQUIVALENT]
+def _stale(by_shape: Mapping[str, Sequence[Verdict]]) -> list[str]:
     return [
         f"{e.function}: {e.before}"
         for e in read_equivalents()
-        if not any(e.covers(mutant) for mutant in equivalent)
+        if not any(
+            v.fate == EQUIVALENT and e.covers(v.mutant, shape)
+            for shape, verdicts in by_shape.items()
+            for v in verdicts
+        )
     ]
 
 

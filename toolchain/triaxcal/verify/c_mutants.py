@@ -7,6 +7,7 @@ replaced by its neighbour (ux by uy, row by column), a condition negated, a stat
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -94,6 +95,7 @@ def _changes(source: str, tokens: list[Token]) -> Iterator[Change]:
     yield from _defines(tokens)
     code = [t for t in tokens if t.kind != DIRECTIVE]
     sizes = _array_sizes(code)
+    names = _names_around(source, code)
     for at, token in enumerate(code):
         if at in sizes:
             continue
@@ -101,10 +103,10 @@ def _changes(source: str, tokens: list[Token]) -> Iterator[Change]:
         if token.kind == NUMBER:
             yield from _off_by_one(token)
         elif token.kind == NAME:
-            yield from _neighbours(token)
+            yield from _neighbours(token, names[at])
         elif token.kind == OPERATOR:
             yield from _operators(code, at, before)
-    yield from _indices(source, code)
+    yield from _indices(source, code, sizes)
     yield from _negations(source, code)
     yield from _lost_statements(code)
 
@@ -130,12 +132,23 @@ def _defines(tokens: list[Token]) -> Iterator[Change]:
                 yield from _off_by_one(Token(NUMBER, inner.text, inner.start + shift))
 
 
-def _neighbours(token: Token) -> Iterator[Change]:
-    for names in NEIGHBOURS:
-        if token.text in names:
-            for other in names:
-                if other != token.text:
+def _neighbours(token: Token, names: set[str]) -> Iterator[Change]:
+    for family in NEIGHBOURS:
+        if token.text in family:
+            for other in family:
+                if other != token.text and (other in names or other.isupper()):
                     yield token.start, token.end, other
+
+
+def _names_around(source: str, code: list[Token]) -> list[set[str]]:
+    """For each token the names that occur in its function: others are unknown to the compiler."""
+    starts = [m.start() for m in _FUNCTION.finditer(source)]
+    groups: dict[int, set[str]] = {}
+    places = [bisect_right(starts, token.start) for token in code]
+    for token, place in zip(code, places, strict=True):
+        if token.kind == NAME:
+            groups.setdefault(place, set()).add(token.text)
+    return [groups.get(place, set()) for place in places]
 
 
 def _array_sizes(code: list[Token]) -> set[int]:
@@ -169,16 +182,16 @@ def _is_pointer(code: list[Token], at: int) -> bool:
     return code[at].text == "*" and code[at - 1].text in _TYPES
 
 
-def _indices(source: str, code: list[Token]) -> Iterator[Change]:
+def _indices(source: str, code: list[Token], sizes: set[int]) -> Iterator[Change]:
     """a[i][j] to a[j][i]."""
     for at, token in enumerate(code):
-        if token.text != "]" or at + 1 >= len(code) or code[at + 1].text != "[":
+        if at in sizes or token.text != "]" or at + 1 >= len(code) or code[at + 1].text != "[":
             continue
         start = _matching(code, at, "[", "]", -1)
         end = _matching(code, at + 1, "]", "[", 1)
         first = source[code[start].end : token.start]
         second = source[code[at + 1].end : code[end].start]
-        if first != second and code[start - 1].text != "header":
+        if first != second:
             yield code[start].start, code[end].end, f"[{second}][{first}]"
 
 

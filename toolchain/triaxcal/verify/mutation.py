@@ -64,17 +64,21 @@ class Equivalent:
         Line without and with the change.
     reason : str
         Why no input shows it.
+    shapes : tuple of str
+        Where that holds; empty for every shape.
     """
 
     function: str
     before: str
     after: tuple[str, ...]
     reason: str
+    shapes: tuple[str, ...] = ()
 
-    def covers(self, mutant: Mutant) -> bool:
-        """Whether the mutant is this one."""
+    def covers(self, mutant: Mutant, shape: str) -> bool:
+        """Whether the mutant of a shape is this one."""
         return (
             mutant.function == self.function
+            and (not self.shapes or shape in self.shapes)
             and _like(self.before, mutant.before)
             and any(_like(after, mutant.after) for after in self.after)
         )
@@ -88,7 +92,13 @@ def read_equivalents() -> tuple[Equivalent, ...]:
     """The equivalent mutants on file."""
     entries = tomllib.loads(EQUIVALENTS.read_text()).get("equivalent", [])
     return tuple(
-        Equivalent(e["function"], e["before"], tuple(e["after"]), " ".join(e["reason"].split()))
+        Equivalent(
+            e["function"],
+            e["before"],
+            tuple(e["after"]),
+            " ".join(e["reason"].split()),
+            tuple(e.get("shapes", ())),
+        )
         for e in entries
     )
 
@@ -96,8 +106,9 @@ def read_equivalents() -> tuple[Equivalent, ...]:
 class Bench:
     """One shape's vectors, answers and images on disk, and what runs mutants on them."""
 
-    def __init__(self, work: Workspace) -> None:
+    def __init__(self, work: Workspace, shape: str) -> None:
         self.work = work
+        self.shape = shape
         folder = work.folder / "bench"
         folder.mkdir()
         # Away from the unit's files, or it would include those rather than the mutant's.
@@ -115,7 +126,8 @@ class Bench:
             fates.append(self._survives(folder, [*flags, *form], None))
             if fates[-1] is False:
                 return False
-        return True if True in fates else None
+        # What does not compile in one form is not seen by the others.
+        return None if None in fates else True
 
     def survives_image(self, folder: Path, image: Path) -> bool | None:
         """The same for an image, of which the form is no matter."""
@@ -150,7 +162,7 @@ def _preprocessed(folder: Path, form: Sequence[str]) -> str:
 def c_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
     """Mutants of triax_comp.c, each `every`-th."""
     source = (bench.work.folder / ROUTINE).read_text()
-    return _campaign(bench, mutants_of(source)[::every], ROUTINE)
+    return judge_all(bench, mutants_of(source)[::every], ROUTINE)
 
 
 def constants_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
@@ -165,7 +177,7 @@ def constants_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
             changed = source[: match.start(1)] + str(other) + source[match.end(1) :]
             line = source.count("\n", 0, match.start(1)) + 1
             mutants.append(Mutant("TRIAX_CALIB", line, str(value), str(other), changed))
-    return _campaign(bench, mutants[::every], CONSTANTS)
+    return judge_all(bench, mutants[::every], CONSTANTS)
 
 
 def image_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
@@ -186,7 +198,8 @@ def image_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
     return verdicts
 
 
-def _campaign(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdict]:
+def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdict]:
+    """What becomes of mutants of one file, in their order."""
     equivalents = read_equivalents()
 
     def judge(item: tuple[int, Mutant]) -> Verdict:
@@ -199,7 +212,7 @@ def _campaign(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
             fate = STILLBORN
         elif not survives:
             fate = KILLED
-        elif any(e.covers(mutant) for e in equivalents):
+        elif any(e.covers(mutant, bench.shape) for e in equivalents):
             fate = EQUIVALENT
         elif not bench.survives(folder, SANITIZED):
             fate = BY_SANITIZER
