@@ -9,7 +9,7 @@ DEVELOPER := $(VENV)/.developer
 # A file stays on one core, so that its compiled fixtures are made once.
 PYTEST := $(BIN)/pytest -q -n auto --dist loadfile
 
-export UNIT
+export UNIT EVERY
 
 # A unit is named, not given by path: the command line takes paths.
 NAMED = case "$$UNIT" in \
@@ -34,6 +34,9 @@ verify: $(INSTALLED)  ## UNIT=<name>: Gappa, Frama-C, cppcheck, gcc and clang on
 
 fuzz: $(DEVELOPER)  ## Images against the loaders, text against the parsers, for a minute
 	@$(BIN)/python fuzz/run.py
+
+mutation: $(DEVELOPER)  ## EVERY=<n>: does the vector set find each n-th mutant of the generated C?
+	@$(BIN)/python fuzz/mutation.py --every "$${EVERY:-1}"
 
 simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated unit again
 	@$(NAMED)

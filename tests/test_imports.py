@@ -40,7 +40,7 @@ MAY_IMPORT = {
     "targets": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
     "uncertainty": {"ground", "model", "records", "fit", "fixedpoint"},
     "verify": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
-    "rig": {"ground", "model", "records"},
+    "rig": {"ground", "model", "records", "simulation"},
     "batch": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery", "publish"},
     "report": {
         "ground",
@@ -63,6 +63,7 @@ ONLY_IN = {
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report"},
+    "rich": {"rig", "cli"},
     "dask": {"batch"},
     "distributed": {"batch"},
 }

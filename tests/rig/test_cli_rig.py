@@ -20,7 +20,7 @@ from triaxcal.rig.simulator import EPOCH_NS
 
 
 def triaxcal(*arguments, cwd=REPO):
-    program = "from triaxcal.cli.main import entry; entry()"
+    program = "from triaxcal.cli.entry import entry; entry()"
     return subprocess.run(
         [sys.executable, "-c", program, *map(str, arguments)],
         capture_output=True, text=True, check=False, cwd=cwd,
@@ -101,7 +101,7 @@ def _kill_somewhere(tmp_path, seed):
     """Kill a session at a random moment; the dwells that it had shown."""
     unit = bench_copy(tmp_path)
     setup = short_setup(tmp_path, temps="[20]")
-    program = "from triaxcal.cli.main import entry; entry()"
+    program = "from triaxcal.cli.entry import entry; entry()"
     command = [sys.executable, "-u", "-c", program, "rig", "run", "--bus", "virtual", "--plain",
                "--unit", str(unit), "--plan", setup.plan.source]  # fmt: skip
     rng = np.random.default_rng(seed)

@@ -12,7 +12,6 @@ from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 
-import can
 import click
 from rich.console import Console
 from rich.live import Live
@@ -26,7 +25,7 @@ from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.screen import BusView, plain_status, screen
 from triaxcal.rig.simulator import SimulatedRig
 from triaxcal.rig.socketcan import SocketSource
-from triaxcal.rig.sources import SimulatedSource, Source, messages_of
+from triaxcal.rig.sources import Bus, SimulatedSource, Source, messages_of
 from triaxcal.rig.view import view
 
 _REFRESH_S = 0.25
@@ -142,7 +141,7 @@ def _on_screen(ticks: Iterator[runner.Tick], taken: recording.Recording, source:
 
 
 def simulate_on(
-    bus: can.BusABC, rig: SimulatedRig, plan: SessionPlan, seconds: float | None, hold: int
+    bus: Bus, rig: SimulatedRig, plan: SessionPlan, seconds: float | None, hold: int
 ) -> None:
     """Send the simulated rig's frames at the pace of the clock."""
     positions = [p for step in plan.steps for p in step.positions]

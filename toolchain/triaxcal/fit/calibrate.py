@@ -250,16 +250,11 @@ def _variance(
     if readings.variance_v2 is not None:
         allowed = np.mean(readings.variance_v2, axis=(0, 1))
         ratio = math.sqrt(float(np.mean(pooled / allowed)))
-        source = (
+        return readings.variance_v2, (
             "the dwells' own statistics, sd^2 / count; readings scatter over the positions "
-            f"{ratio:.2f} times what they allow (1 is noise alone, more is placement)"
+            f"{ratio:.2f} times what they allow (1 is noise alone, more is placement, which the "
+            "passport's budget adds)"
         )
-        # Three standard deviations of a mean square with 2 * groups degrees of freedom.
-        if np.any(pooled > allowed * (1.0 + 3.0 / math.sqrt(groups))):
-            source += "; the excess is added to every reading's variance"
-            excess: FloatArray = np.maximum(pooled - allowed, 0.0)
-            return readings.variance_v2 + excess, source
-        return readings.variance_v2, source
     without = [
         d.row
         for d in measurements.dwells

@@ -18,6 +18,9 @@ WAIT_S = 0.05
 _CAN_DEVICE = "280"  # ARPHRD_CAN
 _NETWORK = Path("/sys/class/net")
 
+Bus = can.BusABC
+"""A bus of python-can, which this room alone imports."""
+
 
 class Source(Protocol):
     """A stream of frames.
