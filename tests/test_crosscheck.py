@@ -25,7 +25,10 @@ from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import prove
 
-NAMES = ["every temperature code", "boundaries", "random in range", "random int32"]
+NAMES = [
+    "every temperature code", "boundaries", "borders of rounding", "random in range",
+    "random int32",
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,8 @@ WRONG = [
     ("inverse", "(divisor < INT64_C(1073741825))", "(divisor < INT64_C(1073741824))"),
     ("saturating", "(bound / 2) + 1", "(bound / 2)"),
     ("saturating", "segment->gain > 0", "segment->gain >= 0"),
-    ("direct-two-segments", "(next <= calib->temp_max_code)", "(next <= INT32_MAX)"),
+    ("direct-two-segments", "first_code != calib->temp_min", "first_code < calib->temp_min"),
+    ("direct-two-segments", "last = next - 1;", "last = next;"),
 ]
 
 

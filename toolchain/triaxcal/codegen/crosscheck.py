@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from triaxcal.codegen.routines import Answers, Generated, Int32Array, Routine
+from triaxcal.codegen.ties import ties
 from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.integer_model import (
     STATUS_OK,
@@ -73,7 +74,7 @@ class CrossCheck:
 
 
 def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[VectorSet]:
-    """Every temperature code x lattice, a boundary grid, random in range, random int32."""
+    """Every temperature code x lattice, a boundary grid, ties, random in range, random int32."""
     rng = np.random.Generator(np.random.PCG64(SEED))
     shape = plan.shape
     low, high = plan.temp_min_code, plan.temp_max_code
@@ -91,6 +92,7 @@ def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[Vector
     return [
         _lattice(plan),
         _boundary(plan),
+        VectorSet("borders of rounding", *ties(plan)),
         VectorSet("random in range", *in_range),
         VectorSet("random int32", *anything),
     ]

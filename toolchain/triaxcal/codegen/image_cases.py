@@ -185,9 +185,14 @@ def _temperature_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
             yield f"gain {gain} of segment {s}", {at + _GAIN: gain}
         for origin in (INT32_MIN, INT32_MAX, firsts[s], lasts[s]):
             yield f"origin {origin} of segment {s}", {at + _ORIGIN: origin}
-        # A point: reach 0, so that any gain fits; and the order of the segments.
         if s:
-            for first in (low, low + 1, firsts[s - 1], firsts[s - 1] + 1, high, high + 1):
+            # The segment before ends where its x does, or one code later.
+            before = starts[s - 1]
+            end = words[before + _ORIGIN] + INT32_MAX // words[before + _GAIN]
+            for first in (end + 1, end + 2):
+                yield f"first_code {first} of segment {s}, near", {at: first, at + _GAIN: 1}
+            # The order of the segments, with gains that any reach allows.
+            for first in (INT32_MIN, low, low + 1, firsts[s - 1], high, high + 1, INT32_MAX):
                 yield f"first_code {first} of segment {s}", {
                     at: first, at + _GAIN: 1, starts[s - 1] + _GAIN: 1
                 }  # fmt: skip

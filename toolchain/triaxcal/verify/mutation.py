@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from triaxcal.codegen.compiler import FLAGS as DELIVERY_FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
 from triaxcal.codegen.image_cases import case_vectors, image_cases
 from triaxcal.codegen.routines import Reference, start_reference
@@ -32,13 +33,14 @@ from triaxcal.verify.workspace import CONSTANTS, FORMS, IMAGE, ROUTINE, Workspac
 EQUIVALENTS = Path(__file__).with_name("equivalent_mutants.toml")
 KILLED = "killed by the vectors"
 BY_SANITIZER = "killed under sanitizers"
+BY_COMPILER = "refused by the compiler's warnings"
 EQUIVALENT = "equivalent"
 ELSEWHERE = "for another core"
 STILLBORN = "does not compile"
 SURVIVED = "survived"
-FATES = (KILLED, BY_SANITIZER, EQUIVALENT, ELSEWHERE, STILLBORN, SURVIVED)
+FATES = (KILLED, BY_SANITIZER, BY_COMPILER, EQUIVALENT, ELSEWHERE, STILLBORN, SURVIVED)
 FLAGS = ("-std=c99", "-O1", "-fwrapv", "-w", "-DCPU_SECONDS=5")
-SANITIZED = (*FLAGS[:-1], "-g", *SANITIZERS[0].flags, "-DCPU_SECONDS=60")
+SANITIZED = ("-std=c99", "-O1", "-w", "-g", *SANITIZERS[0].flags, "-DCPU_SECONDS=60")
 """-fwrapv: what a mutant does shall not depend on what the compiler makes of an overflow."""
 
 _INTEGER = re.compile(r"^ +(\(-2147483647 - 1\)|-?\d+), /\*", re.MULTILINE)
@@ -155,6 +157,14 @@ class Bench:
         )
 
 
+def _is_clean(folder: Path) -> bool:
+    """Whether the delivery would compile it: there every warning is an error."""
+    return not any(
+        run([GCC.find(), *DELIVERY_FLAGS, *form, "-c", "-o", "/dev/null", ROUTINE], folder).code
+        for form in FORMS.values()
+    )
+
+
 def _preprocessed(folder: Path, form: Sequence[str]) -> str:
     return run([GCC.find(), "-E", "-P", *form, ROUTINE], folder).text
 
@@ -175,8 +185,9 @@ def constants_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
             if not -(2**31) < other < 2**31:
                 continue
             changed = source[: match.start(1)] + str(other) + source[match.end(1) :]
-            line = source.count("\n", 0, match.start(1)) + 1
-            mutants.append(Mutant("TRIAX_CALIB", line, str(value), str(other), changed))
+            line = source.count("\n", 0, match.start(1))
+            before, after = (text.split("\n")[line].strip() for text in (source, changed))
+            mutants.append(Mutant("TRIAX_CALIB", line + 1, before, after, changed))
     return judge_all(bench, mutants[::every], CONSTANTS)
 
 
@@ -216,6 +227,8 @@ def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
             fate = EQUIVALENT
         elif not bench.survives(folder, SANITIZED):
             fate = BY_SANITIZER
+        elif file == ROUTINE and not _is_clean(folder):
+            fate = BY_COMPILER
         elif file == ROUTINE and not bench.is_seen(folder):
             fate = ELSEWHERE
         else:
