@@ -38,6 +38,13 @@ def plant(subjects: dict[str, Subject], tmp_path: Path) -> Planter:
     return make
 
 
+SHAPES_FAST_FIRST = [
+    name if name == "direct-two-segments" else pytest.param(name, marks=pytest.mark.slow)
+    for name in SHAPES
+]
+"""One shape in every run, all of them in the nightly one."""
+
+
 def needs(*programs: str) -> pytest.MarkDecorator:
     """Skip, by name, where a program is not installed."""
     missing = [p for p in programs if shutil.which(p) is None]

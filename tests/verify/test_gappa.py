@@ -15,7 +15,7 @@ from triaxcal.verify.image_reader import read_image
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED
 from triaxcal.verify.tools import BrokenToolError
 from triaxcal.verify.workspace import IMAGE, Workspace
-from verify.conftest import Planter, needs
+from verify.conftest import SHAPES_FAST_FIRST, Planter, needs
 
 
 def test_interval_is_read_to_its_larger_end() -> None:
@@ -57,7 +57,7 @@ def test_a_floor_of_a_floor_is_the_floor() -> None:
 
 
 @needs("gappa")
-@pytest.mark.parametrize("shape", ["direct-two-segments", "saturating"])
+@pytest.mark.parametrize("shape", SHAPES_FAST_FIRST[::2])
 def test_bound_lies_above_the_exact_one(plant: Planter, shape: str) -> None:
     work = plant(shape)
     outcome = gappa.check(work)
@@ -70,6 +70,7 @@ def test_bound_lies_above_the_exact_one(plant: Planter, shape: str) -> None:
 
 
 @needs("gappa")
+@pytest.mark.slow
 def test_a_wrong_coefficient_in_the_image_shows(plant: Planter) -> None:
     work = plant("direct-two-segments")
     before = gappa.check(work).figures["per_axis_lsb"]
@@ -83,6 +84,7 @@ def test_a_wrong_coefficient_in_the_image_shows(plant: Planter) -> None:
 
 
 @needs("gappa")
+@pytest.mark.slow
 def test_a_bound_below_the_exact_one_fails(plant: Planter, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gappa, "largest_magnitude", lambda _: 0.5)
     outcome = gappa.check(plant("direct-two-segments"))

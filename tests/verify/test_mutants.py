@@ -133,12 +133,14 @@ def test_fates(bench: Bench, tmp_path: Path, old: str, new: str, expected: str) 
     assert fate(bench, tmp_path, old, new) == expected
 
 
+@pytest.mark.slow
 def test_every_word_of_the_image_matters(bench: Bench) -> None:
     verdicts = mutation.image_campaign(bench, every=7)
     assert len(verdicts) > 15
     assert {v.fate for v in verdicts} == {KILLED}
 
 
+@pytest.mark.slow
 def test_every_constant_matters(bench: Bench) -> None:
     verdicts = mutation.constants_campaign(bench, every=9)
     assert len(verdicts) > 8
