@@ -64,8 +64,18 @@ def test_no_findings(plant: Planter, shape: str) -> None:
     ("old", "new", "rule"),
     [
         ("INT64_C(4294967288)", "INT64_C(0xFFFFFFF8)", "7.2"),
-        ("uint32_t fits = 0u;", "uint32_t fits = (size != 0u) ? 1u : 0u;", "10.6"),
-        ("(~(~value >> shift))", "(value >> shift); /* */ /* /* */", "3.1"),
+        pytest.param(
+            "uint32_t fits = 0u;",
+            "uint32_t fits = (size != 0u) ? 1u : 0u;",
+            "10.6",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "(~(~value >> shift))",
+            "(value >> shift); /* */ /* /* */",
+            "3.1",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_violation_is_found(plant: Planter, old: str, new: str, rule: str) -> None:
@@ -75,6 +85,7 @@ def test_a_violation_is_found(plant: Planter, old: str, new: str, rule: str) -> 
 
 
 @needs("cppcheck")
+@pytest.mark.slow
 def test_a_deviation_elsewhere_is_a_finding(plant: Planter) -> None:
     shifted = plant(
         "direct-two-segments", ("return c + high_word(", "return (c >> 1) + high_word(")

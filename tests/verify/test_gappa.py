@@ -70,6 +70,7 @@ def test_bound_lies_above_the_exact_one(plant: Planter, shape: str) -> None:
 
 
 @needs("gappa")
+@pytest.mark.slow
 def test_a_wrong_coefficient_in_the_image_shows(plant: Planter) -> None:
     work = plant("direct-two-segments")
     before = gappa.check(work).figures["per_axis_lsb"]
@@ -83,6 +84,7 @@ def test_a_wrong_coefficient_in_the_image_shows(plant: Planter) -> None:
 
 
 @needs("gappa")
+@pytest.mark.slow
 def test_a_bound_below_the_exact_one_fails(plant: Planter, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gappa, "largest_magnitude", lambda _: 0.5)
     outcome = gappa.check(plant("direct-two-segments"))
