@@ -17,7 +17,7 @@ NAMED = case "$$UNIT" in \
     */*) echo "make: UNIT=$$UNIT is a path; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; esac
 
 .DEFAULT_GOAL := help
-.PHONY: help rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
+.PHONY: help test-verify rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -43,7 +43,10 @@ simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated un
 	@$(BIN)/triaxcal simulate "units/$$UNIT"
 
 test: $(DEVELOPER)  ## Tests (under 3 minutes)
-	@$(PYTEST) -m "not slow"
+	@$(PYTEST) -m "not slow" --ignore tests/verify
+
+test-verify: $(DEVELOPER)  ## That every check of `make verify` passes, and can fail (2 minutes)
+	@$(PYTEST) -m "not slow" tests/verify
 
 check: lint types test  ## What CI runs: lint, types, tests
 
