@@ -185,6 +185,10 @@ def _temperature_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
             yield f"gain {gain} of segment {s}", {at + _GAIN: gain}
         for origin in (INT32_MIN, INT32_MAX, firsts[s], lasts[s]):
             yield f"origin {origin} of segment {s}", {at + _ORIGIN: origin}
+        for beyond in (0, 1):
+            # INT32_MAX is prime: only a gain of 1 reaches it exactly.
+            origin = lasts[s] - INT32_MAX - beyond
+            yield f"origin {origin} of segment {s}", {at + _ORIGIN: origin, at + _GAIN: 1}
         if s:
             # The segment before ends where its x does, or one code later.
             before = starts[s - 1]
@@ -292,7 +296,8 @@ def case_vectors(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     """Ends and middle of the temperature range and int32's ends x a few raw codes."""
     shape = plan.shape
     middle = (plan.temp_min_code + plan.temp_max_code) // 2
-    temps = [INT32_MIN, plan.temp_min_code, middle, plan.temp_max_code, INT32_MAX]
+    beside = plan.segments[0].origin_code + 1
+    temps = [INT32_MIN, plan.temp_min_code, beside, middle, plan.temp_max_code, INT32_MAX]
     raws = [INT32_MIN, 1, shape.raw_max // 3, shape.raw_max]
     rows = np.array(list(itertools.product(temps, raws, raws, raws)), dtype=np.int32)
     return np.ascontiguousarray(rows[:, 0]), np.ascontiguousarray(rows[:, 1:])
