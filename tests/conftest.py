@@ -10,6 +10,7 @@ from random import Random
 import pytest
 
 from plans import COVERING, GOLDEN, SENSOR, random_plan
+from recordings import ABSENT, FOLDER
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
 from triaxcal.codegen.routines import Generated, Reference, start_generated, start_reference
@@ -24,6 +25,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden", action="store_true", help="write tests/golden/ anew instead of comparing"
     )
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """A test that did not run for want of a recording is told where everyone looks."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    absent = sum(ABSENT in str(report.longrepr) for report in skipped)
+    if absent:
+        terminalreporter.write_line(
+            f"NOT RUN: {absent} tests on real recordings, which are not in {FOLDER}", red=True
+        )
 
 
 def write_generated(plan: Plan, folder: Path) -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import cantools
 import numpy as np
 import pytest
@@ -12,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig_cases import dbc
 
+from recordings import recording
 from triaxcal.errors import RefusedError
 from triaxcal.rig.candump import read_log
 from triaxcal.rig.dbc import REQUIRED, default_dbc, layout_of, load_database, read_dbc
@@ -136,11 +134,8 @@ def test_a_wrong_dbc_is_refused(tmp_path, change, message):
 
 
 def test_a_real_log_decodes_to_the_published_means():
-    """CSS Electronics' public recording; TRIAXCAL_RECORDINGS names the folder of recordings."""
-    recordings = os.environ.get("TRIAXCAL_RECORDINGS")
-    if not recordings:
-        pytest.skip("TRIAXCAL_RECORDINGS does not name a folder with css_canedge/")
-    folder = Path(recordings) / "css_canedge"
+    """CSS Electronics' public recording."""
+    folder = recording("css_canedge")
     message = next(m for m in load_database(folder / "canmod-gps.dbc").messages if m.frame_id == 9)
     layout = layout_of(message)
     parts = list(read_log(next(folder.glob("*.log"))))
