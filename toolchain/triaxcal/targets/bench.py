@@ -14,7 +14,7 @@ from triaxcal.targets.bench_case import case_header, floating_macros, floating_t
 from triaxcal.targets.build import TargetError, Toolset, build, run
 from triaxcal.targets.cores import CORES, Core, install_advice, missing_tools
 from triaxcal.targets.counting import Counts, build_plugin, measure
-from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB2
+from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB1, THUMB2
 from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, Case
 from triaxcal.targets.sizes import Flash, flash_of
 
@@ -56,7 +56,7 @@ class Cost:
 
 def subjects(cases: Sequence[Case]) -> list[Subject]:
     """Every shape in every arithmetic, and the baselines of the cubic."""
-    result = [Subject(case, a, "") for case in cases for a in (PORTABLE, LIMBS, THUMB2)]
+    result = [Subject(case, a, "") for case in cases for a in (PORTABLE, LIMBS, THUMB2, THUMB1)]
     cubic = next(c for c in cases if c.name == CUBIC)
     return [*result, Subject(cubic, PORTABLE, DOUBLE), Subject(cubic, PORTABLE, FLOAT)]
 
@@ -97,7 +97,7 @@ def run_bench(
 
 
 def _meant_for(arithmetic: int, core: Core) -> bool:
-    if arithmetic == LIMBS:
+    if arithmetic in (LIMBS, THUMB1):
         return core.no_long_multiply
     return arithmetic != THUMB2 or core.thumb2_multiply
 
