@@ -264,8 +264,10 @@ static void complete_rows(int32_t row[3][TRIAX_ROW_WORDS])
 /* Horner's rule by halves, row by row, where the lower half of x is 0. */
 static void short_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_high)
 {
-    register const int32_t *c __asm__("r0") = segment->coefficient[0];
-    register int32_t *row __asm__("r1") = state->row[0];
+    const int32_t *const first = segment->coefficient[0];
+    int32_t *const first_row = state->row[0];
+    register const int32_t *c __asm__("r0") = first;
+    register int32_t *row __asm__("r1") = first_row;
     register int32_t x __asm__("r2") = x_high;
     __asm__ volatile(
         ".syntax unified\n\t"
@@ -371,14 +373,16 @@ static void evaluate_state(triax_state_t *state, const triax_segment_t *segment,
 }
 
 /*
- * The limb form, a row at a time: the lower halves of the gains times the lower parts of the codes,
- * what is left of that plus the cross terms, then the offset and the higher parts. r7 is saved by
- * hand because it may be a frame pointer; results wait on the stack because accel may be raw_code.
+ * The limb form: gains in halves, codes in parts of 11 and 13 bits.
+ * Partial sums come in rising order of their weight; what is below the next is shifted out. r7 is
+ * saved by hand because it may be a frame pointer; results wait on the stack because accel may be
+ * raw_code.
  */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
 {
+    const int32_t *const first_row = state->row[0];
     register int32_t *out __asm__("r2") = accel;
-    register const int32_t *row __asm__("r0") = state->row[0];
+    register const int32_t *row __asm__("r0") = first_row;
     register int32_t x __asm__("r3") = ux;
     register int32_t y __asm__("r4") = uy;
     register int32_t z __asm__("r1") = uz;
@@ -403,7 +407,7 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
         "ldrh r6, [r0, #8]\n\t"
         "muls r6, r7, r6\n\t"
         "add r6, r12\n\t"
-"asrs r6, r6, #11\n\t"
+        "asrs r6, r6, #11\n\t"
         "mov r12, r6\n\t"
         "ldrh r6, [r0, #0]\n\t"
         "muls r6, r3, r6\n\t"
@@ -414,7 +418,7 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
         "ldrh r6, [r0, #8]\n\t"
         "muls r6, r1, r6\n\t"
         "add r6, r12\n\t"
-"asrs r6, r6, #5\n\t"
+        "asrs r6, r6, #5\n\t"
         "mov r12, r6\n\t"
         "ldr r6, [r0, #16]\n\t"
         "muls r6, r2, r6\n\t"
@@ -452,7 +456,7 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
         "ldrh r6, [r0, #8]\n\t"
         "muls r6, r7, r6\n\t"
         "add r6, r12\n\t"
-"asrs r6, r6, #11\n\t"
+        "asrs r6, r6, #11\n\t"
         "mov r12, r6\n\t"
         "ldrh r6, [r0, #0]\n\t"
         "muls r6, r3, r6\n\t"
@@ -463,7 +467,7 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
         "ldrh r6, [r0, #8]\n\t"
         "muls r6, r1, r6\n\t"
         "add r6, r12\n\t"
-"asrs r6, r6, #5\n\t"
+        "asrs r6, r6, #5\n\t"
         "mov r12, r6\n\t"
         "ldr r6, [r0, #16]\n\t"
         "muls r6, r2, r6\n\t"
@@ -501,7 +505,7 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
         "ldrh r6, [r0, #8]\n\t"
         "muls r6, r7, r6\n\t"
         "add r6, r12\n\t"
-"asrs r6, r6, #11\n\t"
+        "asrs r6, r6, #11\n\t"
         "mov r12, r6\n\t"
         "ldrh r6, [r0, #0]\n\t"
         "muls r6, r3, r6\n\t"
@@ -512,7 +516,7 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
         "ldrh r6, [r0, #8]\n\t"
         "muls r6, r1, r6\n\t"
         "add r6, r12\n\t"
-"asrs r6, r6, #5\n\t"
+        "asrs r6, r6, #5\n\t"
         "mov r12, r6\n\t"
         "ldr r6, [r0, #16]\n\t"
         "muls r6, r2, r6\n\t"

@@ -18,7 +18,7 @@ static int32_t s32(uint32_t bits)
     return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits : (-1 - (int32_t)inverted);
 }
 
-#if TRIAX_ARITHMETIC != TRIAX_THUMB2
+#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_LIMBS)
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
 static int32_t high_word(int64_t value)
 {
@@ -87,7 +87,7 @@ static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t
 }
 #endif
 
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
+#if TRIAX_ARITHMETIC == TRIAX_LIMBS
 /* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
 static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
 {
@@ -131,7 +131,7 @@ static void long_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *se
 }
 #endif
 
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
+#if TRIAX_ARITHMETIC == TRIAX_LIMBS
 /* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
 static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
                           int32_t x_q31)
@@ -231,6 +231,365 @@ static void apply_rows(const triax_state_t *state, const int32_t raw_code[3],
 }
 #endif
 
+#if TRIAX_ARITHMETIC == TRIAX_THUMB1
+#if defined(__ARM_BIG_ENDIAN)
+#error "TRIAX_THUMB1 takes the lower halves of words at their first byte: use TRIAX_LIMBS"
+#endif
+
+/* Gains as 11 lower, 11 middle and 10 higher bits, so that triax_apply need not take them apart. */
+static void complete_rows(int32_t row[3][TRIAX_ROW_WORDS])
+{
+    uint32_t i;
+    for (i = 0u; i < 3u; i++) {
+        uint32_t j;
+        for (j = 0u; j < 3u; j++) {
+            const int32_t gain = row[i][j];
+            const uint32_t lower = (uint32_t)gain & 0x7FFu;
+            const uint32_t middle = ((uint32_t)gain >> 11) & 0x7FFu;
+            row[i][j] = (int32_t)lower;
+            row[i][4u + j] = (int32_t)middle;
+            row[i][7u + j] = asr32(gain, 22u);
+        }
+    }
+}
+
+/* Horner's rule by halves, row by row, where the lower half of x is 0. */
+static void short_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_high)
+{
+    const int32_t *const first = segment->coefficient[0];
+    int32_t *const first_row = state->row[0];
+    register const int32_t *c __asm__("r0") = first;
+    register int32_t *row __asm__("r1") = first_row;
+    register int32_t x __asm__("r2") = x_high;
+    __asm__ volatile(
+        ".syntax unified\n\t"
+        "movs r3, #3\n\t"
+        "1:\n\t"
+        "ldr r4, [r0, #4]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #0]\n\t"
+        "adds r4, r4, r5\n\t"
+        "lsls r5, r4, #21\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #0]\n\t"
+        "lsls r5, r4, #10\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #16]\n\t"
+        "asrs r4, r4, #22\n\t"
+        "str r4, [r1, #28]\n\t"
+        "ldr r4, [r0, #12]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #8]\n\t"
+        "adds r4, r4, r5\n\t"
+        "lsls r5, r4, #21\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #4]\n\t"
+        "lsls r5, r4, #10\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #20]\n\t"
+        "asrs r4, r4, #22\n\t"
+        "str r4, [r1, #32]\n\t"
+        "ldr r4, [r0, #20]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #16]\n\t"
+        "adds r4, r4, r5\n\t"
+        "lsls r5, r4, #21\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #8]\n\t"
+        "lsls r5, r4, #10\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #24]\n\t"
+        "asrs r4, r4, #22\n\t"
+        "str r4, [r1, #36]\n\t"
+        "ldr r4, [r0, #28]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #24]\n\t"
+        "adds r4, r4, r5\n\t"
+        "adds r0, #32\n\t"
+        "str r4, [r1, #12]\n\t"
+        "adds r1, #40\n\t"
+        "subs r3, #1\n\t"
+        "bne 1b"
+        : "+&r"(c), "+&r"(row)
+        : "r"(x)
+        : "r3", "r4", "r5", "cc", "memory");
+}
+
+static void evaluate_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_q31)
+{
+    const int32_t x_high = high_half(x_q31);
+    const int32_t x_low = low_half(x_q31);
+    if (x_low == 0) {
+        short_state(state, segment, x_high);
+    } else {
+        long_rows(state->row, segment, x_high, x_low);
+        complete_rows(state->row);
+    }
+}
+
+/*
+ * Gains in three limbs of 11, 11 and 10 bits, codes in halves: no sum of three products, with what
+ * is carried into it, leaves int32_t.
+ * Partial sums come in rising order of their weight; what is below the next is shifted out. r7 is
+ * saved by hand because it may be a frame pointer; results wait on the stack because accel may be
+ * raw_code.
+ */
+static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
+{
+    const int32_t *const first_row = state->row[0];
+    register int32_t *out __asm__("r2") = accel;
+    register const int32_t *row __asm__("r0") = first_row;
+    register int32_t x __asm__("r3") = ux;
+    register int32_t y __asm__("r4") = uy;
+    register int32_t z __asm__("r1") = uz;
+    __asm__ volatile(
+        ".syntax unified\n\t"
+        "push {r0, r1, r2, r7}\n\t"
+        "uxth r2, r3\n\t"
+        "asrs r3, r3, #16\n\t"
+        "uxth r5, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "uxth r7, r1\n\t"
+        "asrs r1, r1, #16\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r2, r6\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #11\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #6\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #12]\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r3, r6\n\t"
+        "mov lr, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add lr, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, lr\n\t"
+"lsls r6, r6, #6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #3\n\t"
+        "str r6, [sp, #0]\n\t"
+        "adds r0, #40\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r2, r6\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #11\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #6\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #12]\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r3, r6\n\t"
+        "mov lr, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add lr, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, lr\n\t"
+"lsls r6, r6, #6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #3\n\t"
+        "str r6, [sp, #4]\n\t"
+        "adds r0, #40\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r2, r6\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #11\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #6\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #12]\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r3, r6\n\t"
+        "mov lr, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add lr, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, lr\n\t"
+"lsls r6, r6, #6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #3\n\t"
+        "pop {r0, r1, r2, r7}\n\t"
+        "stmia r2!, {r0, r1, r6}"
+        : "+&r"(row), "+&r"(x), "+&r"(y), "+&r"(z), "+&r"(out)
+        :
+        : "r5", "r6", "r12", "lr", "cc", "memory");
+}
+#endif
+
 uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib, int32_t temp_code)
 {
     const triax_segment_t *segment = &calib->segment[0];
@@ -253,7 +612,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         }
     }
     x_q31 = (code - segment->origin_code) * segment->gain;
-#if TRIAX_ARITHMETIC == TRIAX_THUMB2
+#if (TRIAX_ARITHMETIC == TRIAX_THUMB2) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
     evaluate_state(state, segment, x_q31);
 #else
     evaluate_rows(state->row, segment, x_q31);
@@ -261,7 +620,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     return status;
 }
 
-#if TRIAX_ARITHMETIC != TRIAX_THUMB2
+#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_LIMBS)
 /* The offset holds half an output LSB; floor(floor(v / 2^32) / 2^3) = floor(v / 2^35). */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
 {

@@ -65,6 +65,8 @@ typedef struct {
 /* Words of a row of the state; those beyond 4 are the assembly's own. */
 #if TRIAX_ARITHMETIC == TRIAX_THUMB2
 #define TRIAX_ROW_WORDS 5
+#elif TRIAX_ARITHMETIC == TRIAX_THUMB1
+#define TRIAX_ROW_WORDS 10
 #else
 #define TRIAX_ROW_WORDS 4
 #endif

@@ -151,14 +151,15 @@ def limb_split(shape: Shape) -> int:
 def assembly(shape: Shape) -> dict[str, int]:
     """Which assembly there is for a shape, and its shifts; 0 for none.
 
-    Keys: `thumb2` and `thumb1`, whether `triax_apply` has that form (with a state of its own);
-    `evaluate`, whether the thermal functions have one too; `in_sum`, bits of the final shift that
+    Keys: `thumb2` and `thumb1`, whether `triax_apply` has that form (with a state of its own), for
+    `thumb1` the number of limbs of a gain; `evaluate`, whether the thermal functions have one too;
+    `in_sum`, bits of the final shift that
     the assembly for Thumb-2 gets for nothing, because it shifts the raw codes by so many less.
     """
     thumb2 = int(not shape.saturates)
     return {
         "thumb2": thumb2,
-        "thumb1": int(limb_split(shape) > 0),
+        "thumb1": 2 if limb_split(shape) else 3 * thumb2,
         "evaluate": int(shape.order > 0 and shape.inverse is None),
         "in_sum": min(shape.raw_shift, shape.output_shift - 32) if thumb2 else 0,
     }
@@ -179,7 +180,6 @@ def forms_using(shape: Shape) -> dict[str, str]:
             portable=order or plain_apply,
             limbs=plain_apply and not limbs,
             thumb2=order and not in_asm_2,
-            thumb1=plain_apply and not limbs,
         ),
         "asr32": _condition(
             portable=plain_apply,
@@ -187,16 +187,17 @@ def forms_using(shape: Shape) -> dict[str, str]:
             thumb2=plain_apply and not in_asm_2 and given["in_sum"] > 0,
             thumb1=plain_apply or order,
         ),
-        "high_half": _condition(limbs=limbs or order, thumb1=limbs or order),
+        "high_half": _condition(limbs=limbs or order, thumb1=given["thumb1"] == 2 or order),
         "low_half": _condition(limbs=limbs or order, thumb1=order),
         "int64_horner": _condition(portable=order, thumb2=order and not in_asm_2),
         "limb_horner": _condition(limbs=order, thumb1=order),
         "short_horner": _condition(limbs=order, thumb1=order and not in_asm_1),
         "evaluate_state": _condition(thumb2=in_asm_2, thumb1=in_asm_1),
-        "int64_apply": _condition(
-            portable=plain_apply, limbs=plain_apply and not limbs, thumb1=plain_apply and not limbs
+        "int64_apply": _condition(portable=plain_apply, limbs=plain_apply and not limbs),
+        "left_justify": _condition(
+            portable=True, limbs=not limbs, thumb1=given["thumb1"] != 2, thumb2=not plain_apply
         ),
-        "complete": _condition(thumb2=plain_apply and not in_asm_2, thumb1=limbs),
+        "complete": _condition(thumb2=plain_apply and not in_asm_2, thumb1=plain_apply),
     }
 
 
