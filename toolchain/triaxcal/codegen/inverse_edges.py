@@ -1,7 +1,8 @@
 """Constants of the inverse form at its limits: least determinant, full rows, ties of rounding.
 
-K is diagonal but for k_01, and constant, so that one element decides each: k_00 the determinant,
-k_01 the gains of row x, U0_x its offset and with it the row's sum. The values are found by
+K is constant, and diagonal but for k_01, so that one element decides each: k_00 the determinant,
+k_01 the gains of row x, U0_x its offset and with it the row's sum. Only a determinant beyond int32
+needs k_10 as well. The values are found by
 bisection with the Python model; whether an image of them is answered rightly is judged by the
 reference C.
 """
@@ -24,8 +25,11 @@ the row's sum is even and within reach of the offset."""
 TIES = 8
 """For each rounding constant: one gain off by one shows in one result of 2^output_shift / u."""
 
-Constants = tuple[str, int, int, int]
-"""A name, k_00, k_01 and U0_x; k_11 = k_22 is the largest that fits."""
+_SATURATING = tuple(range(1 << 20, (1 << 20) + TIES))
+"""Elements k_01 whose square, over 2^31, takes the largest determinant past int32."""
+
+Constants = tuple[str, int, int, int, int]
+"""A name, k_00, k_01, U0_x and k_10; k_11 = k_22 is the largest that fits."""
 
 
 def inverse_edges(shifts: InverseShifts, largest: int, preload: int) -> Iterator[Constants]:
@@ -37,8 +41,11 @@ def inverse_edges(shifts: InverseShifts, largest: int, preload: int) -> Iterator
     for determinant in (least - 2, least - 1, least, least + 1):
         k = _element(determinant, largest, shifts)
         if k is not None and _determinant(k, largest, shifts) == determinant:
-            yield f"determinant {determinant}", k, 0, 0
-            yield f"determinant {determinant}, negative", -k, 0, 0
+            yield f"determinant {determinant}", k, 0, 0, 0
+            yield f"determinant {determinant}, negative", -k, 0, 0, 0
+    for k01 in _SATURATING:
+        yield f"determinant above int32, k_01 {k01}", largest, k01, 0, -k01
+        yield f"determinant below int32, k_01 {k01}", -largest, k01, 0, k01
     yield from itertools.islice(_gain_ties(largest, shifts), 2 * TIES)
     yield from itertools.islice(_offset_ties(largest, shifts, preload), 2 * TIES)
     k = _element(least, largest, shifts)
@@ -48,7 +55,7 @@ def inverse_edges(shifts: InverseShifts, largest: int, preload: int) -> Iterator
         for k01 in range(_TRIES):
             u0 = _offset_at(target, (k00, k01), largest, shifts, preload)
             if u0 is not None:
-                yield f"row at {target}, k_00 {k00}", k00, k01, u0
+                yield f"row at {target}, k_00 {k00}", k00, k01, u0, 0
                 break
 
 
@@ -64,7 +71,7 @@ def _gain_ties(largest: int, shifts: InverseShifts) -> Iterator[Constants]:
             # a_01 is -(k_01 k_22) >> adjugate_shift.
             k01 = (-word << shifts.adjugate_shift) // largest
             if abs(k01) <= largest and (-k01 * largest) >> shifts.adjugate_shift == word:
-                yield f"gain at remainder {remainder}, k_00 {k00}", k00, k01, 0
+                yield f"gain at remainder {remainder}, k_00 {k00}", k00, k01, 0, 0
 
 
 def _offset_ties(largest: int, shifts: InverseShifts, preload: int) -> Iterator[Constants]:
@@ -77,7 +84,7 @@ def _offset_ties(largest: int, shifts: InverseShifts, preload: int) -> Iterator[
             # Odd, as 4 remainder + 0 of a tie has the one solution -2^31, which does not fit.
             u0 = _signed((4 * remainder + 1) * pow(n00, -1, 1 << 32), 1 << 32)
             if abs(u0) <= largest:
-                yield f"offset at remainder {remainder}, k_00 {k00}", k00, 0, u0
+                yield f"offset at remainder {remainder}, k_00 {k00}", k00, 0, u0, 0
 
 
 def _signed(value: int, modulus: int) -> int:
