@@ -86,7 +86,7 @@ def run_bench(
         plugin = build_plugin(work)
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             futures = {
-                pool.submit(_cost, subject, core, work / str(i), plugin): i
+                pool.submit(cost_of, subject, core, work / str(i), plugin): i
                 for i, (subject, core) in enumerate(plan)
             }
             costs: dict[int, Cost] = {}
@@ -102,6 +102,13 @@ def _meant_for(arithmetic: int, core: Core) -> bool:
     return arithmetic != THUMB2 or core.thumb2_multiply
 
 
+def best_form(core: Core) -> int:
+    """The value of TRIAX_ARITHMETIC that is fastest on a core."""
+    if core.no_long_multiply:
+        return THUMB1
+    return THUMB2 if core.thumb2_multiply else PORTABLE
+
+
 def compiler_versions() -> list[str]:
     """First line of --version of every cross compiler that is installed."""
     compilers = dict.fromkeys(core.gcc for core in CORES if not core.hosted)
@@ -109,7 +116,8 @@ def compiler_versions() -> list[str]:
     return [run([c, "--version"]).splitlines()[0] for c in installed]
 
 
-def _cost(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
+def cost_of(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
+    """Build, count and size a subject on a core; `work` is made for it."""
     missing = missing_tools(core.tools("gcc"))
     if missing:
         advice = f"not done: {', '.join(missing)} not found: {install_advice(missing)}"
