@@ -51,6 +51,8 @@ static int invert(triax_ref_state_t *state, const triax_ref_t *ref, int32_t k[3]
     int64_t det;
     int64_t reciprocal;
     int64_t least = power_of_two(ref->reciprocal_log2 - 31) + 1;
+    const int64_t row_limit =
+        (ref->terms & TRIAX_REF_QUADRATIC) ? 3 * power_of_two(30) : power_of_two(32) - 8;
     int fits = 1;
     int i;
     int j;
@@ -88,11 +90,11 @@ static int invert(triax_ref_state_t *state, const triax_ref_t *ref, int32_t k[3]
             row += absolute(state->gain[i][j]);
         }
         offset = -floor_div(offset + power_of_two(29), 30);
-        if (ref->output_shift > 32) {
+        if (ref->output_shift > 32 && !(ref->terms & TRIAX_REF_QUADRATIC)) {
             offset += power_of_two(ref->output_shift - 33);
         }
         state->offset[i] = saturate(offset);
-        if (row + 2 * absolute(state->offset[i]) >= power_of_two(32) - 8) {
+        if (row + 2 * absolute(state->offset[i]) >= row_limit) {
             fits = 0;
         }
     }
@@ -145,13 +147,33 @@ uint32_t triax_ref_set_temperature(triax_ref_state_t *state, const triax_ref_t *
     return status;
 }
 
-/* Step A: the sum of three products, offset and rounding, then one floor. */
+/* Step Q: what is added to the sums, the products being those of all three linear results. */
+static void add_quadratic(const triax_ref_state_t *state, const triax_ref_t *ref, int64_t sum[3])
+{
+    static const int first[6] = {0, 1, 2, 0, 0, 1};
+    static const int second[6] = {0, 1, 2, 1, 2, 2};
+    int64_t linear[3];
+    int i;
+    int k;
+    for (i = 0; i < 3; i++) {
+        linear[i] = floor_div(sum[i], 32) + state->offset[i];
+    }
+    for (i = 0; i < 3; i++) {
+        for (k = 0; k < 6; k++) {
+            sum[i] += ref->quadratic[i][k] * floor_div(linear[first[k]] * linear[second[k]], 32);
+        }
+    }
+}
+
+/* Steps A and Q: the sum of three products, quadratic terms, offset and rounding; then one floor. */
 uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
                          const int32_t raw_code[3], int32_t accel[3])
 {
     const int64_t scale = power_of_two(ref->raw_shift);
+    const int quadratic = (ref->terms & TRIAX_REF_QUADRATIC) != 0;
     uint32_t status = TRIAX_REF_OK;
     int64_t u[3];
+    int64_t sum[3];
     int i;
 
     for (i = 0; i < 3; i++) {
@@ -162,13 +184,18 @@ uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
         u[i] = clamped * scale;
     }
     for (i = 0; i < 3; i++) {
-        int64_t sum = state->gain[i][0] * u[0] + state->gain[i][1] * u[1] + state->gain[i][2] * u[2];
+        sum[i] = state->gain[i][0] * u[0] + state->gain[i][1] * u[1] + state->gain[i][2] * u[2];
+    }
+    if (quadratic) {
+        add_quadratic(state, ref, sum);
+    }
+    for (i = 0; i < 3; i++) {
+        int64_t total = sum[i] + state->offset[i] * INT64_C(4294967296);
         int64_t result;
-        sum += state->offset[i] * INT64_C(4294967296);
-        if (ref->output_shift <= 32) {
-            sum += power_of_two(ref->output_shift - 1);
+        if (ref->output_shift <= 32 || quadratic) {
+            total += power_of_two(ref->output_shift - 1);
         }
-        result = floor_div(sum, ref->output_shift);
+        result = floor_div(total, ref->output_shift);
         accel[i] = saturate(result);
         if (accel[i] != result) {
             status |= TRIAX_REF_SATURATED;

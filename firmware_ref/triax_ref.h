@@ -28,6 +28,11 @@ enum {
     TRIAX_REF_BAD_IMAGE = 16
 };
 
+/* Bits of the word that says which terms there are beyond the linear ones. */
+enum {
+    TRIAX_REF_QUADRATIC = 1
+};
+
 typedef struct {
     int32_t first_code;
     int32_t origin_code;
@@ -49,10 +54,12 @@ typedef struct {
     int determinant_shift;
     int reciprocal_log2;
     int gain_shift;
+    int terms;
     /* constants */
     int32_t temp_min_code;
     int32_t temp_max_code;
     triax_ref_segment_t segment[TRIAX_REF_MAX_SEGMENTS];
+    int32_t quadratic[3][6]; /* xx, yy, zz, xy, xz, yz */
 } triax_ref_t;
 
 typedef struct {

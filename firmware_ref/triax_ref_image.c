@@ -64,11 +64,17 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
     int s;
     int f;
     int k;
+    size_t words;
+    uint32_t version;
 
     if (size < 4 * (TRIAX_REF_HEADER_WORDS + 3) || size % 4 != 0) {
         return TRIAX_REF_BAD_IMAGE;
     }
-    if (next_word(&reader) != 0x43585254u || next_word(&reader) != 1u || next_word(&reader) != size) {
+    if (next_word(&reader) != 0x43585254u) {
+        return TRIAX_REF_BAD_IMAGE;
+    }
+    version = next_word(&reader);
+    if ((version != 1u && version != 2u) || next_word(&reader) != size) {
         return TRIAX_REF_BAD_IMAGE;
     }
     ref->inverse_form = next_int(&reader);
@@ -83,10 +89,18 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
     ref->determinant_shift = next_int(&reader);
     ref->reciprocal_log2 = next_int(&reader);
     ref->gain_shift = next_int(&reader);
-    if (!shape_is_legal(ref)) {
+    ref->terms = (version == 2u) ? next_int(&reader) : 0;
+    if (!shape_is_legal(ref) || (version == 2u && ref->terms != TRIAX_REF_QUADRATIC)) {
         return TRIAX_REF_BAD_IMAGE;
     }
-    if (size != 4u * (size_t)(TRIAX_REF_HEADER_WORDS + 3 + ref->segments * (3 + 12 * (ref->order + 1)))) {
+    words = (size_t)(TRIAX_REF_HEADER_WORDS + 3 + ref->segments * (3 + 12 * (ref->order + 1)));
+    if (version == 2u) {
+        words += 1;
+    }
+    if (ref->terms & TRIAX_REF_QUADRATIC) {
+        words += 18;
+    }
+    if (size != 4u * words) {
         return TRIAX_REF_BAD_IMAGE;
     }
     ref->temp_min_code = next_int(&reader);
@@ -100,6 +114,9 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
                 ref->segment[s].coefficient[f][k] = next_int(&reader);
             }
         }
+    }
+    for (k = 0; k < 18; k++) {
+        ref->quadratic[k / 6][k % 6] = (ref->terms & TRIAX_REF_QUADRATIC) ? next_int(&reader) : 0;
     }
     return (next_word(&reader) == crc32(image, size - 4)) ? TRIAX_REF_OK : TRIAX_REF_BAD_IMAGE;
 }

@@ -10,10 +10,13 @@ from typing import Any
 import jinja2
 
 from triaxcal import __version__
-from triaxcal.codegen.image import HEADER_NAMES, header_words, image_size
+from triaxcal.codegen.image import header_names, header_words, image_size
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
-from triaxcal.fixedpoint.plan import Plan, Shape
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.quadratic import QUADRATIC_LIMIT, QUADRATIC_NAMES, quadratic_log2
+from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.compensation import INVERSE
+from triaxcal.model.terms import PRODUCT_NAMES
 from triaxcal.resources import shipped
 from triaxcal.unitfile import TemperatureSensor
 
@@ -92,6 +95,8 @@ def render_constants(plan: Plan, sensor: TemperatureSensor, provenance: Provenan
         "temp_min": _code(plan.temp_min_code, sensor),
         "temp_max": _code(plan.temp_max_code, sensor),
         "segments": [_segment_context(plan, s, sensor) for s in range(len(plan.segments))],
+        "quadratic": _quadratic_context(plan),
+        "quadratic_log2": quadratic_log2(plan.shape.output_q, plan.shape.output_shift - 32),
     }
     source = f"shape {shape_id(plan)}, inputs sha256 {provenance.inputs_sha256[:16]}"
     return _render(CONSTANTS_FILE, context, source)
@@ -127,7 +132,11 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "function_order": ", ".join(names[:4]) + ", ... " + names[11],
         "image_size": image_size(plan),
         "header": header_words(plan),
-        "header_names": HEADER_NAMES,
+        "header_names": header_names(plan),
+        "row_limit": shape.row_limit,
+        "products": PRODUCT_NAMES,
+        "quadratic_limit": QUADRATIC_LIMIT,
+        "final_rounding": 1 << max(0, shape.output_shift - 33),
     }
 
 
@@ -140,9 +149,33 @@ def limb_split(shape: Shape) -> int:
     a high gain and a low code below (2^16 + 3) * 2^k: with what is carried into them all are below
     2^31 for spare >= 2 and k <= 13.
     """
+    if shape.quadratic:
+        return 0  # its products need the 64-bit sums
     spare = shape.output_shift - 32
     split = 16 + spare - shape.raw_shift
     return split if spare >= 2 and shape.raw_shift <= 16 and 1 <= split <= 13 else 0
+
+
+def _quadratic_context(plan: Plan) -> list[list[dict[str, str]]]:
+    """Words of the quadratic terms by row, each with its physical value and rounding; or none."""
+    if plan.quadratic is None or plan.real_quadratic is None:
+        return []
+    lsb = 2.0 ** -quadratic_log2(plan.shape.output_q, plan.shape.output_shift - 32)
+    words = [
+        {
+            "name": name,
+            "integer": int32_literal(integer),
+            "value": f"{exact * lsb:.9g}",
+            "rounding": f"{(integer - exact) * lsb:+.1e}",
+        }
+        for name, integer, exact in zip(
+            QUADRATIC_NAMES,
+            plan.quadratic.ravel().tolist(),
+            plan.real_quadratic.ravel().tolist(),
+            strict=True,
+        )
+    ]
+    return [words[6 * i : 6 * i + 6] for i in range(3)]
 
 
 def _code(code: int, sensor: TemperatureSensor) -> dict[str, str]:

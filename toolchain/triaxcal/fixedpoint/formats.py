@@ -15,16 +15,13 @@ from triaxcal.fixedpoint.inversion import (
     quarter_determinant,
     reciprocal,
 )
+from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unitfile import OUTPUT_Q_RANGE
 
 MAX_SPARE_BITS = 16
 MIN_SPARE_BITS = -4
 """Below this the gain's own last place costs more than 16 output LSB: a smaller Q says as much."""
-
-ROW_LIMIT = 2**32 - 8
-"""|n_i0| + |n_i1| + |n_i2| + 2 |b_i| stays below this: the 64-bit sum and its high word plus b
-cannot overflow for any int32 raw codes (docs/fixed-point.md, step R)."""
 
 _NAMES = tuple(
     f"{matrix}{row}{column}" if column else f"{offset}{row}"
@@ -36,7 +33,7 @@ FUNCTION_NAMES = {"direct": _NAMES[:12], "inverse": _NAMES[12:]}
 """Names of the twelve functions in image order."""
 
 
-def choose_spare_bits(real: FloatArray, output_q: int, where: str) -> int:
+def choose_spare_bits(real: FloatArray, output_q: int, row_limit: int, where: str) -> int:
     """Largest number of spare bits with which the direct form fits.
 
     `real`, shape (segments, 12, order + 1), is in units of no spare bits.
@@ -47,13 +44,14 @@ def choose_spare_bits(real: FloatArray, output_q: int, where: str) -> int:
         Naming the row or the coefficient that does not fit, and the highest output_q that does.
     """
     stage = _stage_bounds(real)
+
+    def fits(spare: int) -> bool:
+        return _fits(stage * 2.0**spare, real.shape[2], spare, row_limit)
+
     for spare in range(MAX_SPARE_BITS, MIN_SPARE_BITS - 1, -1):
-        if _fits(stage * 2.0**spare, real.shape[2], spare):
+        if fits(spare):
             return spare
-    fitting = next(
-        (s for s in range(MIN_SPARE_BITS - 1, -40, -1) if _fits(stage * 2.0**s, real.shape[2], s)),
-        None,
-    )
+    fitting = next((s for s in range(MIN_SPARE_BITS - 1, -40, -1) if fits(s)), None)
     raise _refusal(stage * 2.0**MIN_SPARE_BITS, output_q, fitting, where)
 
 
@@ -64,10 +62,10 @@ def _stage_bounds(real: FloatArray) -> FloatArray:
     return bounds
 
 
-def _fits(stage: FloatArray, terms: int, spare: int) -> bool:
+def _fits(stage: FloatArray, terms: int, spare: int, row_limit: int) -> bool:
     stage = stage + _rounding(terms)
     rows = _row_sums(stage) + 2.0 ** (spare + 1)
-    return bool(stage.max() <= INT32_MAX and rows.max() < ROW_LIMIT)
+    return bool(stage.max() <= INT32_MAX and rows.max() < row_limit)
 
 
 def _rounding(terms: int) -> float:
@@ -139,17 +137,19 @@ def choose_matrix_bits(real: FloatArray, where: str) -> int:
 
 
 def choose_inverse(
-    functions: IntArray, k_bits: int, output_q: int, where: str
+    functions: IntArray, k_bits: int, shape: Shape, where: str
 ) -> tuple[InverseShifts, int]:
     """Shifts of the inversion and spare bits, from the integers at every temperature code.
 
-    `functions`, shape (n, 3, 4), are K (times 2^k_bits raw LSB per g) and U0 (raw LSB).
+    `functions`, shape (n, 3, 4), are K (times 2^k_bits raw LSB per g) and U0 (raw LSB). Of the
+    plan's `shape` the output's format counts, but for the spare bits.
 
     Raises
     ------
     RefusedError
         When K is so badly conditioned, or the output so fine, that nothing fits.
     """
+    output_q = shape.output_q
     K = functions[:, :, :3]
     exact = adjugate(K)
     adjugate_shift = max(0, int(np.abs(exact).max()).bit_length() - 31)
@@ -176,10 +176,10 @@ def choose_inverse(
         if gain_shift > 62:
             break
         shifts = replace(shifts, gain_shift=gain_shift)
-        preload = 1 << (spare - 1) if spare > 0 else 0
+        preload = replace(shape, output_shift=32 + spare).rounding_in_offset
         gain, offset = invert(functions, shifts, preload)
         rows = np.abs(gain).sum(axis=2) + 2 * np.abs(offset)
-        if rows.max() >= ROW_LIMIT or np.abs(offset).max() >= INT32_MAX:
+        if rows.max() >= shape.row_limit or np.abs(offset).max() >= INT32_MAX:
             continue
         if spare >= MIN_SPARE_BITS:
             return shifts, spare

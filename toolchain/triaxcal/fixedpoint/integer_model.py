@@ -11,6 +11,7 @@ from triaxcal.fixedpoint.arithmetic import high_word, saturate_int32
 from triaxcal.fixedpoint.horner import horner, segment_of
 from triaxcal.fixedpoint.inversion import invert
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.quadratic import linear_words, quadratic_sum
 from triaxcal.model.types import IntArray
 
 STATUS_OK = 0
@@ -52,7 +53,9 @@ def apply(plan: Plan, state: State, raw_code: IntArray) -> tuple[IntArray, IntAr
     total = np.empty_like(u)
     for i in range(3):
         total[:, i] = gain[:, i, 0] * u[:, 0] + gain[:, i, 1] * u[:, 1] + gain[:, i, 2] * u[:, 2]
-    if not shape.saturates:
+    if plan.quadratic is not None:
+        total += quadratic_sum(plan.quadratic, linear_words(total, offset))
+    elif not shape.saturates:
         return (high_word(total) + offset) >> (shape.output_shift - 32), status
     wide = (total + (offset << 32) + shape.rounding_in_sum) >> shape.output_shift
     accel = saturate_int32(wide)

@@ -21,10 +21,11 @@ import numpy as np
 
 from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import INT32_MAX
-from triaxcal.fixedpoint.formats import FUNCTION_NAMES, ROW_LIMIT
+from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.horner import Segment
 from triaxcal.fixedpoint.integer_model import State, set_temperature
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.proof_quadratic import check_quadratic_range, quadratic_errors
 
 
 @dataclass(frozen=True)
@@ -58,19 +59,28 @@ def prove(plan: Plan) -> Bound:
         When a range does not hold: a fault of the planner, never of the data.
     """
     check_ranges(plan)
+    check_quadratic_range(plan)
     codes = plan.temp_codes
     state, _ = set_temperature(plan, codes)
     _check_rows(plan, state)
     errors = _inverse_errors if plan.shape.inverse is not None else _direct_errors
     axes = [errors(plan, state, axis) for axis in range(3)]
-    worst = int(np.max(axes, axis=0).argmax())
-    per_axis = tuple(math.nextafter(max(axis) + 0.5, math.inf) for axis in axes)
+    extra = quadratic_errors(plan, state, [max(axis) for axis in axes])
+    worst = int((np.array(axes) + np.array(extra)[:, None]).max(axis=0).argmax())
+    per_axis = tuple(
+        math.nextafter(_sum_upwards(max(axis), more) + 0.5, math.inf)
+        for axis, more in zip(axes, extra, strict=True)
+    )
     return Bound(
         lsb=max(per_axis),
         per_axis_lsb=(per_axis[0], per_axis[1], per_axis[2]),
         temp_code=int(codes[worst]),
         codes=len(codes),
     )
+
+
+def _sum_upwards(error: float, more: float) -> float:
+    return math.nextafter(error + more, math.inf) if more else error
 
 
 def check_ranges(plan: Plan) -> None:
@@ -90,7 +100,7 @@ def check_ranges(plan: Plan) -> None:
         if plan.shape.inverse is None:
             for row in range(3):
                 n0, n1, n2, b = bounds[4 * row : 4 * row + 4]
-                if n0 + n1 + n2 + 2 * b >= ROW_LIMIT:
+                if n0 + n1 + n2 + 2 * b >= plan.shape.row_limit:
                     raise _broken(f"row {row} of the sum")
 
 
@@ -109,7 +119,7 @@ def horner_bounds(segment: Segment) -> list[int]:
 
 def _check_rows(plan: Plan, state: State) -> None:
     rows = np.abs(state.gain).sum(axis=2) + 2 * np.abs(state.offset)
-    if int(rows.max()) >= ROW_LIMIT:
+    if int(rows.max()) >= plan.shape.row_limit:
         raise _broken(f"the sum at output_q = {plan.shape.output_q}")
 
 
