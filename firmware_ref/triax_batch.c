@@ -5,7 +5,8 @@
 static void run(const triax_calib_t *calib, size_t count, const int32_t *temp_code,
                 const int32_t *raw_code, int32_t *accel, uint32_t *status)
 {
-    triax_state_t state = {{{0}}};
+    static const triax_state_t nothing;
+    triax_state_t state = nothing;
     uint32_t temp_status = 0;
     size_t i;
     for (i = 0; i < count; i++) {

@@ -131,6 +131,7 @@ def compensation_of(unit: UnitDescription, calibration: Calibration, method: str
         calibration.range_degc,
         voltage_max_v,
         unit.model_error_max_micro_g * 1e-6,
+        terms=calibration.terms,
     )
 
 

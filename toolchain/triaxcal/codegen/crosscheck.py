@@ -25,6 +25,7 @@ from triaxcal.fixedpoint.integer_model import (
     set_temperature,
 )
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray, IntArray
 
 NumberArray = TypeVar("NumberArray", IntArray, FloatArray)
@@ -219,10 +220,14 @@ def _largest_error(plan: Plan, table: FloatArray, vectors: VectorSet, answers: A
         chosen = clean[start : start + _BLOCK]
         rows = _gather(table, vectors.temp[chosen].astype(np.int64) - plan.temp_min_code)
         u = vectors.raw[chosen].astype(np.float64) * 2.0 ** (shape.raw_shift - 32)
+        real = np.empty((3, len(chosen)))
         for i in range(3):
-            exact = rows[:, i, 3].copy()
+            real[i] = rows[:, i, 3]
             for j in range(3):
-                exact += rows[:, i, j] * u[:, j]
-            error = answers[0][chosen, i] - exact * 2.0 ** (32 - shape.output_shift)
+                real[i] += rows[:, i, j] * u[:, j]
+        if plan.real_quadratic is not None:
+            real = real + plan.real_quadratic @ products(real.T).T * 2.0**-64
+        for i in range(3):
+            error = answers[0][chosen, i] - real[i] * 2.0 ** (32 - shape.output_shift)
             largest = max(largest, float(error.max()), -float(error.min()))
     return largest
