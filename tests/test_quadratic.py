@@ -32,17 +32,13 @@ from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.compensation import Compensation, compensate
-from triaxcal.model.terms import Terms
+from triaxcal.model.terms import EXAMPLE_TERMS, Terms
 from triaxcal.unitfile import TemperatureSensor, UnitDescription
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 """45 codes from -40 to 70 degC: few enough for fractions."""
-Q = np.array([
-    [9.1e-4, -2.3e-4, 1.2e-4, 3.0e-4, -1.7e-4, 0.4e-4],
-    [-1.0e-4, 1.4e-3, 0.0, 2.2e-4, 5.0e-5, -6.1e-4],
-    [3.3e-4, 1.0e-5, -7.7e-4, -2.0e-4, 4.4e-4, 1.9e-4],
-])  # fmt: skip
-"""g/g^2, of the size that data sheets of capacitive sensors state."""
+assert EXAMPLE_TERMS.quadratic_per_g is not None
+Q = EXAMPLE_TERMS.quadratic_per_g
 UNITS = {
     "24 bits": unit_of(sensor=COARSE),
     "inverse": unit_of(sensor=COARSE, method="inverse"),
