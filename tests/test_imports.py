@@ -14,6 +14,7 @@ PACKAGE = Path(__file__).parent.parent / "toolchain" / "triaxcal"
 ROOM_OF_MODULE = {
     "records": "records",
     "records_csv": "records",
+    "recordinglayout": "records",
     "certificate": "records",
     "tomltable": "records",
     "unitfile": "records",
@@ -32,7 +33,8 @@ MAY_IMPORT = {
     "records": {"ground", "model"},
     "simulation": {"ground", "model", "records"},
     "dynamic": {"ground", "model", "records"},
-    "fit": {"ground", "model", "records"},
+    "recording": {"ground", "model", "records"},
+    "fit": {"ground", "model", "records", "recording"},
     "fixedpoint": {"ground", "model", "records"},
     "codegen": {"ground", "model", "records", "fixedpoint"},
     "publish": {"ground"},
@@ -57,7 +59,7 @@ MAY_IMPORT = {
 imports what lies before it; none imports report, which reads all, nor cli, which calls all."""
 
 ONLY_IN = {
-    "scipy": {"fit", "dynamic"},
+    "scipy": {"fit", "dynamic", "recording"},  # recording reads MAT-files by it
     "can": {"rig"},
     "cantools": {"rig"},
     "jinja2": {"codegen", "report"},
