@@ -60,6 +60,8 @@ ONLY_IN = {
     "scipy": {"fit", "dynamic"},
     "can": {"rig"},
     "cantools": {"rig"},
+    "asammdf": {"rig"},
+    "pyarrow": {"rig"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report"},
