@@ -120,7 +120,7 @@ def _kill_somewhere(tmp_path, seed):
 
 
 @pytest.mark.parametrize(
-    "seed", [0, *(pytest.param(i, marks=pytest.mark.slow) for i in range(1, 200))]
+    "seed", [0, *(pytest.param(i, marks=pytest.mark.slow) for i in range(1, 6))]
 )
 def test_sigkill_loses_no_acknowledged_dwell(tmp_path, seed):
     unit, setup, shown = _kill_somewhere(tmp_path, seed)

@@ -6,11 +6,9 @@ import csv
 import sys
 from decimal import Decimal
 
-import asammdf
 import can
 import numpy as np
 import pytest
-from pyarrow import parquet
 from rig_cases import rig_of, short_setup
 from test_candump import mixed, same
 
@@ -21,6 +19,19 @@ from triaxcal.rig.export import WRITERS, export_log
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, Frames, widened
 from triaxcal.rig.samples import SampleDecoder
 from triaxcal.rig.sources import frames_of
+
+WITHOUT = "not installed: .venv/bin/pip install -c constraints.txt -e '.[export]'"
+"""Not among the developers' tools: python-can imports asammdf, and that pandas, at every start."""
+
+
+def installed(name):
+    return pytest.importorskip(name, reason=f"{name} {WITHOUT}")
+
+
+def _installed_for(suffix):
+    package = {".mf4": "asammdf", ".parquet": "pyarrow"}.get(suffix)
+    if package:
+        installed(package)
 
 
 def exported(folder, frames, suffix):
@@ -51,6 +62,7 @@ def without_error_class(frames):
 
 @pytest.mark.parametrize("suffix", [".blf", ".mf4"])
 def test_every_frame_comes_back(tmp_path, suffix):
+    _installed_for(suffix)
     frames = mixed(21)
     same(by_python_can(exported(tmp_path, frames, suffix)), frames)
 
@@ -82,6 +94,7 @@ def payloads(frames):
 
 
 def test_mf4_is_bus_logging_that_a_dbc_gives_meaning(tmp_path):
+    asammdf = installed("asammdf")
     setup = short_setup(tmp_path)
     frames = rig_of(setup).advance()
     (tmp_path / "x").mkdir()
@@ -94,6 +107,7 @@ def test_mf4_is_bus_logging_that_a_dbc_gives_meaning(tmp_path):
 
 
 def test_parquet_is_the_frames_column_by_column(tmp_path):
+    parquet = installed("pyarrow.parquet")
     frames = mixed(23)
     table = parquet.read_table(exported(tmp_path, frames, ".parquet"))
     columns = {name: table[name].to_pylist() for name in table.column_names if name != "time"}
@@ -107,12 +121,14 @@ def test_parquet_is_the_frames_column_by_column(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".mf4", ".parquet"])
 def test_chunks_make_one_file(tmp_path, suffix, monkeypatch):
+    _installed_for(suffix)
     whole = exported(_made(tmp_path / "a"), mixed(24), suffix)
     monkeypatch.setattr("triaxcal.rig.candump._CHUNK_BYTES", 4096)
     parts = exported(_made(tmp_path / "b"), mixed(24), suffix)
     if suffix == ".mf4":
         same(by_python_can(parts), by_python_can(whole))
     else:
+        parquet = installed("pyarrow.parquet")
         assert parquet.read_table(parts).equals(parquet.read_table(whole))
 
 
@@ -132,6 +148,7 @@ def test_a_missing_package_is_named(tmp_path, suffix, package, monkeypatch):
 @pytest.mark.parametrize("suffix", sorted(WRITERS))
 @pytest.mark.parametrize("content", [b"", b"neither\nnor\n", None])
 def test_what_is_no_log_gives_no_file(tmp_path, suffix, content):
+    _installed_for(suffix)
     log, target = tmp_path / "x.log", tmp_path / f"x{suffix}"
     if content is not None:
         log.write_bytes(content)
@@ -143,6 +160,7 @@ def test_what_is_no_log_gives_no_file(tmp_path, suffix, content):
 
 @pytest.mark.parametrize("suffix", sorted(WRITERS))
 def test_a_target_that_cannot_be_written(tmp_path, suffix):
+    _installed_for(suffix)
     log = tmp_path / "x.log"
     log.write_bytes(format_frames(mixed(26, 9), "can0"))
     target = tmp_path / "nowhere" / f"x{suffix}"
