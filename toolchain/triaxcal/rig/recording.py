@@ -17,7 +17,7 @@ from triaxcal.errors import RefusedError
 from triaxcal.rig.candump import NS_PER_US, read_log
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.events import DURABLE, AcceptedDwell, Agree, Command, Event, Redo
-from triaxcal.rig.frames import Frames
+from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.journal import Journal, Record, disk_refusal, read_journal
 from triaxcal.rig.rawlog import LogState, RawLog, changed_log
 from triaxcal.rig.stillness import Reference
@@ -25,6 +25,9 @@ from triaxcal.rig.stillness import Reference
 FORMAT = 1
 LOG_FILE = "frames.log"
 JOURNAL_FILE = "session.journal"
+_DECIDE_NS = 80_000_000
+"""Frames wait so long for the decoder, which costs the same for ten as for a hundred; they are in
+the log meanwhile. Decisions do not depend on how frames are cut."""
 _NUMBERED = re.compile(r"[0-9]{3,}")
 
 
@@ -64,6 +67,7 @@ class Recording:
             self.journal.append({**header(setup), "channel": channel})
         self.engine = Engine(setup, channel, history)
         self._trouble = ""
+        self._waiting: list[Frames] = []
 
     def feed(self, frames: Frames) -> list[Event]:
         """Record frames and decide.
@@ -75,7 +79,11 @@ class Recording:
         """
         frames = whole_microseconds(frames)
         self.log.append(frames)
-        return self._acknowledge(self.engine.feed(frames))
+        if len(frames):
+            self._waiting.append(frames)
+        if not self._waiting or frames_ns(self._waiting) < _DECIDE_NS:
+            return []
+        return self._decide()
 
     def command(self, command: Command, t_ns: int) -> list[Event]:
         """Record a word of the operator and decide.
@@ -85,10 +93,11 @@ class Recording:
         RefusedError
             When the disk refuses.
         """
+        events = self._decide()
         self.log.flush(sync=True)
         said = {"name": type(command).__name__, **asdict(command), "t_ns": t_ns}
         self.journal.append({"kind": "command", "command": said, **self._place()})
-        return self._acknowledge(self.engine.command(command, t_ns))
+        return [*events, *self._acknowledge(self.engine.command(command, t_ns))]
 
     def close(self) -> None:
         """Close log and journal.
@@ -103,6 +112,11 @@ class Recording:
         finally:
             self.journal.close()
 
+    def _decide(self) -> list[Event]:
+        frames = concatenate(self._waiting)
+        self._waiting = []
+        return self._acknowledge(self.engine.feed(frames))
+
     def _acknowledge(self, events: list[Event]) -> list[Event]:
         for event in events:
             repeated = event.kind == "trouble" and event.text == self._trouble
@@ -116,6 +130,11 @@ class Recording:
 
     def _place(self) -> dict[str, Any]:
         return {"log": self.log.state}
+
+
+def frames_ns(parts: list[Frames]) -> int:
+    """Time from the first frame of the first part to the last of the last."""
+    return int(parts[-1].t_ns[-1]) - int(parts[0].t_ns[0])
 
 
 def whole_microseconds(frames: Frames) -> Frames:
