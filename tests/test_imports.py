@@ -62,6 +62,8 @@ ONLY_IN = {
     "scipy": {"fit", "dynamic", "recording"},  # recording reads MAT-files by it
     "can": {"rig"},
     "cantools": {"rig"},
+    "asammdf": {"rig"},
+    "pyarrow": {"rig"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report"},

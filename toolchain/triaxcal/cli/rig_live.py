@@ -71,10 +71,18 @@ class _Keys:
 
 def guide(setup: Setup, source: Source, folder: Path, plain: bool) -> None:
     """Guide a session to its end and write the records."""
+    start = time.monotonic()
     robot = None
     if isinstance(source, SimulatedSource):
         robot = runner.Robot(source.rig)
     taken = recording.Recording(setup, folder, source.name)
+    if taken.resumed:
+        session = taken.engine.session
+        session.last_event = (
+            f"resumed in {time.monotonic() - start:.2f} s, {len(session.accepted)} accepted "
+            "dwells kept"
+        )
+        click.echo(session.last_event)
     keys = _Keys(plain)
     try:
         with keys.listening():
