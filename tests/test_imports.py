@@ -15,6 +15,7 @@ ROOM_OF_MODULE = {
     "records": "records",
     "records_csv": "records",
     "certificate": "records",
+    "measured": "records",
     "tomltable": "records",
     "unitfile": "records",
     "errors": "ground",

@@ -75,8 +75,11 @@ class Delivery:
     files: dict[str, bytes]
 
 
-def deliver(folder: Path) -> Delivery:
+def deliver(folder: Path, reference: Reference | None = None) -> Delivery:
     """Calibrate the unit in `folder`, generate its C and check it.
+
+    `reference` is the handwritten C, which does not depend on the unit, where it has been compiled
+    already.
 
     Raises
     ------
@@ -87,7 +90,8 @@ def deliver(folder: Path) -> Delivery:
         work = Path(name)
         unit = read_unit(folder)
         inputs = inputs_sha256(folder)
-        started.append(start_reference(work))
+        if reference is None:
+            started.append(start_reference(work))
         measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
         calibration = calibrate(unit, measurements)
         refuse_unacceptable(unit, calibration, measurements)
@@ -104,7 +108,8 @@ def deliver(folder: Path) -> Delivery:
         started.append(start_generated(work, work))
         bound = prove(plan)
         sets = vector_sets(plan)
-        reference, generated = Reference(started[0].load()), Generated(started[1].load())
+        reference = reference or Reference(started[0].load())
+        generated = Generated(started[-1].load())
         image = files[IMAGE_FILE]
         check = cross_check(plan, sets, generated, reference.routine(image), image)
         check = replace(check, images=check_images(plan, image, generated, reference))

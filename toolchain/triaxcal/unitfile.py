@@ -9,6 +9,7 @@ from pathlib import Path
 
 from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certificate_details
 from triaxcal.errors import RefusedError
+from triaxcal.measured import MEASURED_KEYS, Measured, measured_details
 from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
@@ -52,6 +53,7 @@ _LAYOUT: Layout = {
     "limits": {"at_t0_g": False, "over_range_g": False},
     "uncertainty": dict.fromkeys(UNCERTAINTY_MAX, False),
     "certificate": dict.fromkeys(CERTIFICATE_KEYS, False),
+    "measured": dict.fromkeys(MEASURED_KEYS, False),
 }
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
 _NAME_RULE = "1 to 64 of A-Z a-z 0-9 - _, the first a letter or digit"
@@ -173,6 +175,7 @@ class UnitDescription:
     limits: Limits
     stated: StatedUncertainty = StatedUncertainty()
     certificate: CertificateDetails | None = None
+    measured: Measured = Measured()
 
 
 def read_unit(folder: Path) -> UnitDescription:
@@ -280,6 +283,7 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
         ),
         stated=_stated(tables["uncertainty"]),
         certificate=certificate_details(tables["certificate"]),
+        measured=measured_details(tables["measured"]),
     )
 
 
