@@ -52,6 +52,8 @@ MAY_IMPORT = {
         "codegen",
         "delivery",
         "uncertainty",
+        "batch",
+        "publish",
     },
 }
 """rig -> records -> fit -> model -> fixedpoint -> codegen -> delivery -> cli, as data flow. A room

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
@@ -175,7 +175,7 @@ class UnitDescription:
     limits: Limits
     stated: StatedUncertainty = StatedUncertainty()
     certificate: CertificateDetails | None = None
-    measured: Measured = Measured()
+    measured: Measured = field(default_factory=Measured)
 
 
 def read_unit(folder: Path) -> UnitDescription:

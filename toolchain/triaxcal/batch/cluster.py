@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 from collections.abc import Iterator
 from typing import Any
 
@@ -23,13 +23,7 @@ def connect(address: str) -> Any:
         When distributed is not installed, nobody answers, there is no worker, or a worker has
         another triaxcal, compiler or none.
     """
-    if importlib.util.find_spec("distributed") is None:
-        raise RefusedError(
-            "--scheduler", "package distributed is missing",
-            remedy="install it: pip install 'triaxcal[series]'",
-        )  # fmt: skip
-    import distributed  # noqa: PLC0415  optional
-
+    distributed = _distributed()
     try:
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
@@ -55,8 +49,7 @@ def workers(client: Any) -> int:
 
 def run_cluster(client: Any, make: Make, orders: list[Order]) -> Iterator[Outcome]:
     """Outcomes of all orders as they come; the scheduler redoes the units of a dead worker."""
-    import distributed  # noqa: PLC0415  optional
-
+    distributed = _distributed()
     by_key = {f"triaxcal-{order.name}-{order.key[:16]}": order for order in orders}
     futures = client.map(make, list(by_key.values()), key=list(by_key), pure=False)
     for future in distributed.as_completed(futures):
@@ -75,6 +68,18 @@ def run_cluster(client: Any, make: Make, orders: list[Order]) -> Iterator[Outcom
             ) from error
         future.release()
         yield outcome
+
+
+def _distributed() -> Any:
+    """The package, which only those with a cluster need."""
+    try:
+        return importlib.import_module("distributed")
+    except ModuleNotFoundError as missing:
+        raise RefusedError(
+            "--scheduler",
+            f"package {missing.name} is missing",
+            remedy="install it: pip install 'triaxcal[series]'",
+        ) from missing
 
 
 def _refuse_other_workers(client: Any, address: str) -> None:

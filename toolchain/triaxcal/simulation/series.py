@@ -1,8 +1,8 @@
 """`triaxcal simulate --series`: folders of many units that differ as a production does.
 
 Each unit's truth is the template's with every constant drawn about it; the units of a run are
-measured on one rig, drawn anew for the next run. The same template, number and seed give the same
-bytes.
+measured in one day on one rig, which moves after some days. The same template, number and seed
+give the same bytes.
 """
 
 from __future__ import annotations
@@ -52,7 +52,9 @@ class Spread:
     temperature_sd_ratio : float
         Of each coefficient of dT, dT^2 and dT^3, relative to the template's.
     units_per_run : int
-        Units measured on one rig, one day.
+        Units measured on one day.
+    runs_between_moves : int
+        Days after which the rig is another: its tilts and its gravity are drawn anew.
     """
 
     scale_sd_ratio: float
@@ -60,6 +62,7 @@ class Spread:
     bias_sd_v: float
     temperature_sd_ratio: float
     units_per_run: int
+    runs_between_moves: int
 
 
 def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Iterator[Path]:
@@ -79,7 +82,9 @@ def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Itera
     text = (template / UNIT_FILE).read_text(encoding="utf-8")
     if description.measured.run is not None:
         raise RefusedError(
-            f"{template / UNIT_FILE}, [measured]", "given", remedy="remove it: each unit gets its own"
+            f"{template / UNIT_FILE}, [measured]",
+            "given",
+            remedy="remove it: each unit gets its own",
         )
     names = [f"{template.absolute().name}-{k:04d}" for k in range(1, count + 1)]
     there = [name for name in names if (into / name).exists()]
@@ -99,7 +104,13 @@ def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Itera
             folder.mkdir(parents=True)
             (folder / UNIT_FILE).write_text(own, encoding="utf-8")
             (folder / TRUTH_FILE).write_text(
-                truth_text(truth, plan, coefficients, seed * (COUNT_MAX + 1) + k, seed + run),
+                truth_text(
+                    truth,
+                    plan,
+                    coefficients,
+                    seed * (COUNT_MAX + 1) + k,
+                    seed + run // spread.runs_between_moves,
+                ),
                 encoding="utf-8",
             )
         except OSError as error:
@@ -133,6 +144,7 @@ def read_spread(folder: Path) -> Spread:
         bias_sd_v=table.number("bias_sd_v", 0.0, 1.0),
         temperature_sd_ratio=table.number("temperature_sd_ratio", 0.0, 1.0),
         units_per_run=table.integer("units_per_run", 1, COUNT_MAX),
+        runs_between_moves=table.integer("runs_between_moves", 1, COUNT_MAX),
     )
 
 
@@ -148,9 +160,7 @@ def drawn(coefficients: FloatArray, spread: Spread, rng: np.random.Generator) ->
     return result
 
 
-def truth_text(
-    truth: Truth, plan: Plan, coefficients: FloatArray, seed: int, rig_seed: int
-) -> str:
+def truth_text(truth: Truth, plan: Plan, coefficients: FloatArray, seed: int, rig_seed: int) -> str:
     """A truth.toml that gives these numbers back to the last bit."""
     curves = "\n".join(
         f"{name} = {[float(c) for c in row]}"

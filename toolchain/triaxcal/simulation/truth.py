@@ -32,6 +32,7 @@ SERIES_KEYS = (
     "bias_sd_v",
     "temperature_sd_ratio",
     "units_per_run",
+    "runs_between_moves",
 )
 """Keys of [series], which `simulation.series` reads."""
 

@@ -40,9 +40,7 @@ def make_unit(order: Order) -> Outcome:
         try:
             delivery = deliver(folder, _reference())
             made = passport(delivery, {})
-            return Outcome(
-                order.name, order.key, "", all_files(delivery, made), unit_record(made)
-            )
+            return Outcome(order.name, order.key, "", all_files(delivery, made), unit_record(made))
         except RefusedError as refusal:
             return refused(order, str(refusal).replace(str(folder), order.folder))
         except Exception as fault:
