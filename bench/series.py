@@ -80,9 +80,7 @@ def run(folder: Path, build: Path, jobs: int, log: Path | None = None) -> dict[s
             log.write_text(json.dumps(rows), encoding="utf-8")
 
     work = plan_work(sorted(folder.iterdir()), build)
-    series = run_series(
-        work, build, make_unit, lambda m, o: run_local(m, o, jobs), SOMETIMES, tell
-    )
+    series = run_series(work, build, make_unit, lambda m, o: run_local(m, o, jobs), SOMETIMES, tell)
     series_files(series)
     rows["wall"].append(time.monotonic() - start)
     rows["cpu"].append(cpu_s(seen) - start_cpu)
@@ -136,8 +134,10 @@ def measure(folder: Path, build: Path) -> None:
             if b > a
         ]
         print(f"cost     {name:<5}" + " ".join(steps) + "  s a unit, by tenths")
-    print(f"memory   {first['mb'][max(1, count // 10)]:.0f} MB the largest worker after a tenth, "
-          f"{first['mb'][count]:.0f} MB at the end")
+    print(
+        f"memory   {first['mb'][max(1, count // 10)]:.0f} MB the largest worker after a tenth, "
+        f"{first['mb'][count]:.0f} MB at the end"
+    )
     print(
         f"rate     {60 * count / first['wall'][-1]:.1f} units a minute on {cores()} workers, "
         f"{60 * count / first['cpu'][-1]:.1f} a minute of CPU ({count} units, "

@@ -1,6 +1,6 @@
 """A real Dask cluster of two worker processes on this machine: prints its address, then waits.
 
-    python batch_cluster.py [WORKERS]
+python batch_cluster.py [WORKERS]
 """
 
 from __future__ import annotations

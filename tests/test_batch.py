@@ -12,13 +12,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import batch_workers
 from triaxcal.batch import journal
+from triaxcal.batch.cluster import connect
 from triaxcal.batch.local import run_local
 from triaxcal.batch.order import Make, Outcome
 from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import Series, run_series
+from triaxcal.cli.batch import batch
+from triaxcal.errors import RefusedError
 
 ROOT = Path(__file__).resolve().parents[1]
 TESTS = Path(__file__).parent
@@ -39,7 +43,12 @@ def run(
     told: list[Outcome] = []
     work = plan_work(folder.iterdir(), build)
     series = run_series(
-        work, build, make, lambda m, orders: run_local(m, orders, jobs), (), told.append
+        work,
+        build,
+        make,
+        lambda m, orders: run_local(m, orders, jobs),
+        sometimes=(),
+        tell=told.append,
     )
     return work, series, told
 
@@ -180,7 +189,7 @@ def content(folder: Path) -> dict[str, bytes]:
 
 
 def test_batch_gives_what_calib_gives(bench: Path) -> None:
-    command = ["batch", *sorted((bench / "units").iterdir()), "--build", "many"]
+    command = ["batch", *sorted((bench / "units").iterdir()), "--build", "many", "--jobs", "1"]
     done = triaxcal(*command, cwd=bench)
     assert done.returncode == 1
     assert content(bench / "many" / "AT-CHERNIAK") == content(bench / "one" / "AT-CHERNIAK")
@@ -201,19 +210,31 @@ def test_batch_gives_what_calib_gives(bench: Path) -> None:
     assert "1 were done and unchanged" in again.stdout
 
 
-def test_mistakes_are_told_in_one_line(bench: Path) -> None:
-    for arguments, code, said in (
-        (["--scheduler", "tcp://127.0.0.1:9"], 1, "no scheduler answers there"),
-        (["--scheduler", "nonsense://x"], 1, "no scheduler answers there"),
-        (["--jobs", "0"], 2, "--jobs"),
-        (["--jobs", "2", "--scheduler", "tcp://127.0.0.1:9"], 2, "a cluster has its own workers"),
-    ):
-        done = triaxcal("batch", "units/AT-CHERNIAK", "--build", "none", *arguments, cwd=bench)
-        assert done.returncode == code, done.stderr
-        assert said in done.stderr
-        assert "Traceback" not in done.stderr
-        assert code == 2 or len(done.stderr.splitlines()) == 1
-    assert not (bench / "none").exists()
+@pytest.mark.parametrize(
+    "address", ["tcp://127.0.0.1:9", "nonsense://x:1", "tcp://127.0.0.1", "tcp://127.0.0.1:x"]
+)
+def test_a_scheduler_that_is_not_there(address: str) -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(RefusedError) as refusal:
+        connect(address)
+    line = str(refusal.value)
+    assert line.startswith(f"--scheduler {address}: no scheduler answers there (")
+    assert line.endswith(
+        "expected a running Dask scheduler, as tcp://host:8786; start it, or leave the option out "
+        "to use this machine's cores"
+    )
+
+
+def test_distributed_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(RefusedError, match=r"package distributed is missing; install it: pip"):
+        connect("tcp://127.0.0.1:9")
+
+
+def test_usage(tmp_path: Path) -> None:
+    for arguments in (["--jobs", "0"], ["--jobs", "2", "--scheduler", "tcp://127.0.0.1:9"], []):
+        done = CliRunner().invoke(batch, [*arguments, *([str(tmp_path)] if arguments else [])])
+        assert done.exit_code == 2
 
 
 # ---- a real cluster ----
@@ -250,7 +271,7 @@ folder, build = Path(sys.argv[2]), Path(sys.argv[3])
 work = plan_work(folder.iterdir(), build)
 series = run_series(
     work, build, getattr(batch_workers, sys.argv[4]),
-    lambda m, o: run_cluster(client, m, o), (), lambda outcome: None,
+    lambda m, o: run_cluster(client, m, o), sometimes=(), tell=lambda outcome: None,
 )
 print(sorted(series.entries), series.refused)
 client.close()

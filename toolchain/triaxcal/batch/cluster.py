@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import socket
 from collections.abc import Iterator
 from typing import Any
+from urllib.parse import urlsplit
 
 from triaxcal.batch.order import Make, Order, Outcome, refused
 from triaxcal.batch.toolchain import toolchain
@@ -25,12 +27,13 @@ def connect(address: str) -> Any:
     """
     distributed = _distributed()
     try:
-        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        _refuse_silence(address)
+        client = distributed.Client(address, timeout=CONNECT_S)
+    except (OSError, ValueError) as error:
+        reason = " ".join((getattr(error, "strerror", None) or str(error)).split())[:120]
         raise RefusedError(
             f"--scheduler {address}",
-            f"no scheduler answers there ({reason})",
+            f"no scheduler answers there ({(reason or type(error).__name__).lower()})",
             expected="a running Dask scheduler, as tcp://host:8786",
             remedy="start it, or leave the option out to use this machine's cores",
         ) from error
@@ -68,6 +71,14 @@ def run_cluster(client: Any, make: Make, orders: list[Order]) -> Iterator[Outcom
             ) from error
         future.release()
         yield outcome
+
+
+def _refuse_silence(address: str) -> None:
+    """Ask the port itself first: distributed's client takes long to give up, and says much."""
+    parts = urlsplit(address)
+    if parts.scheme not in ("tcp", "tls") or not parts.hostname or not parts.port:
+        raise ValueError("not an address")
+    socket.create_connection((parts.hostname, parts.port), CONNECT_S).close()
 
 
 def _distributed() -> Any:

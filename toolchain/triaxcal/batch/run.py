@@ -43,6 +43,7 @@ def run_series(
     build: Path,
     make: Make,
     runner: Runner,
+    *,
     sometimes: Collection[str],
     tell: Callable[[Outcome], None],
 ) -> Series:

@@ -105,7 +105,7 @@ def _run(work: Work, build: Path, runner: Runner) -> Series:
                 )
 
         try:
-            return run_series(work, build, make_unit, runner, SOMETIMES, tell)
+            return run_series(work, build, make_unit, runner, sometimes=SOMETIMES, tell=tell)
         except KeyboardInterrupt:
             raise RefusedError(
                 "batch",
