@@ -16,6 +16,7 @@ ROOM_OF_MODULE = {
     "records_csv": "records",
     "recordinglayout": "records",
     "certificate": "records",
+    "measured": "records",
     "tomltable": "records",
     "unitfile": "records",
     "errors": "ground",
@@ -53,6 +54,8 @@ MAY_IMPORT = {
         "codegen",
         "delivery",
         "uncertainty",
+        "batch",
+        "publish",
     },
 }
 """rig -> records -> fit -> model -> fixedpoint -> codegen -> delivery -> cli, as data flow. A room

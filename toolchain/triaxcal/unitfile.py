@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
 from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certificate_details
 from triaxcal.errors import RefusedError
 from triaxcal.recordinglayout import DEFAULT_LSB, KEYS, RecordingLayout, recording_layout
+from triaxcal.measured import MEASURED_KEYS, Measured, measured_details
 from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
@@ -54,6 +55,7 @@ _LAYOUT: Layout = {
     "uncertainty": dict.fromkeys(UNCERTAINTY_MAX, False),
     "certificate": dict.fromkeys(CERTIFICATE_KEYS, False),
     "recording": dict.fromkeys(KEYS, False),
+    "measured": dict.fromkeys(MEASURED_KEYS, False),
 }
 _OF_RECORDING: Layout = {
     **_LAYOUT,
@@ -197,6 +199,7 @@ class UnitDescription:
     terms: str = "auto"
     loss: str = "linear"
     adc_open: bool = False
+    measured: Measured = field(default_factory=Measured)
 
 
 def read_unit(folder: Path) -> UnitDescription:
@@ -311,6 +314,7 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
         terms=_choice(tables["fit"], "terms", TERMS),
         loss=_choice(tables["fit"], "loss", LOSSES),
         adc_open=recording is not None and not tables["adc"].values,
+        measured=measured_details(tables["measured"]),
     )
 
 
