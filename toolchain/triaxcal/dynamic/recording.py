@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -61,8 +62,9 @@ class ImuSamples:
         return len(self.time_s)
 
     def __getitem__(self, part: slice) -> ImuSamples:
-        columns = {name: getattr(self, name) for name in _SHAPES}
-        return ImuSamples(**{k: None if c is None else c[part] for k, c in columns.items()})
+        found = {name: getattr(self, name) for name in _SHAPES}
+        columns: dict[str, Any] = {k: None if c is None else c[part] for k, c in found.items()}
+        return ImuSamples(**columns)
 
 
 _SHAPES: dict[str, tuple[int, ...]] = {
@@ -78,10 +80,11 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 def joined(parts: Iterable[ImuSamples]) -> ImuSamples:
     """One piece of several that follow each other and have the same columns."""
     listed = list(parts)
-    columns = {name: [getattr(part, name) for part in listed] for name in _SHAPES}
-    return ImuSamples(
-        **{k: None if c[0] is None else np.concatenate(c) for k, c in columns.items()}
-    )
+    found = {name: [getattr(part, name) for part in listed] for name in _SHAPES}
+    columns: dict[str, Any] = {
+        k: None if c[0] is None else np.concatenate(c) for k, c in found.items()
+    }
+    return ImuSamples(**columns)
 
 
 @dataclass(frozen=True)
