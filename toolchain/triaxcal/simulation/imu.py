@@ -54,10 +54,9 @@ def _pieces(
     accel = Channel.accelerometers(truth, step_s, seed, ACCEL)
     second = Channel.accelerometers(truth, step_s, seed, SECOND)
     temp, table = white(seed, TEMPERATURE), white(seed, TABLE)
-    delay_s = 1e-3 * truth.accel_delay_ms
     for start in range(0, count, PIECE):
         time_s = np.arange(start + 1, min(start + PIECE, count) + 1) / rate_hz
-        rate, force, force2 = _ideal(truth, motion, time_s, step_s, delay_s)
+        rate, force, force2 = _ideal(truth, motion, time_s, step_s)
         thermometer = truth.noise.temp_sd_degc * temp.standard_normal(len(time_s))
         angle = None
         if motion.table.reads_angle:
@@ -75,18 +74,18 @@ def _pieces(
 
 
 def _ideal(
-    truth: ImuTruth, motion: ImuMotion, time_s: FloatArray, step_s: float, delay_s: float
+    truth: ImuTruth, motion: ImuMotion, time_s: FloatArray, step_s: float
 ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
     """Readings without noise of gyros, accelerometers and the second triad, each (n, 3)."""
     moments: dict[tuple[str, float], Moments] = {}
 
     def sampled(
-        convention: str, lag_s: float, readings_of: Callable[[Moments], FloatArray]
+        convention: str, lag_ms: float, readings_of: Callable[[Moments], FloatArray]
     ) -> FloatArray:
-        if (convention, lag_s) not in moments:
-            nodes_s = _nodes(time_s - lag_s, step_s, convention)
-            moments[convention, lag_s] = Moments.of(truth, motion, nodes_s)
-        readings = readings_of(moments[convention, lag_s])
+        if (convention, lag_ms) not in moments:
+            nodes_s = _nodes(time_s - 1e-3 * lag_ms, step_s, convention)
+            moments[convention, lag_ms] = Moments.of(truth, motion, nodes_s)
+        readings = readings_of(moments[convention, lag_ms])
         if convention != INCREMENT:
             return readings.T
         by_node = readings.reshape(3, len(_NODES), len(time_s))
@@ -94,11 +93,11 @@ def _ideal(
         return integral
 
     rate = sampled(truth.rate_convention, 0.0, partial(gyro_readings, truth))
-    force = sampled(truth.force_convention, delay_s, partial(accel_readings, truth))
+    force = sampled(truth.force_convention, truth.accel_delay_ms, partial(accel_readings, truth))
     if truth.second is None:
         return rate, force, None
     second = partial(second_readings, truth.second)
-    return rate, force, sampled(truth.force_convention, delay_s, second)
+    return rate, force, sampled(truth.force_convention, truth.second.delay_ms, second)
 
 
 _ROOTS, _LEGENDRE = np.polynomial.legendre.leggauss(3)

@@ -158,7 +158,7 @@ def _drawn(grade: Grade, name: str, seed: int) -> Any:
             bias_mm_per_s2=_tuple(grade.second_bias_mm_per_s2 * rng.standard_normal(3)),
             scale_ppm=_tuple(grade.second_scale_ppm * rng.standard_normal(3)),
             misalignment_arcsec=_tuple(grade.gyro_misalignment_arcsec * rng.standard_normal(6)),
-            position_mm=_tuple(grade.accel_position_mm * rng.standard_normal((3, 3))),
+            delay_ms=grade.accel_delay_ms * float(rng.standard_normal()),
         )
     shape = np.shape(getattr(ImuTruth(), name))
     values = getattr(grade, name) * rng.standard_normal(shape)

@@ -5,7 +5,7 @@ Signs and conventions, each of them physics and none of them a filter's:
 - readings = truth + bias + matrix * truth; instrument axis 1 is accelerometer 1's sensitive axis,
   axis 3 is normal to those of accelerometers 1 and 2: the accelerometer matrix has no 12, 13, 23;
 - origin M of the instrument axes is accelerometer 1's proof mass, where the gyros feel g as well;
-- a positive delay: the accelerometers' sample stamped t is the force at t - delay;
+- a positive delay: a triad's sample stamped t is the force at t - delay;
 - an angle turns the axes right-handed: mounting elasticity turns the unit against its mounting by
   D f/g; gyro i, seen along its own axes (i, next, next but one), turns about its own second and
   third axis by kappa_12 f1 + kappa_22 f2 + kappa_32 f3 and kappa_13 f1 + kappa_23 f2 + kappa_33 f3,
@@ -78,12 +78,15 @@ class SecondTriad:
         12, 13, 21, 23, 31, 32.
     position_mm : three triples
         Of each proof mass from M, on the instrument axes.
+    delay_ms : float
+        How much it lags behind the gyros: its electronics are its own.
     """
 
     bias_mm_per_s2: Three = _NONE3
     scale_ppm: Three = _NONE3
     misalignment_arcsec: Six = _NONE6
     position_mm: tuple[Three, Three, Three] = _NONE33
+    delay_ms: float = 0.0
 
     def matrix(self) -> FloatArray:
         """Gamma of (21), shape (3, 3), rows the accelerometers 4 to 6."""
@@ -107,7 +110,7 @@ class ImuTruth:
     gyro_g_deg_per_h_per_g : three triples
         Rows of (13).
     accel_delay_ms : float
-        (14): how much the accelerometers lag behind the gyros.
+        (14): how much the first triad lags behind the gyros.
     accel_position_mm : three triples
         Of each proof mass from M, on the instrument axes; the first is zero by definition of M.
     mount_elasticity_arcsec_per_g : six floats
