@@ -113,6 +113,15 @@ class StateBlock:
     needs: str = ""
 
 
+@dataclass(frozen=True)
+class Extension:
+    """What is switched on by one name: one block, or some that make no sense without each other."""
+
+    name: str
+    title: str
+    blocks: tuple[StateBlock, ...]
+
+
 def spread(values: FloatArray) -> FloatArray:
     """Rows of a full 3 x 3 matrix of states acting on `values` (n, 3): shape (n, 3, 9), by rows."""
     n = len(values)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.attitude import rotation_of
-from triaxcal.dynamic.block import Signals, State, StateBlock
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
 from triaxcal.model.types import FloatArray
 
 
@@ -34,3 +34,4 @@ BLOCK = StateBlock(
     motion=rows,
     motion_curve=curve,
 )
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

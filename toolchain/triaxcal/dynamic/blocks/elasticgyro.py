@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.dynamic.block import Signals, State, StateBlock
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
 from triaxcal.dynamic.blocks.base import ARCSEC
 from triaxcal.model.types import FloatArray
 
@@ -32,3 +32,4 @@ BLOCK = StateBlock(
     tuple(State(f"K{i}{j}", "arcsec/g", ARCSEC, 60.0) for i in (1, 2, 3) for j in (2, 3)),
     rate=_rows,
 )
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

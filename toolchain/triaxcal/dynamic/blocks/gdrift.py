@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from triaxcal.dynamic.block import Signals, State, StateBlock, spread
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock, spread
 from triaxcal.dynamic.blocks.base import DEG_PER_H
 from triaxcal.model.types import FloatArray
 
@@ -17,3 +17,4 @@ BLOCK = StateBlock(
     tuple(State(f"D{i}{j}", "deg/h/g", DEG_PER_H, 3600.0) for i in (1, 2, 3) for j in (1, 2, 3)),
     rate=_rows,
 )
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

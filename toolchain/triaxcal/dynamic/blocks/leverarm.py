@@ -10,7 +10,7 @@ acceleration; the signs in print are damaged.
 from __future__ import annotations
 
 from triaxcal.dynamic.attitude import skew
-from triaxcal.dynamic.block import Signals, State, StateBlock
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
 from triaxcal.model.types import FloatArray
 
 
@@ -33,3 +33,4 @@ BLOCK = StateBlock(
     edges2=_velocity,
     reset=True,
 )
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

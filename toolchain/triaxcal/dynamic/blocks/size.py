@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.attitude import skew
-from triaxcal.dynamic.block import Signals, State, StateBlock
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
 from triaxcal.model.types import FloatArray
 
 _MASSES = (1, 2)
@@ -45,3 +45,4 @@ BLOCK = StateBlock(
     motion=_rest,
     edges=_ends,
 )
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))
