@@ -14,6 +14,7 @@ others use too, only they say what a unit costs. Lines:
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 import statistics
@@ -130,7 +131,7 @@ def measure(folder: Path, build: Path) -> None:
     for name in ("cpu", "wall"):
         steps = [
             f"{(first[name][b] - first[name][a]) / (b - a):5.2f}"
-            for a, b in zip(tenths, tenths[1:], strict=False)
+            for a, b in itertools.pairwise(tenths)
             if b > a
         ]
         print(f"cost     {name:<5}" + " ".join(steps) + "  s a unit, by tenths")

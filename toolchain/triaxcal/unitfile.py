@@ -9,8 +9,8 @@ from pathlib import Path
 
 from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certificate_details
 from triaxcal.errors import RefusedError
-from triaxcal.recordinglayout import DEFAULT_LSB, KEYS, RecordingLayout, recording_layout
 from triaxcal.measured import MEASURED_KEYS, Measured, measured_details
+from triaxcal.recordinglayout import DEFAULT_LSB, KEYS, RecordingLayout, recording_layout
 from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
