@@ -51,8 +51,7 @@ static int invert(triax_ref_state_t *state, const triax_ref_t *ref, int32_t k[3]
     int64_t det;
     int64_t reciprocal;
     int64_t least = power_of_two(ref->reciprocal_log2 - 31) + 1;
-    const int64_t row_limit =
-        (ref->terms & TRIAX_REF_QUADRATIC) ? 3 * power_of_two(30) : power_of_two(32) - 8;
+    const int64_t row_limit = (ref->terms != 0) ? 3 * power_of_two(30) : power_of_two(32) - 8;
     int fits = 1;
     int i;
     int j;
@@ -165,9 +164,12 @@ static void add_quadratic(const triax_ref_state_t *state, const triax_ref_t *ref
     }
 }
 
-/* Steps A and Q: the sum of three products, quadratic terms, offset and rounding; then one floor. */
-uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
-                         const int32_t raw_code[3], int32_t accel[3])
+/*
+ * Steps A, Q and G: the sum of three products, the terms, offset and rounding; then one floor.
+ * force is looked at with a g-sensitivity only.
+ */
+static uint32_t apply(const triax_ref_state_t *state, const triax_ref_t *ref, const int32_t raw_code[3],
+                      const int32_t force[3], int32_t result32[3])
 {
     const int64_t scale = power_of_two(ref->raw_shift);
     const int quadratic = (ref->terms & TRIAX_REF_QUADRATIC) != 0;
@@ -189,6 +191,12 @@ uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
     if (quadratic) {
         add_quadratic(state, ref, sum);
     }
+    for (i = 0; i < 3 && (ref->terms & TRIAX_REF_SENSITIVITY) != 0; i++) {
+        int j;
+        for (j = 0; j < 3; j++) {
+            sum[i] += (int64_t)ref->sensitivity[i][j] * force[j];
+        }
+    }
     for (i = 0; i < 3; i++) {
         int64_t total = sum[i] + state->offset[i] * INT64_C(4294967296);
         int64_t result;
@@ -196,10 +204,23 @@ uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
             total += power_of_two(ref->output_shift - 1);
         }
         result = floor_div(total, ref->output_shift);
-        accel[i] = saturate(result);
-        if (accel[i] != result) {
+        result32[i] = saturate(result);
+        if (result32[i] != result) {
             status |= TRIAX_REF_SATURATED;
         }
     }
     return status;
+}
+
+uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
+                         const int32_t raw_code[3], int32_t accel[3])
+{
+    static const int32_t nothing[3] = {0, 0, 0};
+    return apply(state, ref, raw_code, nothing, accel);
+}
+
+uint32_t triax_ref_apply_gyro(const triax_ref_state_t *state, const triax_ref_t *ref,
+                              const int32_t raw_code[3], const int32_t force[3], int32_t rate[3])
+{
+    return apply(state, ref, raw_code, force, rate);
 }

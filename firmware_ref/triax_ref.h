@@ -30,7 +30,8 @@ enum {
 
 /* Bits of the word that says which terms there are beyond the linear ones. */
 enum {
-    TRIAX_REF_QUADRATIC = 1
+    TRIAX_REF_QUADRATIC = 1,
+    TRIAX_REF_SENSITIVITY = 4 /* of a gyro, with the Q of the force it takes times 256 */
 };
 
 typedef struct {
@@ -60,6 +61,7 @@ typedef struct {
     int32_t temp_max_code;
     triax_ref_segment_t segment[TRIAX_REF_MAX_SEGMENTS];
     int32_t quadratic[3][6]; /* xx, yy, zz, xy, xz, yz */
+    int32_t sensitivity[3][3];
 } triax_ref_t;
 
 typedef struct {
@@ -75,6 +77,10 @@ uint32_t triax_ref_set_temperature(triax_ref_state_t *state, const triax_ref_t *
 uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
                          const int32_t raw_code[3], int32_t accel[3]);
 
+/* The same for a gyro's constants: force is the accelerometer's result, any int32_t. */
+uint32_t triax_ref_apply_gyro(const triax_ref_state_t *state, const triax_ref_t *ref,
+                              const int32_t raw_code[3], const int32_t force[3], int32_t rate[3]);
+
 /*
  * Runs count vectors: temp_code[count], raw_code[count][3] to accel[count][3] and status[count],
  * the temperature's status or-ed with the sample's. Returns TRIAX_REF_BAD_IMAGE when the image
@@ -82,5 +88,10 @@ uint32_t triax_ref_apply(const triax_ref_state_t *state, const triax_ref_t *ref,
  */
 uint32_t triax_ref_batch(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
                          const int32_t *raw_code, int32_t *accel, uint32_t *status);
+
+/* The same for a gyro, with force[count][3]. */
+uint32_t triax_ref_batch_gyro(const uint8_t *image, size_t size, size_t count,
+                              const int32_t *temp_code, const int32_t *raw_code,
+                              const int32_t *force, int32_t *rate, uint32_t *status);
 
 #endif

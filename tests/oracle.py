@@ -75,8 +75,9 @@ def set_temperature(plan: Plan, temp_code: int) -> tuple[Rows, int]:
 
 
 def row_limit(plan: Plan) -> int:
-    """Step R, point 3 or 5."""
-    return 2**32 - 8 if plan.quadratic is None else 3 * 2**30
+    """Step R, point 3, 5 or 6."""
+    terms = plan.quadratic is not None or plan.sensitivity is not None
+    return 3 * 2**30 if terms else 2**32 - 8
 
 
 def inverted(plan: Plan, rows: Rows) -> Rows:
@@ -112,8 +113,10 @@ def cofactor(k: Rows, i: int, j: int) -> int:
     return (-1) ** (i + j) * (a * d - b * c)
 
 
-def apply(plan: Plan, rows: Rows, raw: list[int]) -> tuple[list[int], int]:
-    """Steps A and Q, with the one formula that the page gives for both ways."""
+def apply(
+    plan: Plan, rows: Rows, raw: list[int], force: list[int] | None = None
+) -> tuple[list[int], int]:
+    """Steps A, Q and G, with the one formula that the page gives for both ways."""
     shape = plan.shape
     u = [min(max(code, shape.raw_min), shape.raw_max) for code in raw]
     status = 0 if u == raw else RAW_RANGE
@@ -127,6 +130,11 @@ def apply(plan: Plan, rows: Rows, raw: list[int]) -> tuple[list[int], int]:
         sums = [
             int64(s + int64(sum(q * v for q, v in zip(row, p, strict=True))))
             for s, row in zip(sums, plan.quadratic.tolist(), strict=True)
+        ]
+    if plan.sensitivity is not None and force is not None:
+        sums = [
+            int64(s + int64(sum(k * f for k, f in zip(row, force, strict=True))))
+            for s, row in zip(sums, plan.sensitivity.tolist(), strict=True)
         ]
     for s, (*_, b) in zip(sums, rows, strict=True):
         total = int64(s + b * 2**32)
@@ -156,7 +164,7 @@ def keeps_step_r(
 ) -> bool:
     """Points 1 to 3 and 5 of step R, and segments that divide the range in rising order."""
     firsts = [s.first_code for s in plan.segments]
-    quadratic = plan.quadratic is not None and max(np.abs(plan.quadratic).sum(axis=1)) > 2**30
+    quadratic = plan.quadratic is not None and max(np.abs(plan.quadratic).sum(axis=1)) > 2**31 - 1
     if quadratic or firsts[0] != plan.temp_min_code or sorted(set(firsts)) != firsts:
         return False
     lasts = [f - 1 for f in firsts[1:]] + [plan.temp_max_code]

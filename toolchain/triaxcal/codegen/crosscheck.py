@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from triaxcal.codegen.forces import forces_of
 from triaxcal.codegen.routines import Answers, Generated, Int32Array, Routine
 from triaxcal.codegen.ties import ties
 from triaxcal.errors import RefusedError
@@ -143,7 +144,8 @@ def python_routine(plan: Plan) -> Routine:
             state = State(rows[:, :, :3], rows[:, :, 3])
             # Axis by axis in memory, as the integer model works.
             axes = np.ascontiguousarray(raw[block].T, dtype=np.int64).T
-            result, flags = apply(plan, state, axes)
+            force = forces_of(temp[block], raw[block]) if plan.shape.gyro else None
+            result, flags = apply(plan, state, axes, force)
             accel[block] = result
             low, high = codes < plan.temp_min_code, codes > plan.temp_max_code
             status[block] = flags | low * STATUS_TEMP_LOW | high * STATUS_TEMP_HIGH
@@ -214,6 +216,7 @@ def _compare(vectors: VectorSet, name: str, found: Answers, expected: Answers) -
 def _largest_error(plan: Plan, table: FloatArray, vectors: VectorSet, answers: Answers) -> float:
     """Largest |integer - real| in LSB over the vectors that no limit touched."""
     shape = plan.shape
+    fraction = 2.0 ** (32 - shape.output_shift)
     clean = np.flatnonzero(answers[1] == STATUS_OK)
     largest = 0.0
     for start in range(0, len(clean), _BLOCK):
@@ -227,7 +230,10 @@ def _largest_error(plan: Plan, table: FloatArray, vectors: VectorSet, answers: A
                 real[i] += rows[:, i, j] * u[:, j]
         if plan.real_quadratic is not None:
             real = real + plan.real_quadratic @ products(real.T).T * 2.0**-64
+        if plan.real_sensitivity is not None:
+            force = forces_of(vectors.temp[chosen], vectors.raw[chosen]).astype(np.float64)
+            real += plan.real_sensitivity @ force.T * 2.0**-32
         for i in range(3):
-            error = answers[0][chosen, i] - real[i] * 2.0 ** (32 - shape.output_shift)
+            error = answers[0][chosen, i] - real[i] * fraction
             largest = max(largest, float(error.max()), -float(error.min()))
     return largest

@@ -16,7 +16,7 @@ from random import Random
 
 import numpy as np
 
-from triaxcal.codegen.image import QUADRATIC, header_names, terms_word
+from triaxcal.codegen.image import QUADRATIC, SENSITIVITY, header_names, terms_word
 from triaxcal.codegen.inverse_edges import inverse_edges
 from triaxcal.codegen.routines import Generated, Reference
 from triaxcal.errors import RefusedError
@@ -25,8 +25,10 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.compensation import INVERSE
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
-ROW_LIMIT, ROW_LIMIT_QUADRATIC = 2**32 - 8, 3 * 2**30
-QUADRATIC_LIMIT = 2**30
+ROW_LIMIT, ROW_LIMIT_WITH_TERMS = 2**32 - 8, 3 * 2**30
+QUADRATIC_LIMIT, SENSITIVITY_LIMIT = 2**31 - 1, 2**29
+_TABLES = {0: (0, 0), QUADRATIC: (6, QUADRATIC_LIMIT), SENSITIVITY: (3, SENSITIVITY_LIMIT)}
+"""Columns and limit of a row of the table of terms."""
 SEED = 20130527
 WILD_IMAGES = 48
 _FIRST, _ORIGIN, _GAIN, _COEFFICIENTS = range(4)
@@ -49,7 +51,8 @@ class Layout:
     segments: int
     order: int
     inverse: bool
-    quadratic: bool = False
+    columns: int = 0
+    limit: int = 0
 
     @property
     def temp_min(self) -> int:
@@ -64,15 +67,15 @@ class Layout:
     @property
     def row_limit(self) -> int:
         """Limit of a row."""
-        return ROW_LIMIT_QUADRATIC if self.quadratic else ROW_LIMIT
+        return ROW_LIMIT_WITH_TERMS if self.columns else ROW_LIMIT
 
     def segment(self, s: int) -> int:
         """Index of the first word of a segment."""
         return self.header + 2 + s * (_COEFFICIENTS + 12 * (self.order + 1))
 
-    def quadratic_word(self, row: int, k: int) -> int:
-        """Index of a quadratic term."""
-        return self.segment(self.segments) + 6 * row + k
+    def term(self, row: int, k: int) -> int:
+        """Index of a word of the table of terms."""
+        return self.segment(self.segments) + self.columns * row + k
 
     def coefficient(self, s: int, f: int, k: int) -> int:
         """Index of c_k of a function."""
@@ -85,8 +88,8 @@ class Layout:
         if firsts[0] != low or any(not low < f <= high for f in firsts[1:]):
             return False
         lasts = [f - 1 for f in firsts[1:]] + [high]
-        for row in range(3 if self.quadratic else 0):
-            if sum(abs(words[self.quadratic_word(row, k)]) for k in range(6)) > QUADRATIC_LIMIT:
+        for row in range(3):
+            if sum(abs(words[self.term(row, k)]) for k in range(self.columns)) > self.limit:
                 return False
         return all(self._segment_is_safe(words, s, lasts[s]) for s in range(self.segments))
 
@@ -148,15 +151,13 @@ def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
     """Damaged images, images at the limits of step R, and wild ones."""
     shape = plan.shape
     names = header_names(plan)
-    layout = Layout(
-        len(names), shape.segments, shape.order, shape.form == INVERSE,
-        bool(terms_word(plan) & QUADRATIC),
-    )  # fmt: skip
+    columns, limit = _TABLES[terms_word(plan) & 7]
+    layout = Layout(len(names), shape.segments, shape.order, shape.form == INVERSE, columns, limit)
     words = list(struct.unpack(f"<{len(image) // 4}i", image))[:-1]
     cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image, names)]
     changes = itertools.chain(
         _temperature_edges(layout, words), _coefficient_edges(layout, words),
-        _row_edges(layout), _wild(layout), _inverse_edges(layout, plan), _quadratic_edges(layout),
+        _row_edges(layout), _wild(layout), _inverse_edges(layout, plan), _term_edges(layout),
     )  # fmt: skip
     for name, change in changes:
         if not all(INT32_MIN <= value <= INT32_MAX for value in change.values()):
@@ -299,10 +300,10 @@ def _wild(layout: Layout) -> Iterator[Change]:
                 range(layout.segments), range(3), range(layout.order + 1)
             ):
                 change[layout.coefficient(s, 4 + j, k)] = change[layout.coefficient(s, j, k)]
-        for row, k in itertools.product(range(3 if layout.quadratic else 0), range(6)):
-            # Six of a sixth and less keep step R; every eighth image may break it.
-            limit = QUADRATIC_LIMIT // (4 if number % 8 == 0 else 6)
-            change[layout.quadratic_word(row, k)] = rng.randint(-limit, limit)
+        for row, k in itertools.product(range(3), range(layout.columns)):
+            # As many of equal shares keep step R; every eighth image may break it.
+            limit = layout.limit // (2 if number % 8 == 0 else layout.columns)
+            change[layout.term(row, k)] = rng.randint(-limit, limit)
         yield f"wild {number}", change
 
 
@@ -326,22 +327,20 @@ def _inverse_edges(layout: Layout, plan: Plan) -> Iterator[Change]:
         )
 
 
-def _quadratic_edges(layout: Layout) -> Iterator[Change]:
-    """Rows of quadratic terms at their limit and one beyond, each word in turn deciding."""
-    if not layout.quadratic:
-        return
-    for row, last in itertools.product(range(3), range(6)):
+def _term_edges(layout: Layout) -> Iterator[Change]:
+    """Rows of terms at their limit and one beyond, each word in turn deciding."""
+    for row, last in itertools.product(range(3), range(layout.columns)):
         for excess in (0, 1):
-            share = QUADRATIC_LIMIT // 6
-            change = {layout.quadratic_word(row, k): share if k % 2 else -share for k in range(6)}
-            most = QUADRATIC_LIMIT + excess - 5 * share
-            change[layout.quadratic_word(row, last)] = most if row % 2 else -most
-            yield f"quadratic row {row} at {QUADRATIC_LIMIT + excess}, word {last}", change
-        alone = {layout.quadratic_word(row, k): 0 for k in range(6)}
-        for value in (QUADRATIC_LIMIT, -QUADRATIC_LIMIT, INT32_MIN, INT32_MAX):
-            yield f"quadratic word {row}, {last} = {value}", {
-                **alone, layout.quadratic_word(row, last): value
-            }  # fmt: skip
+            share = layout.limit // layout.columns
+            change = {
+                layout.term(row, k): share if k % 2 else -share for k in range(layout.columns)
+            }
+            most = layout.limit + excess - (layout.columns - 1) * share
+            change[layout.term(row, last)] = most if row % 2 else -most
+            yield f"terms of row {row} at {layout.limit + excess}, word {last}", change
+        alone = {layout.term(row, k): 0 for k in range(layout.columns)}
+        for value in (layout.limit, -layout.limit, INT32_MIN, INT32_MAX):
+            yield f"term {row}, {last} = {value}", {**alone, layout.term(row, last): value}
 
 
 def case_vectors(plan: Plan) -> tuple[np.ndarray, np.ndarray]:

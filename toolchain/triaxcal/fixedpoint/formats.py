@@ -33,10 +33,11 @@ FUNCTION_NAMES = {"direct": _NAMES[:12], "inverse": _NAMES[12:]}
 """Names of the twelve functions in image order."""
 
 
-def choose_spare_bits(real: FloatArray, output_q: int, row_limit: int, where: str) -> int:
+def choose_spare_bits(real: FloatArray, shape: Shape, where: str) -> int:
     """Largest number of spare bits with which the direct form fits.
 
-    `real`, shape (segments, 12, order + 1), is in units of no spare bits.
+    `real`, shape (segments, 12, order + 1), is in units of no spare bits. Of the
+    plan's `shape` the output's format counts, but for the spare bits.
 
     Raises
     ------
@@ -46,13 +47,13 @@ def choose_spare_bits(real: FloatArray, output_q: int, row_limit: int, where: st
     stage = _stage_bounds(real)
 
     def fits(spare: int) -> bool:
-        return _fits(stage * 2.0**spare, real.shape[2], spare, row_limit)
+        return _fits(stage * 2.0**spare, real.shape[2], spare, shape.row_limit)
 
     for spare in range(MAX_SPARE_BITS, MIN_SPARE_BITS - 1, -1):
         if fits(spare):
             return spare
     fitting = next((s for s in range(MIN_SPARE_BITS - 1, -40, -1) if fits(s)), None)
-    raise _refusal(stage * 2.0**MIN_SPARE_BITS, output_q, fitting, where)
+    raise _refusal(stage * 2.0**MIN_SPARE_BITS, shape, fitting, where)
 
 
 def _stage_bounds(real: FloatArray) -> FloatArray:
@@ -79,16 +80,16 @@ def _row_sums(stage: FloatArray) -> FloatArray:
     return sums
 
 
-def _refusal(stage: FloatArray, output_q: int, fitting: int | None, where: str) -> RefusedError:
+def _refusal(stage: FloatArray, shape: Shape, fitting: int | None, where: str) -> RefusedError:
     f, k = np.unravel_index(int(stage.argmax()), stage.shape)
     name = FUNCTION_NAMES["direct"][f]
-    largest_g = _row_sums(stage).max() / 2.0 ** (MIN_SPARE_BITS + 1 + output_q)
+    largest = _row_sums(stage).max() / 2.0 ** (MIN_SPARE_BITS + 1 + shape.output_q)
     culprit = (
-        f"the declared raw range stands for {largest_g:.4g} g"
+        f"the declared raw range stands for {largest:.4g} {shape.unit}"
         if k == 0
         else f"the temperature coefficient of order {k} of {name} is too steep for the range"
     )
-    return _does_not_fit(culprit, output_q, fitting, where)
+    return _does_not_fit(culprit, shape.output_q, fitting, where)
 
 
 def _does_not_fit(culprit: str, output_q: int, fitting: int | None, where: str) -> RefusedError:
@@ -183,7 +184,7 @@ def choose_inverse(
             continue
         if spare >= MIN_SPARE_BITS:
             return shifts, spare
-        largest_g = float(rows.max()) / 2.0 ** (spare + 1 + output_q)
-        culprit = f"the declared raw range stands for {largest_g:.4g} g"
+        largest = float(rows.max()) / 2.0 ** (spare + 1 + output_q)
+        culprit = f"the declared raw range stands for {largest:.4g} {shape.unit}"
         raise _does_not_fit(culprit, output_q, spare, where)
     raise _does_not_fit("the declared raw range", output_q, None, where)

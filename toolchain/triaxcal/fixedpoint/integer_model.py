@@ -43,8 +43,13 @@ def set_temperature(plan: Plan, temp_code: IntArray) -> tuple[State, IntArray]:
     return State(gain, offset), status
 
 
-def apply(plan: Plan, state: State, raw_code: IntArray) -> tuple[IntArray, IntArray]:
-    """Accelerations (n, 3) in 2^-output_q g and status (n,) of raw codes (n, 3), any int32."""
+def apply(
+    plan: Plan, state: State, raw_code: IntArray, accel: IntArray | None = None
+) -> tuple[IntArray, IntArray]:
+    """Results (n, 3) in 2^-output_q g or deg/s, and status (n,), of raw codes (n, 3), any int32.
+
+    A gyro's plan needs the accelerations (n, 3) that the accelerometer's gave, any int32.
+    """
     shape = plan.shape
     clamped = np.clip(raw_code, shape.raw_min, shape.raw_max)
     status = np.where(_any_axis(clamped != raw_code), STATUS_RAW_RANGE, STATUS_OK)
@@ -55,12 +60,14 @@ def apply(plan: Plan, state: State, raw_code: IntArray) -> tuple[IntArray, IntAr
         total[:, i] = gain[:, i, 0] * u[:, 0] + gain[:, i, 1] * u[:, 1] + gain[:, i, 2] * u[:, 2]
     if plan.quadratic is not None:
         total += quadratic_sum(plan.quadratic, linear_words(total, offset))
-    elif not shape.saturates:
+    if plan.sensitivity is not None and accel is not None:
+        total += accel @ plan.sensitivity.T  # step G
+    if not shape.saturates and plan.quadratic is None:
         return (high_word(total) + offset) >> (shape.output_shift - 32), status
     wide = (total + (offset << 32) + shape.rounding_in_sum) >> shape.output_shift
-    accel = saturate_int32(wide)
-    saturated = np.where(_any_axis(accel != wide), STATUS_SATURATED, STATUS_OK)
-    return accel, np.bitwise_or(status, saturated)
+    result = saturate_int32(wide)
+    saturated = np.where(_any_axis(result != wide), STATUS_SATURATED, STATUS_OK)
+    return result, np.bitwise_or(status, saturated)
 
 
 def _any_axis(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

@@ -13,6 +13,7 @@ device inverts. Each Horner step halves, so c_k carries one bit more than c_(k-1
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from triaxcal.fixedpoint.quadratic import quadratic_log2, quantise_quadratic
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.compensation import INVERSE, Compensation
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.unitfile import TemperatureSensor, UnitDescription
+from triaxcal.unitfile import Adc, TemperatureSensor
 
 MAX_TEMPERATURE_CODES = 2**17
 """Proof and cross-check visit every temperature code: this many take some seconds."""
@@ -60,6 +61,12 @@ class Plan:
         Words of the quadratic terms, in the order of `PRODUCT_NAMES`.
     real_quadratic : array, shape (3, 6), or None
         What they stand for, in units of their last place.
+    sensitivity : array, shape (3, 3), or None
+        Words of a gyro's g-sensitivity, step G.
+    real_sensitivity : array, shape (3, 3), or None
+        What they stand for, in units of their last place.
+    force_q : int
+        Of a gyro: LSB of the specific force that it takes is 2^-force_q g.
     """
 
     shape: Shape
@@ -70,6 +77,9 @@ class Plan:
     volts_per_lsb: float
     quadratic: IntArray | None = None
     real_quadratic: FloatArray | None = None
+    sensitivity: IntArray | None = None
+    real_sensitivity: FloatArray | None = None
+    force_q: int = 0
 
     @property
     def temp_codes(self) -> IntArray:
@@ -97,7 +107,27 @@ class Plan:
         return np.concatenate([N, offset[:, :, None]], axis=2)
 
 
-def make_plan(compensation: Compensation, unit: UnitDescription) -> Plan:
+class Triad(Protocol):
+    """What the plan needs to know of a triad; a `UnitDescription` tells it."""
+
+    @property
+    def name(self) -> str:
+        """Name of the unit."""
+
+    @property
+    def adc(self) -> Adc:
+        """Converter of the three outputs."""
+
+    @property
+    def temperature_sensor(self) -> TemperatureSensor:
+        """Thermometer."""
+
+    @property
+    def output_q(self) -> int:
+        """Result's LSB is 2^-output_q."""
+
+
+def make_plan(compensation: Compensation, unit: Triad) -> Plan:
     """Turn a compensation into integers that provably cannot overflow.
 
     Raises
@@ -105,6 +135,11 @@ def make_plan(compensation: Compensation, unit: UnitDescription) -> Plan:
     RefusedError
         When no format holds: names the input range or the coefficient to blame.
     """
+    return triad_plan(compensation, unit, gyro=False)
+
+
+def triad_plan(compensation: Compensation, unit: Triad, *, gyro: bool) -> Plan:
+    """The plan of either triad, without a gyro's g-sensitivity: `make_plan`, `make_gyro_plan`."""
     where = f"unit {unit.name}"
     low, high = _temperature_codes(compensation, unit.temperature_sensor, where)
     bits = max(unit.adc.code_max.bit_length(), (-unit.adc.code_min - 1).bit_length())
@@ -129,6 +164,7 @@ def make_plan(compensation: Compensation, unit: UnitDescription) -> Plan:
         raw_shift=raw_shift,
         inverse=None,
         quadratic=compensation.terms.quadratic_per_g is not None,
+        gyro=gyro,
     )
     plan = Plan(shape, low, high, tuple(frames), real, volts_per_lsb)
     plan = _inverse_plan(plan, where) if compensation.form == INVERSE else _direct_plan(plan, where)
@@ -168,7 +204,7 @@ def _temperature_codes(
 
 def _device_polynomials(
     compensation: Compensation,
-    unit: UnitDescription,
+    unit: Triad,
     low: int,
     high: int,
     volts_per_lsb: float,
@@ -215,7 +251,7 @@ def _substitute(coefficients: FloatArray, middle: float, half: float) -> FloatAr
 
 
 def _direct_plan(plan: Plan, where: str) -> Plan:
-    spare = choose_spare_bits(plan.real, plan.shape.output_q, plan.shape.row_limit, where)
+    spare = choose_spare_bits(plan.real, plan.shape, where)
     shape = replace(plan.shape, output_shift=32 + spare)
     real = plan.real * 2.0**spare
     preload = np.zeros(12)

@@ -25,7 +25,7 @@ from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.horner import Segment
 from triaxcal.fixedpoint.integer_model import State, set_temperature
 from triaxcal.fixedpoint.plan import Plan
-from triaxcal.fixedpoint.proof_quadratic import check_quadratic_range, quadratic_errors
+from triaxcal.fixedpoint.proof_terms import check_term_ranges, quadratic_errors, sensitivity_errors
 from triaxcal.model.types import IntArray
 
 _GUARD_BITS = 20
@@ -63,13 +63,19 @@ def prove(plan: Plan) -> Bound:
         When a range does not hold: a fault of the planner, never of the data.
     """
     check_ranges(plan)
-    check_quadratic_range(plan)
+    check_term_ranges(plan)
     codes = plan.temp_codes
     state, _ = set_temperature(plan, codes)
     _check_rows(plan, state)
     errors = _inverse_errors if plan.shape.inverse is not None else _direct_errors
     axes = [errors(plan, state, axis) for axis in range(3)]
-    extra = quadratic_errors(plan, state, [max(axis) for axis in axes])
+    linear = [max(axis) for axis in axes]
+    extra = [
+        q + s
+        for q, s in zip(
+            quadratic_errors(plan, state, linear), sensitivity_errors(plan), strict=True
+        )
+    ]
     worst = int((np.array(axes) + np.array(extra)[:, None]).max(axis=0).argmax())
     per_axis = tuple(
         math.nextafter(_sum_upwards(max(axis), more) + 0.5, math.inf)

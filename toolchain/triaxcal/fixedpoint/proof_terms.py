@@ -1,4 +1,4 @@
-"""Proof of range and error of the quadratic terms; docs/fixed-point.md, steps R and E."""
+"""Proof of range and error of the terms beyond the linear; docs/fixed-point.md, steps R and E."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from triaxcal.errors import RefusedError
+from triaxcal.fixedpoint.gyro import SENSITIVITY_LIMIT
 from triaxcal.fixedpoint.integer_model import State
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_LIMIT
@@ -16,23 +17,25 @@ from triaxcal.model.positions import AXES
 from triaxcal.model.terms import PRODUCT_AXES
 
 
-def check_quadratic_range(plan: Plan) -> None:
-    """Step R, point 5: the words of a row, as the loader checks them.
+def check_term_ranges(plan: Plan) -> None:
+    """Step R, points 5 and 6: the words of a row, as the loader checks them.
 
     Raises
     ------
     RefusedError
         When a row does not fit: a fault of the planner, never of the data.
     """
-    if plan.quadratic is None:
-        return
-    sums = np.abs(plan.quadratic).sum(axis=1)
-    if int(sums.max()) > QUADRATIC_LIMIT:
-        raise RefusedError(
-            "range proof",
-            f"the quadratic terms of axis {AXES[int(sums.argmax())]} could overflow",
-            remedy="this is a fault in triaxcal: report it",
-        )
+    for words, limit, what in (
+        (plan.quadratic, QUADRATIC_LIMIT, "quadratic terms"),
+        (plan.sensitivity, SENSITIVITY_LIMIT, "g-sensitivities"),
+    ):
+        sums = [0] if words is None else np.abs(words).sum(axis=1).tolist()
+        if max(sums) > limit:
+            raise RefusedError(
+                "range proof",
+                f"the {what} of axis {AXES[sums.index(max(sums))]} could overflow",
+                remedy="this is a fault in triaxcal: report it",
+            )
 
 
 def quadratic_errors(plan: Plan, state: State, linear_lsb: Sequence[float]) -> list[float]:
@@ -56,6 +59,21 @@ def quadratic_errors(plan: Plan, state: State, linear_lsb: Sequence[float]) -> l
             total += abs(q) * product
         result.append(math.nextafter(float(total / 2**32 / place), math.inf))
     return result
+
+
+def sensitivity_errors(plan: Plan) -> list[float]:
+    """What the rounding of a gyro's g-sensitivity adds to each axis' error, in LSB, rounded up.
+
+    For any int32 of specific force, taken as it is.
+    """
+    if plan.sensitivity is None or plan.real_sensitivity is None:
+        return [0.0, 0.0, 0.0]
+    unit = Fraction(2) ** (31 - plan.shape.output_shift)
+    sums = [
+        sum(abs(k - Fraction(exact)) for k, exact in zip(row, real, strict=True))
+        for row, real in zip(plan.sensitivity.tolist(), plan.real_sensitivity.tolist(), strict=True)
+    ]
+    return [math.nextafter(float(s * unit), math.inf) if s else 0.0 for s in sums]
 
 
 def _reach(plan: Plan, state: State, axis: int) -> int:
