@@ -58,11 +58,11 @@ static int shape_is_legal(const triax_ref_t *ref)
             (within(ref->reciprocal_log2, 31, 62) && within(ref->gain_shift, 1, 62)));
 }
 
-/* "TRXC" is an accelerometer, with quadratic terms in version 2; "TRXG" is a gyro. */
+/* "TRXC" is an accelerometer, with quadratic terms or dT/dt in version 2; "TRXG" is a gyro. */
 static int terms_are_legal(uint32_t magic, uint32_t version, int terms)
 {
     if (magic == 0x43585254u) {
-        return version == 1u || terms == TRIAX_REF_QUADRATIC;
+        return version == 1u || within(terms, 1, TRIAX_REF_QUADRATIC | TRIAX_REF_RATE);
     }
     return magic == 0x47585254u && version == 2u && (terms % 256) == TRIAX_REF_SENSITIVITY &&
            within(terms / 256, 8, 30);
@@ -112,6 +112,9 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
     if (ref->terms & TRIAX_REF_SENSITIVITY) {
         words += 9;
     }
+    if (ref->terms & TRIAX_REF_RATE) {
+        words += 6;
+    }
     if (size != 4u * words) {
         return TRIAX_REF_BAD_IMAGE;
     }
@@ -130,15 +133,23 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
     for (k = 0; k < 18; k++) {
         ref->quadratic[k / 6][k % 6] = (ref->terms & TRIAX_REF_QUADRATIC) ? next_int(&reader) : 0;
     }
+    if (ref->terms & TRIAX_REF_RATE) {
+        ref->rate_min_code = next_int(&reader);
+        ref->rate_max_code = next_int(&reader);
+        ref->rate_gain = next_int(&reader);
+        for (k = 0; k < 3; k++) {
+            ref->rate_offset[k] = next_int(&reader);
+        }
+    }
     for (k = 0; k < 9; k++) {
         ref->sensitivity[k / 3][k % 3] = (ref->terms & TRIAX_REF_SENSITIVITY) ? next_int(&reader) : 0;
     }
     return (next_word(&reader) == crc32(image, size - 4)) ? TRIAX_REF_OK : TRIAX_REF_BAD_IMAGE;
 }
 
-/* Vectors of either triad; force is a null pointer for an accelerometer. */
+/* Vectors of either triad; force and rate_code are null pointers where they do not belong. */
 static uint32_t batch(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
-                      const int32_t *raw_code, const int32_t *force, int32_t *result, uint32_t *status)
+                      const int32_t *rate_code, const int32_t *raw_code, const int32_t *force, int32_t *result, uint32_t *status)
 {
     triax_ref_t ref;
     triax_ref_state_t state = {{{0}}, {0}};
@@ -148,7 +159,9 @@ static uint32_t batch(const uint8_t *image, size_t size, size_t count, const int
         return TRIAX_REF_BAD_IMAGE;
     }
     for (i = 0; i < count; i++) {
-        if (i == 0 || temp_code[i] != temp_code[i - 1]) {
+        if (rate_code != NULL) {
+            temp_status = triax_ref_set_temperature_rate(&state, &ref, temp_code[i], rate_code[i]);
+        } else if (i == 0 || temp_code[i] != temp_code[i - 1]) {
             temp_status = triax_ref_set_temperature(&state, &ref, temp_code[i]);
         }
         status[i] = temp_status;
@@ -163,12 +176,19 @@ static uint32_t batch(const uint8_t *image, size_t size, size_t count, const int
 uint32_t triax_ref_batch(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
                          const int32_t *raw_code, int32_t *accel, uint32_t *status)
 {
-    return batch(image, size, count, temp_code, raw_code, NULL, accel, status);
+    return batch(image, size, count, temp_code, NULL, raw_code, NULL, accel, status);
+}
+
+uint32_t triax_ref_batch_rate(const uint8_t *image, size_t size, size_t count,
+                              const int32_t *temp_code, const int32_t *rate_code,
+                              const int32_t *raw_code, int32_t *accel, uint32_t *status)
+{
+    return batch(image, size, count, temp_code, rate_code, raw_code, NULL, accel, status);
 }
 
 uint32_t triax_ref_batch_gyro(const uint8_t *image, size_t size, size_t count,
                               const int32_t *temp_code, const int32_t *raw_code,
                               const int32_t *force, int32_t *rate, uint32_t *status)
 {
-    return batch(image, size, count, temp_code, raw_code, force, rate, status);
+    return batch(image, size, count, temp_code, NULL, raw_code, force, rate, status);
 }

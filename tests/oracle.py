@@ -14,7 +14,7 @@ import numpy as np
 
 from triaxcal.fixedpoint.plan import Plan
 
-TEMP_LOW, TEMP_HIGH, RAW_RANGE, SATURATED, BAD_IMAGE = 1, 2, 4, 8, 16
+TEMP_LOW, TEMP_HIGH, RAW_RANGE, SATURATED, BAD_IMAGE, RATE_RANGE = 1, 2, 4, 8, 16, 32
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 
 Rows = list[list[int]]
@@ -57,8 +57,8 @@ def functions(plan: Plan, code: int) -> list[int]:
     return values
 
 
-def set_temperature(plan: Plan, temp_code: int) -> tuple[Rows, int]:
-    """Steps C, H, I: the state's rows and the status."""
+def set_temperature(plan: Plan, temp_code: int, rate_code: int = 0) -> tuple[Rows, int]:
+    """Steps C, H, I, D: the state's rows and the status."""
     status = 0
     code = temp_code
     if code < plan.temp_min_code:
@@ -69,8 +69,16 @@ def set_temperature(plan: Plan, temp_code: int) -> tuple[Rows, int]:
     rows = [values[4 * i : 4 * i + 4] for i in range(3)]
     if plan.shape.form == "inverse":
         rows = inverted(plan, rows)
-        if any(sum(map(abs, r[:3])) + 2 * abs(r[3]) >= row_limit(plan) for r in rows):
-            return [[0] * 4 for _ in range(3)], status | BAD_IMAGE
+    if plan.rate is not None:
+        rate = min(max(rate_code, plan.rate.min_code), plan.rate.max_code)
+        status |= RATE_RANGE if rate != rate_code else 0
+        w = int32(rate * plan.rate.gain)
+        for row, r in zip(rows, plan.rate.words.tolist(), strict=True):
+            more = int32(floor_of(int64(r * w + 2**31), 32))
+            row[3] = sat32(row[3] + more)
+    full = any(sum(map(abs, r[:3])) + 2 * abs(r[3]) >= row_limit(plan) for r in rows)
+    if plan.shape.form == "inverse" and full:
+        return [[0] * 4 for _ in range(3)], status | BAD_IMAGE
     return rows, status
 
 

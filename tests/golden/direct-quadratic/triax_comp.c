@@ -379,7 +379,7 @@ static uint32_t image_fits(const uint8_t *image, size_t size)
         0x00000000u, /* determinant shift */
         0x00000000u, /* log2 of the reciprocal */
         0x00000000u, /* gain shift */
-        0x00000001u, /* terms: 1 quadratic, 4 g-sensitivity, force Q << 8 */
+        0x00000001u, /* terms: 1 quadratic, 2 dT/dt, 4 g-sensitivity, force Q << 8 */
     };
     uint32_t fits = 0u;
 

@@ -5,6 +5,7 @@ temp_min_code, temp_max_code,
 a segment: first_code, origin_code, gain, 12 x (order + 1) coefficients, constant first,
 with terms beyond the linear ones (version 2) a thirteenth word of shape says which, and here stand
     quadratic: 3 x 6 words
+    dT/dt: rate_min, rate_max, rate_gain, 3 words
     g-sensitivity of a gyro, whose magic is "TRXG": 3 x 3 words
 CRC-32 (IEEE 802.3) of all before it.
 """
@@ -20,7 +21,7 @@ from triaxcal.model.compensation import DIRECT
 MAGIC = int.from_bytes(b"TRXC", "little")
 VERSION, VERSION_WITH_TERMS = 1, 2
 GYRO_MAGIC = int.from_bytes(b"TRXG", "little")
-QUADRATIC, SENSITIVITY = 1, 4
+QUADRATIC, RATE, SENSITIVITY = 1, 2, 4
 """Bits of the word that says which terms there are."""
 FORCE_Q_SHIFT = 8
 """Of a gyro, where that word has the Q of the specific force that it takes."""
@@ -41,15 +42,15 @@ HEADER_NAMES = (
     "log2 of the reciprocal",
     "gain shift",
 )
-TERMS_NAME = "terms: 1 quadratic, 4 g-sensitivity, force Q << 8"
+TERMS_NAME = "terms: 1 quadratic, 2 dT/dt, 4 g-sensitivity, force Q << 8"
 
 
 def terms_word(plan: Plan) -> int:
     """Which terms there are beyond the linear ones."""
+    if plan.sensitivity is not None:
+        return SENSITIVITY | plan.force_q << FORCE_Q_SHIFT
     quadratic = QUADRATIC if plan.quadratic is not None else 0
-    if plan.sensitivity is None:
-        return quadratic
-    return quadratic | SENSITIVITY | plan.force_q << FORCE_Q_SHIFT
+    return quadratic | (RATE if plan.rate is not None else 0)
 
 
 def header_names(plan: Plan) -> tuple[str, ...]:
@@ -102,7 +103,11 @@ def image_size(plan: Plan) -> int:
 def _term_words(plan: Plan) -> list[int]:
     """Words of the terms, as they stand before the CRC."""
     tables = [t for t in (plan.quadratic, plan.sensitivity) if t is not None]
-    return [word for table in tables for word in table.ravel().tolist()]
+    words: list[int] = [word for table in tables for word in table.ravel().tolist()]
+    if plan.rate is not None:
+        rate = plan.rate
+        words += [rate.min_code, rate.max_code, rate.gain, *rate.words.tolist()]
+    return words
 
 
 def image_bytes(plan: Plan) -> bytes:

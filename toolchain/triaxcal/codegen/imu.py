@@ -29,6 +29,7 @@ from triaxcal.codegen.routines import (
     Int32Array,
     Reference,
     UInt32Array,
+    routines_of,
     start_generated_imu,
     start_reference,
 )
@@ -100,8 +101,8 @@ def build_imu(
         reference = start_reference(folder).load()
         library = start_generated_imu(folder, folder).load()
         checks = (
-            _check(accel, Generated(library), Reference(reference), random_vectors),
-            _check(gyro, GyroGenerated(library), GyroReference(reference), random_vectors),
+            _check(accel, routines_of(accel.rate, library, reference), random_vectors),
+            _check(gyro, (GyroGenerated(library), GyroReference(reference)), random_vectors),
         )
         vectors = _check_both(accel, gyro, GeneratedImu(library), files[IMU_IMAGE_FILE])
     for what, bound, check in zip(("accelerometer", "gyro"), bounds, checks, strict=True):
@@ -149,8 +150,9 @@ def rate_bound(gyro: Plan, own: Bound, accel: Bound) -> tuple[float, float, floa
     return x, y, z
 
 
-def _check(plan: Plan, generated: Generated, reference: Reference, count: int) -> CrossCheck:
+def _check(plan: Plan, routines: tuple[Generated, Reference], count: int) -> CrossCheck:
     image = image_bytes(plan)
+    generated, reference = routines
     check = cross_check(plan, vector_sets(plan, count), generated, reference.routine(image), image)
     return replace(check, images=check_images(plan, image, generated, reference))
 

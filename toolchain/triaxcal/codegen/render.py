@@ -15,6 +15,7 @@ from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.gyro import SENSITIVITY_LIMIT, SENSITIVITY_NAMES, sensitivity_log2
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_LIMIT, QUADRATIC_NAMES, quadratic_log2
+from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.compensation import INVERSE
 from triaxcal.model.terms import PRODUCT_NAMES
@@ -105,6 +106,7 @@ def render_constants(plan: Plan, sensor: TemperatureSensor, provenance: Provenan
         "temp_max": _code(plan.temp_max_code, sensor),
         "segments": [_segment_context(plan, s, sensor) for s in range(len(plan.segments))],
         **_terms_context(plan),
+        "rate": _rate_context(plan, sensor),
     }
     source = f"shape {shape_id(plan)}, inputs sha256 {provenance.inputs_sha256[:16]}"
     text = _render(CONSTANTS_FILE, context, source)
@@ -164,6 +166,7 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "products": PRODUCT_NAMES,
         "terms": _TERM_TABLES[shape.gyro],
         "force_q": plan.force_q,
+        "rate_q": RATE_Q,
         "final_rounding": 1 << max(0, shape.output_shift - 33),
     }
 
@@ -196,6 +199,32 @@ def _terms_context(plan: Plan) -> dict[str, Any]:
         "quadratic_log2": of_quadratic,
         "sensitivity": _table_context(sensitivity, SENSITIVITY_NAMES, of_sensitivity),
         "sensitivity_log2": of_sensitivity,
+    }
+
+
+def _rate_context(plan: Plan, sensor: TemperatureSensor) -> dict[str, Any] | None:
+    """The term in dT/dt, or none."""
+    if plan.rate is None:
+        return None
+    rate, shape = plan.rate, plan.shape
+    step = sensor.degc_per_code * 2.0**-RATE_Q
+    fraction = shape.output_q + shape.output_shift - 32
+    lsb = rate.gain / step * 2.0 ** -(fraction + 32)
+    return {
+        "min": {"code": int32_literal(rate.min_code), "value": f"{rate.min_code * step:.6g}"},
+        "max": {"code": int32_literal(rate.max_code), "value": f"{rate.max_code * step:.6g}"},
+        "gain": rate.gain,
+        "words": [
+            {
+                "name": f"r{axis}",
+                "integer": int32_literal(integer),
+                "value": f"{exact * lsb:.9g}",
+                "rounding": f"{(integer - exact) * lsb:+.1e}",
+            }
+            for axis, integer, exact in zip(
+                "xyz", rate.words.tolist(), rate.real.tolist(), strict=True
+            )
+        ],
     }
 
 

@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from triaxcal.codegen.compiler import Compilation, compile_library
-from triaxcal.codegen.forces import forces_of
+from triaxcal.codegen.forces import forces_of, rates_of
 from triaxcal.errors import RefusedError
+from triaxcal.fixedpoint.rate import RatePlan
 from triaxcal.resources import shipped
 
 Int32Array = npt.NDArray[np.int32]
@@ -109,6 +110,53 @@ class Generated:
 
 
 @dataclass(frozen=True)
+class RateReference(Reference):
+    """The handwritten reference with the rates of temperature of `rates_of`."""
+
+    rate: RatePlan
+
+    def routine(self, image: bytes) -> Routine:
+        """Bind an image."""
+
+        def run(temp: Int32Array, raw: Int32Array) -> Answers:
+            accel, status = _outputs(len(temp))
+            rates = rates_of(self.rate, temp).astype(np.int32)
+            refused = self.library.triax_ref_batch_rate(
+                image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
+                _pointer(temp), _pointer(rates), _pointer(raw), _pointer(accel), _pointer(status),
+            )  # fmt: skip
+            if refused:
+                raise RefusedError("reference C", f"the image was refused (status {refused})")
+            return accel, status
+
+        return run
+
+
+@dataclass(frozen=True)
+class RateGenerated(Generated):
+    """A generated routine with a term in dT/dt, with the rates of `rates_of`."""
+
+    rate: RatePlan
+
+    def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
+        """Answers with the compiled-in constants."""
+        return self._run(None, temp, raw)[1]
+
+    def run_image(self, image: bytes, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
+        """Status of triax_calib_load, and the answers with the constants of the image."""
+        return self._run(image, temp, raw)
+
+    def _run(self, image: bytes | None, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
+        accel, status = _outputs(len(temp))
+        rates = rates_of(self.rate, temp).astype(np.int32)
+        loaded = self.library.triax_batch_rate(
+            image, ctypes.c_size_t(len(image or b"")), ctypes.c_size_t(len(temp)),
+            _pointer(temp), _pointer(rates), _pointer(raw), _pointer(accel), _pointer(status),
+        )  # fmt: skip
+        return int(loaded), (accel, status)
+
+
+@dataclass(frozen=True)
 class GyroReference(Reference):
     """The handwritten reference of a gyro, with the forces of `forces_of`."""
 
@@ -172,6 +220,15 @@ class GeneratedImu:
             _pointer(status),
         )  # fmt: skip
         return int(loaded), (accel, rate, status)
+
+
+def routines_of(
+    rate: RatePlan | None, generated: ctypes.CDLL, reference: ctypes.CDLL
+) -> tuple[Generated, Reference]:
+    """Generated routine and reference as the cross-check of an accelerometer calls them."""
+    if rate is None:
+        return Generated(generated), Reference(reference)
+    return RateGenerated(generated, rate), RateReference(reference, rate)
 
 
 def _forces(temp: Int32Array, raw: Int32Array) -> Int32Array:

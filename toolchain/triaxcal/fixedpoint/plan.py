@@ -22,6 +22,7 @@ from triaxcal.fixedpoint.arithmetic import INT32_MAX, round_half_up
 from triaxcal.fixedpoint.formats import choose_inverse, choose_matrix_bits, choose_spare_bits
 from triaxcal.fixedpoint.horner import Segment, horner, segment_of
 from triaxcal.fixedpoint.quadratic import quadratic_log2, quantise_quadratic
+from triaxcal.fixedpoint.rate import RatePlan, largest_offset_g, plan_rate
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.compensation import INVERSE, Compensation
 from triaxcal.model.types import FloatArray, IntArray
@@ -67,6 +68,8 @@ class Plan:
         What they stand for, in units of their last place.
     force_q : int
         Of a gyro: LSB of the specific force that it takes is 2^-force_q g.
+    rate : RatePlan or None
+        The term in dT/dt.
     """
 
     shape: Shape
@@ -80,6 +83,7 @@ class Plan:
     sensitivity: IntArray | None = None
     real_sensitivity: FloatArray | None = None
     force_q: int = 0
+    rate: RatePlan | None = None
 
     @property
     def temp_codes(self) -> IntArray:
@@ -164,11 +168,19 @@ def triad_plan(compensation: Compensation, unit: Triad, *, gyro: bool) -> Plan:
         raw_shift=raw_shift,
         inverse=None,
         quadratic=compensation.terms.quadratic_per_g is not None,
+        rate=compensation.terms.rate is not None,
         gyro=gyro,
     )
     plan = Plan(shape, low, high, tuple(frames), real, volts_per_lsb)
-    plan = _inverse_plan(plan, where) if compensation.form == INVERSE else _direct_plan(plan, where)
-    return _with_quadratic(plan, compensation.terms.quadratic_per_g, where)
+    terms = compensation.terms
+    room = np.zeros(3) if terms.rate is None else largest_offset_g(terms.rate) * 2.0**unit.output_q
+    planned = _inverse_plan if compensation.form == INVERSE else _direct_plan
+    plan = _with_quadratic(planned(plan, room, where), terms.quadratic_per_g, where)
+    if terms.rate is None:
+        return plan
+    fraction = plan.shape.output_q + plan.shape.output_shift - 32
+    rate = plan_rate(terms.rate, fraction, unit.temperature_sensor.degc_per_code, where)
+    return replace(plan, rate=rate)
 
 
 def _temperature_codes(
@@ -250,8 +262,8 @@ def _substitute(coefficients: FloatArray, middle: float, half: float) -> FloatAr
     return result
 
 
-def _direct_plan(plan: Plan, where: str) -> Plan:
-    spare = choose_spare_bits(plan.real, plan.shape, where)
+def _direct_plan(plan: Plan, room: FloatArray, where: str) -> Plan:
+    spare = choose_spare_bits(plan.real, room, plan.shape, where)
     shape = replace(plan.shape, output_shift=32 + spare)
     real = plan.real * 2.0**spare
     preload = np.zeros(12)
@@ -259,14 +271,14 @@ def _direct_plan(plan: Plan, where: str) -> Plan:
     return replace(plan, shape=shape, real=real, segments=_quantise(plan.segments, real, preload))
 
 
-def _inverse_plan(plan: Plan, where: str) -> Plan:
+def _inverse_plan(plan: Plan, room: FloatArray, where: str) -> Plan:
     bits = choose_matrix_bits(plan.real, where)
     real = plan.real.copy()
     real[:, _MATRIX] *= 2.0**bits
     segments = _quantise(plan.segments, real, np.zeros(12))
     codes = plan.temp_codes
     functions = horner(segments, codes, segment_of(segments, codes)).reshape(-1, 3, 4)
-    inverse, spare = choose_inverse(functions, bits, plan.shape, where)
+    inverse, spare = choose_inverse(functions, room, bits, plan.shape, where)
     shape = replace(plan.shape, output_shift=32 + spare, inverse=inverse)
     return replace(plan, shape=shape, real=real, segments=segments)
 

@@ -76,9 +76,29 @@ def sensitivity_errors(plan: Plan) -> list[float]:
     return [math.nextafter(float(s * unit), math.inf) if s else 0.0 for s in sums]
 
 
+def rate_reach(plan: Plan) -> list[int]:
+    """Bound of what a term in dT/dt adds to each offset: |r w| / 2^32 + 1/2, |w| < 2^31."""
+    if plan.rate is None:
+        return [0, 0, 0]
+    return [abs(word) // 2 + 1 for word in plan.rate.words.tolist()]
+
+
+def rate_errors(plan: Plan) -> list[float]:
+    """What a term in dT/dt adds to each axis' error, in output LSB, rounded up."""
+    if plan.rate is None:
+        return [0.0, 0.0, 0.0]
+    place = Fraction(2) ** (plan.shape.output_shift - 32)
+    errors = [
+        (abs(word - Fraction(exact)) * plan.rate.reach / 2**32 + Fraction(1, 2)) / place
+        for word, exact in zip(plan.rate.words.tolist(), plan.rate.real.tolist(), strict=True)
+    ]
+    return [math.nextafter(float(error), math.inf) for error in errors]
+
+
 def _reach(plan: Plan, state: State, axis: int) -> int:
     """Bound of |h| over all codes and the raw box."""
     gain: list[int] = np.abs(state.gain[:, axis]).sum(axis=1).tolist()
     offset: list[int] = np.abs(state.offset[:, axis]).tolist()
     box = plan.shape.raw_box
-    return max(n * box // 2**32 + 1 + b for n, b in zip(gain, offset, strict=True))
+    more = rate_reach(plan)[axis]
+    return more + max(n * box // 2**32 + 1 + b for n, b in zip(gain, offset, strict=True))

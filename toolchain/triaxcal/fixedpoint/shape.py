@@ -36,6 +36,8 @@ class Shape:
         Shifts of the inversion on the device.
     quadratic : bool
         Whether there are quadratic terms.
+    rate : bool
+        Whether there is a term in dT/dt.
     gyro : bool
         Whether it is a gyro triad: LSB 2^-output_q deg/s, and a g-sensitivity.
     """
@@ -50,6 +52,7 @@ class Shape:
     raw_shift: int
     inverse: InverseShifts | None
     quadratic: bool = False
+    rate: bool = False
     gyro: bool = False
 
     @property
