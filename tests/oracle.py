@@ -14,7 +14,7 @@ import numpy as np
 
 from triaxcal.fixedpoint.plan import Plan
 
-TEMP_LOW, TEMP_HIGH, RAW_RANGE, SATURATED, BAD_IMAGE = 1, 2, 4, 8, 16
+TEMP_LOW, TEMP_HIGH, RAW_RANGE, SATURATED, BAD_IMAGE, RATE_RANGE = 1, 2, 4, 8, 16, 32
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 
 Rows = list[list[int]]
@@ -57,8 +57,8 @@ def functions(plan: Plan, code: int) -> list[int]:
     return values
 
 
-def set_temperature(plan: Plan, temp_code: int) -> tuple[Rows, int]:
-    """Steps C, H, I: the state's rows and the status."""
+def set_temperature(plan: Plan, temp_code: int, rate_code: int = 0) -> tuple[Rows, int]:
+    """Steps C, H, I, D: the state's rows and the status."""
     status = 0
     code = temp_code
     if code < plan.temp_min_code:
@@ -69,14 +69,23 @@ def set_temperature(plan: Plan, temp_code: int) -> tuple[Rows, int]:
     rows = [values[4 * i : 4 * i + 4] for i in range(3)]
     if plan.shape.form == "inverse":
         rows = inverted(plan, rows)
-        if any(sum(map(abs, r[:3])) + 2 * abs(r[3]) >= row_limit(plan) for r in rows):
-            return [[0] * 4 for _ in range(3)], status | BAD_IMAGE
+    if plan.rate is not None:
+        rate = min(max(rate_code, plan.rate.min_code), plan.rate.max_code)
+        status |= RATE_RANGE if rate != rate_code else 0
+        w = int32(rate * plan.rate.gain)
+        for row, r in zip(rows, plan.rate.words.tolist(), strict=True):
+            more = int32(floor_of(int64(r * w + 2**31), 32))
+            row[3] = sat32(row[3] + more)
+    full = any(sum(map(abs, r[:3])) + 2 * abs(r[3]) >= row_limit(plan) for r in rows)
+    if plan.shape.form == "inverse" and full:
+        return [[0] * 4 for _ in range(3)], status | BAD_IMAGE
     return rows, status
 
 
 def row_limit(plan: Plan) -> int:
-    """Step R, point 3 or 5."""
-    return 2**32 - 8 if plan.quadratic is None else 3 * 2**30
+    """Step R, point 3, 5 or 6."""
+    terms = plan.quadratic is not None or plan.sensitivity is not None
+    return 3 * 2**30 if terms else 2**32 - 8
 
 
 def inverted(plan: Plan, rows: Rows) -> Rows:
@@ -112,8 +121,10 @@ def cofactor(k: Rows, i: int, j: int) -> int:
     return (-1) ** (i + j) * (a * d - b * c)
 
 
-def apply(plan: Plan, rows: Rows, raw: list[int]) -> tuple[list[int], int]:
-    """Steps A and Q, with the one formula that the page gives for both ways."""
+def apply(
+    plan: Plan, rows: Rows, raw: list[int], force: list[int] | None = None
+) -> tuple[list[int], int]:
+    """Steps A, Q and G, with the one formula that the page gives for both ways."""
     shape = plan.shape
     u = [min(max(code, shape.raw_min), shape.raw_max) for code in raw]
     status = 0 if u == raw else RAW_RANGE
@@ -127,6 +138,11 @@ def apply(plan: Plan, rows: Rows, raw: list[int]) -> tuple[list[int], int]:
         sums = [
             int64(s + int64(sum(q * v for q, v in zip(row, p, strict=True))))
             for s, row in zip(sums, plan.quadratic.tolist(), strict=True)
+        ]
+    if plan.sensitivity is not None and force is not None:
+        sums = [
+            int64(s + int64(sum(k * f for k, f in zip(row, force, strict=True))))
+            for s, row in zip(sums, plan.sensitivity.tolist(), strict=True)
         ]
     for s, (*_, b) in zip(sums, rows, strict=True):
         total = int64(s + b * 2**32)
@@ -156,7 +172,7 @@ def keeps_step_r(
 ) -> bool:
     """Points 1 to 3 and 5 of step R, and segments that divide the range in rising order."""
     firsts = [s.first_code for s in plan.segments]
-    quadratic = plan.quadratic is not None and max(np.abs(plan.quadratic).sum(axis=1)) > 2**30
+    quadratic = plan.quadratic is not None and max(np.abs(plan.quadratic).sum(axis=1)) > 2**31 - 1
     if quadratic or firsts[0] != plan.temp_min_code or sorted(set(firsts)) != firsts:
         return False
     lasts = [f - 1 for f in firsts[1:]] + [plan.temp_max_code]

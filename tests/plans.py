@@ -22,7 +22,7 @@ from triaxcal.unitfile import Adc, Limits, TemperatureSensor, ThermalChoice, Uni
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 ROW_LIMIT, ROW_LIMIT_QUADRATIC = 2**32 - 8, 3 * 2**30
-QUADRATIC_LIMIT = 2**30
+QUADRATIC_LIMIT = 2**31 - 1
 SENSOR = TemperatureSensor(degc_per_code=0.0078125, degc_at_zero=0.0)
 
 Coefficients = list[list[int]]

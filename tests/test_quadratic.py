@@ -83,14 +83,14 @@ def test_words_are_nearest_and_a_row_that_is_no_small_nonlinearity_is_refused() 
     lsb = 2.0 ** -(64 - plan.shape.output_q - (plan.shape.output_shift - 32))
     assert plan.quadratic is not None
     assert np.abs(plan.quadratic * lsb - Q).max() <= lsb / 2
-    limit = 2**30 * lsb
+    limit = (2**31 - 1) * lsb
     with pytest.raises(RefusedError) as refusal:
         make_plan(
             compensation_for(UNITS["24 bits"], np.diag([0, 0, limit], 3)[:3] * 1.01),
             UNITS["24 bits"],
         )
     assert str(refusal.value) == (
-        "unit TEST: quadratic terms of axis z sum to 0.007891 g/g^2; expected at most 0.007812 for "
+        "unit TEST: quadratic terms of axis z sum to 0.01578 g/g^2; expected at most 0.01562 for "
         "the declared raw range; check the fit, or declare a narrower adc.code_min to adc.code_max"
     )
 
@@ -158,7 +158,7 @@ def test_a_word_one_off_raises_the_bound() -> None:
 
 
 def test_words_beyond_step_r_are_a_fault_of_the_planner() -> None:
-    plan = with_quadratic(PLANS["24 bits"], [[2**28] * 4 + [1, 0]] * 3)
+    plan = with_quadratic(PLANS["24 bits"], [[2**29] * 4 + [0, 0]] * 3)
     with pytest.raises(RefusedError, match="the quadratic terms of axis x could overflow"):
         prove(plan)
 

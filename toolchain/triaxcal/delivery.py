@@ -21,6 +21,7 @@ from triaxcal.codegen.routines import (
     Generated,
     Reference,
     Routine,
+    routines_of,
     start_generated,
     start_reference,
 )
@@ -110,8 +111,9 @@ def deliver(folder: Path, reference: Reference | None = None) -> Delivery:
         reference = reference or Reference(started[0].load())
         generated = Generated(started[-1].load())
         image = files[IMAGE_FILE]
-        check = cross_check(plan, sets, generated, reference.routine(image), image)
-        check = replace(check, images=check_images(plan, image, generated, reference))
+        tried = routines_of(plan.rate, generated.library, reference.library)
+        check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
+        check = replace(check, images=check_images(plan, image, *tried))
         _refuse_wrong_bound(unit, bound, check)
         routines = {unit.method: generated.run, **_other_routines(unit, calibration, reference)}
         thermal = calibration.thermal

@@ -146,7 +146,7 @@ static int32_t clamp_raw(int32_t code)
     return result;
 }
 
-static void copy_quadratic(triax_state_t *state, const triax_calib_t *calib)
+static void copy_terms(triax_state_t *state, const triax_calib_t *calib)
 {
     uint32_t i;
     uint32_t k;
@@ -172,13 +172,13 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         status = TRIAX_STATUS_TEMP_HIGH;
     }
     evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
-    copy_quadratic(state, calib);
+    copy_terms(state, calib);
     return status;
 }
 
 /*
  * The products xx, yy, zz, xy, xz, yz of the linear result, that before its rounding: its word is
- * below 2^31 in magnitude, a product's below 2^30.
+ * at most 3 * 2^29 + 1 in magnitude, a product's below 5 * 2^27.
  */
 static void products_of(const triax_state_t *state, int64_t sum_x, int64_t sum_y, int64_t sum_z,
                         int32_t product[6])
@@ -194,7 +194,7 @@ static void products_of(const triax_state_t *state, int64_t sum_x, int64_t sum_y
     product[5] = high_word((int64_t)y * z);
 }
 
-/* Below 2^60 in magnitude, as the words of a row sum to 1073741824 at most. */
+/* Below 5 * 2^58 in magnitude, as the words of a row sum to 2147483647 at most. */
 static int64_t quadratic_sum(const int32_t q[6], const int32_t product[6])
 {
     return ((int64_t)q[0] * product[0]) + ((int64_t)q[1] * product[1]) +
@@ -202,8 +202,9 @@ static int64_t quadratic_sum(const int32_t q[6], const int32_t product[6])
            ((int64_t)q[4] * product[4]) + ((int64_t)q[5] * product[5]);
 }
 
-/* floor(floor(v / 2^32) / 2^3) = floor(v / 2^35), 4 being half an output LSB. */
-static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
+/* floor(floor(v / 2^32) / 2^3) = floor(v / 2^35); half an output LSB is 4. */
+static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz,
+                       int32_t accel[3])
 {
     int32_t product[6];
     int64_t sum_x = ((int64_t)state->row[0][0] * ux) + ((int64_t)state->row[0][1] * uy) +
@@ -214,10 +215,10 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
             ((int64_t)state->row[2][2] * uz);
     products_of(state, sum_x, sum_y, sum_z, product);
     sum_x += quadratic_sum(state->quadratic[0], product);
-    accel[0] = asr32((high_word(sum_x) + state->row[0][3]) + 4, 3u);
     sum_y += quadratic_sum(state->quadratic[1], product);
-    accel[1] = asr32((high_word(sum_y) + state->row[1][3]) + 4, 3u);
     sum_z += quadratic_sum(state->quadratic[2], product);
+    accel[0] = asr32((high_word(sum_x) + state->row[0][3]) + 4, 3u);
+    accel[1] = asr32((high_word(sum_y) + state->row[1][3]) + 4, 3u);
     accel[2] = asr32((high_word(sum_z) + state->row[2][3]) + 4, 3u);
 }
 
@@ -321,7 +322,7 @@ static uint32_t segment_fits(const triax_segment_t *segment)
     return fits;
 }
 
-static uint32_t quadratic_fits(const triax_calib_t *calib)
+static uint32_t terms_fit(const triax_calib_t *calib)
 {
     uint32_t fits = 1u;
     uint32_t i;
@@ -331,7 +332,7 @@ static uint32_t quadratic_fits(const triax_calib_t *calib)
         for (k = 0u; k < 6u; k++) {
             row_sum += magnitude(calib->quadratic[i][k]);
         }
-        if (row_sum > INT64_C(1073741824)) {
+        if (row_sum > INT64_C(2147483647)) {
             fits = 0u;
         }
     }
@@ -353,7 +354,7 @@ static uint32_t calib_fits(const triax_calib_t *calib)
             fits = 0u;
         }
     }
-    if (quadratic_fits(calib) == 0u) {
+    if (terms_fit(calib) == 0u) {
         fits = 0u;
     }
     return fits;
@@ -378,7 +379,7 @@ static uint32_t image_fits(const uint8_t *image, size_t size)
         0x00000000u, /* determinant shift */
         0x00000000u, /* log2 of the reciprocal */
         0x00000000u, /* gain shift */
-        0x00000001u, /* terms: 1 quadratic */
+        0x00000001u, /* terms: 1 quadratic, 2 dT/dt, 4 g-sensitivity, force Q << 8 */
     };
     uint32_t fits = 0u;
 

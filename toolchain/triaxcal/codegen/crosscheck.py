@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from triaxcal.codegen.forces import forces_of, rates_of
 from triaxcal.codegen.routines import Answers, Generated, Int32Array, Routine
 from triaxcal.codegen.ties import ties
 from triaxcal.errors import RefusedError
@@ -21,6 +22,7 @@ from triaxcal.fixedpoint.integer_model import (
     STATUS_TEMP_HIGH,
     STATUS_TEMP_LOW,
     State,
+    add_rate,
     apply,
     set_temperature,
 )
@@ -140,13 +142,17 @@ def python_routine(plan: Plan) -> Routine:
             codes = temp[block].astype(np.int64)
             index = np.clip(codes, plan.temp_min_code, plan.temp_max_code) - plan.temp_min_code
             rows = _gather(table, index)
-            state = State(rows[:, :, :3], rows[:, :, 3])
+            offset, flags = rows[:, :, 3], np.zeros(len(codes), np.int64)
+            if plan.rate is not None:
+                offset, flags = add_rate(plan.rate, offset, rates_of(plan.rate, codes))
+            state = State(rows[:, :, :3], offset)
             # Axis by axis in memory, as the integer model works.
             axes = np.ascontiguousarray(raw[block].T, dtype=np.int64).T
-            result, flags = apply(plan, state, axes)
+            force = forces_of(temp[block], raw[block]) if plan.shape.gyro else None
+            result, sample = apply(plan, state, axes, force)
             accel[block] = result
             low, high = codes < plan.temp_min_code, codes > plan.temp_max_code
-            status[block] = flags | low * STATUS_TEMP_LOW | high * STATUS_TEMP_HIGH
+            status[block] = flags | sample | low * STATUS_TEMP_LOW | high * STATUS_TEMP_HIGH
         return accel, status
 
     return run
@@ -214,6 +220,7 @@ def _compare(vectors: VectorSet, name: str, found: Answers, expected: Answers) -
 def _largest_error(plan: Plan, table: FloatArray, vectors: VectorSet, answers: Answers) -> float:
     """Largest |integer - real| in LSB over the vectors that no limit touched."""
     shape = plan.shape
+    fraction = 2.0 ** (32 - shape.output_shift)
     clean = np.flatnonzero(answers[1] == STATUS_OK)
     largest = 0.0
     for start in range(0, len(clean), _BLOCK):
@@ -225,9 +232,15 @@ def _largest_error(plan: Plan, table: FloatArray, vectors: VectorSet, answers: A
             real[i] = rows[:, i, 3]
             for j in range(3):
                 real[i] += rows[:, i, j] * u[:, j]
+        if plan.rate is not None:
+            fullest = rates_of(plan.rate, vectors.temp[chosen]) * (plan.rate.gain / 2.0**32)
+            real += plan.rate.real[:, None] * fullest
         if plan.real_quadratic is not None:
             real = real + plan.real_quadratic @ products(real.T).T * 2.0**-64
+        if plan.real_sensitivity is not None:
+            force = forces_of(vectors.temp[chosen], vectors.raw[chosen]).astype(np.float64)
+            real += plan.real_sensitivity @ force.T * 2.0**-32
         for i in range(3):
-            error = answers[0][chosen, i] - real[i] * 2.0 ** (32 - shape.output_shift)
+            error = answers[0][chosen, i] - real[i] * fraction
             largest = max(largest, float(error.max()), -float(error.min()))
     return largest

@@ -5,6 +5,8 @@ temp_min_code, temp_max_code,
 a segment: first_code, origin_code, gain, 12 x (order + 1) coefficients, constant first,
 with terms beyond the linear ones (version 2) a thirteenth word of shape says which, and here stand
     quadratic: 3 x 6 words
+    dT/dt: rate_min, rate_max, rate_gain, 3 words
+    g-sensitivity of a gyro, whose magic is "TRXG": 3 x 3 words
 CRC-32 (IEEE 802.3) of all before it.
 """
 
@@ -18,8 +20,11 @@ from triaxcal.model.compensation import DIRECT
 
 MAGIC = int.from_bytes(b"TRXC", "little")
 VERSION, VERSION_WITH_TERMS = 1, 2
-QUADRATIC = 1
+GYRO_MAGIC = int.from_bytes(b"TRXG", "little")
+QUADRATIC, RATE, SENSITIVITY = 1, 2, 4
 """Bits of the word that says which terms there are."""
+FORCE_Q_SHIFT = 8
+"""Of a gyro, where that word has the Q of the specific force that it takes."""
 HEADER_NAMES = (
     "magic TRXC",
     "version of the layout",
@@ -37,17 +42,21 @@ HEADER_NAMES = (
     "log2 of the reciprocal",
     "gain shift",
 )
-TERMS_NAME = "terms: 1 quadratic"
+TERMS_NAME = "terms: 1 quadratic, 2 dT/dt, 4 g-sensitivity, force Q << 8"
 
 
 def terms_word(plan: Plan) -> int:
     """Which terms there are beyond the linear ones."""
-    return QUADRATIC if plan.quadratic is not None else 0
+    if plan.sensitivity is not None:
+        return SENSITIVITY | plan.force_q << FORCE_Q_SHIFT
+    quadratic = QUADRATIC if plan.quadratic is not None else 0
+    return quadratic | (RATE if plan.rate is not None else 0)
 
 
 def header_names(plan: Plan) -> tuple[str, ...]:
     """What each of the first words is."""
-    return (*HEADER_NAMES, TERMS_NAME) if terms_word(plan) else HEADER_NAMES
+    names = (*HEADER_NAMES, TERMS_NAME) if terms_word(plan) else HEADER_NAMES
+    return ("magic TRXG", *names[1:]) if plan.shape.gyro else names
 
 
 def header_words(plan: Plan) -> list[int]:
@@ -66,7 +75,7 @@ def header_words(plan: Plan) -> list[int]:
     )
     terms = terms_word(plan)
     words = [
-        MAGIC,
+        GYRO_MAGIC if shape.gyro else MAGIC,
         VERSION_WITH_TERMS if terms else VERSION,
         image_size(plan),
         0 if shape.form == DIRECT else 1,
@@ -93,7 +102,11 @@ def image_size(plan: Plan) -> int:
 
 def _term_words(plan: Plan) -> list[int]:
     """Words of the terms, as they stand before the CRC."""
-    words: list[int] = [] if plan.quadratic is None else plan.quadratic.ravel().tolist()
+    tables = [t for t in (plan.quadratic, plan.sensitivity) if t is not None]
+    words: list[int] = [word for table in tables for word in table.ravel().tolist()]
+    if plan.rate is not None:
+        rate = plan.rate
+        words += [rate.min_code, rate.max_code, rate.gain, *rate.words.tolist()]
     return words
 
 

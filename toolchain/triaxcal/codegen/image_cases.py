@@ -16,7 +16,7 @@ from random import Random
 
 import numpy as np
 
-from triaxcal.codegen.image import QUADRATIC, header_names, terms_word
+from triaxcal.codegen.image import QUADRATIC, RATE, SENSITIVITY, header_names, terms_word
 from triaxcal.codegen.inverse_edges import inverse_edges
 from triaxcal.codegen.routines import Generated, Reference
 from triaxcal.errors import RefusedError
@@ -25,8 +25,11 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.compensation import INVERSE
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
-ROW_LIMIT, ROW_LIMIT_QUADRATIC = 2**32 - 8, 3 * 2**30
-QUADRATIC_LIMIT = 2**30
+ROW_LIMIT, ROW_LIMIT_WITH_TERMS = 2**32 - 8, 3 * 2**30
+QUADRATIC_LIMIT, SENSITIVITY_LIMIT = 2**31 - 1, 2**29
+_TABLES = {0: (0, 0), QUADRATIC: (6, QUADRATIC_LIMIT), SENSITIVITY: (3, SENSITIVITY_LIMIT)}
+_RATE_MIN, _RATE_MAX, _RATE_GAIN, _RATE_WORDS = range(4)
+"""Columns and limit of a row of the table of terms."""
 SEED = 20130527
 WILD_IMAGES = 48
 _FIRST, _ORIGIN, _GAIN, _COEFFICIENTS = range(4)
@@ -49,7 +52,9 @@ class Layout:
     segments: int
     order: int
     inverse: bool
-    quadratic: bool = False
+    columns: int = 0
+    limit: int = 0
+    rate: bool = False
 
     @property
     def temp_min(self) -> int:
@@ -64,15 +69,15 @@ class Layout:
     @property
     def row_limit(self) -> int:
         """Limit of a row."""
-        return ROW_LIMIT_QUADRATIC if self.quadratic else ROW_LIMIT
+        return ROW_LIMIT_WITH_TERMS if self.columns else ROW_LIMIT
 
     def segment(self, s: int) -> int:
         """Index of the first word of a segment."""
         return self.header + 2 + s * (_COEFFICIENTS + 12 * (self.order + 1))
 
-    def quadratic_word(self, row: int, k: int) -> int:
-        """Index of a quadratic term."""
-        return self.segment(self.segments) + 6 * row + k
+    def term(self, row: int, k: int) -> int:
+        """Index of a word of the table of terms."""
+        return self.segment(self.segments) + self.columns * row + k
 
     def coefficient(self, s: int, f: int, k: int) -> int:
         """Index of c_k of a function."""
@@ -85,10 +90,20 @@ class Layout:
         if firsts[0] != low or any(not low < f <= high for f in firsts[1:]):
             return False
         lasts = [f - 1 for f in firsts[1:]] + [high]
-        for row in range(3 if self.quadratic else 0):
-            if sum(abs(words[self.quadratic_word(row, k)]) for k in range(6)) > QUADRATIC_LIMIT:
+        if self.rate and not self._rate_is_safe(words):
+            return False
+        for row in range(3):
+            if sum(abs(words[self.term(row, k)]) for k in range(self.columns)) > self.limit:
                 return False
         return all(self._segment_is_safe(words, s, lasts[s]) for s in range(self.segments))
+
+    def rate_word(self, k: int) -> int:
+        """Index of a word of the term in dT/dt."""
+        return self.segment(self.segments) + 3 * self.columns + k
+
+    def _rate_is_safe(self, words: list[int]) -> bool:
+        low, high, gain = (words[self.rate_word(k)] for k in (_RATE_MIN, _RATE_MAX, _RATE_GAIN))
+        return low <= 0 <= high and gain > 0 and max(-low, high) * gain <= INT32_MAX
 
     def _segment_is_safe(self, words: list[int], s: int, last: int) -> bool:
         at = self.segment(s)
@@ -106,6 +121,9 @@ class Layout:
                 if bound > INT32_MAX:
                     return False
             ends.append(bound)
+        if self.rate:
+            for i in range(3):
+                ends[4 * i + 3] += abs(words[self.rate_word(_RATE_WORDS + i)]) // 2 + 1
         rows = [sum(ends[4 * i : 4 * i + 3]) + 2 * ends[4 * i + 3] for i in range(3)]
         return self.inverse or max(rows) < self.row_limit
 
@@ -148,15 +166,18 @@ def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
     """Damaged images, images at the limits of step R, and wild ones."""
     shape = plan.shape
     names = header_names(plan)
+    terms = terms_word(plan)
+    columns, limit = _TABLES[terms & (QUADRATIC | SENSITIVITY)]
     layout = Layout(
-        len(names), shape.segments, shape.order, shape.form == INVERSE,
-        bool(terms_word(plan) & QUADRATIC),
+        len(names), shape.segments, shape.order, shape.form == INVERSE, columns, limit,
+        bool(terms & RATE),
     )  # fmt: skip
     words = list(struct.unpack(f"<{len(image) // 4}i", image))[:-1]
     cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image, names)]
     changes = itertools.chain(
         _temperature_edges(layout, words), _coefficient_edges(layout, words),
-        _row_edges(layout), _wild(layout), _inverse_edges(layout, plan), _quadratic_edges(layout),
+        _row_edges(layout), _wild(layout), _inverse_edges(layout, plan), _term_edges(layout),
+        _rate_edges(layout, words),
     )  # fmt: skip
     for name, change in changes:
         if not all(INT32_MIN <= value <= INT32_MAX for value in change.values()):
@@ -299,10 +320,12 @@ def _wild(layout: Layout) -> Iterator[Change]:
                 range(layout.segments), range(3), range(layout.order + 1)
             ):
                 change[layout.coefficient(s, 4 + j, k)] = change[layout.coefficient(s, j, k)]
-        for row, k in itertools.product(range(3 if layout.quadratic else 0), range(6)):
-            # Six of a sixth and less keep step R; every eighth image may break it.
-            limit = QUADRATIC_LIMIT // (4 if number % 8 == 0 else 6)
-            change[layout.quadratic_word(row, k)] = rng.randint(-limit, limit)
+        for row, k in itertools.product(range(3), range(layout.columns)):
+            # As many of equal shares keep step R; every eighth image may break it.
+            limit = layout.limit // (2 if number % 8 == 0 else layout.columns)
+            change[layout.term(row, k)] = rng.randint(-limit, limit)
+        for k in range(3 if layout.rate else 0):
+            change[layout.rate_word(_RATE_WORDS + k)] = rng.randint(-size // 2, size // 2)
         yield f"wild {number}", change
 
 
@@ -326,22 +349,49 @@ def _inverse_edges(layout: Layout, plan: Plan) -> Iterator[Change]:
         )
 
 
-def _quadratic_edges(layout: Layout) -> Iterator[Change]:
-    """Rows of quadratic terms at their limit and one beyond, each word in turn deciding."""
-    if not layout.quadratic:
-        return
-    for row, last in itertools.product(range(3), range(6)):
+def _term_edges(layout: Layout) -> Iterator[Change]:
+    """Rows of terms at their limit and one beyond, each word in turn deciding."""
+    for row, last in itertools.product(range(3), range(layout.columns)):
         for excess in (0, 1):
-            share = QUADRATIC_LIMIT // 6
-            change = {layout.quadratic_word(row, k): share if k % 2 else -share for k in range(6)}
-            most = QUADRATIC_LIMIT + excess - 5 * share
-            change[layout.quadratic_word(row, last)] = most if row % 2 else -most
-            yield f"quadratic row {row} at {QUADRATIC_LIMIT + excess}, word {last}", change
-        alone = {layout.quadratic_word(row, k): 0 for k in range(6)}
-        for value in (QUADRATIC_LIMIT, -QUADRATIC_LIMIT, INT32_MIN, INT32_MAX):
-            yield f"quadratic word {row}, {last} = {value}", {
-                **alone, layout.quadratic_word(row, last): value
-            }  # fmt: skip
+            share = layout.limit // layout.columns
+            change = {
+                layout.term(row, k): share if k % 2 else -share for k in range(layout.columns)
+            }
+            most = layout.limit + excess - (layout.columns - 1) * share
+            change[layout.term(row, last)] = most if row % 2 else -most
+            yield f"terms of row {row} at {layout.limit + excess}, word {last}", change
+        alone = {layout.term(row, k): 0 for k in range(layout.columns)}
+        for value in (layout.limit, -layout.limit, INT32_MIN, INT32_MAX):
+            yield f"term {row}, {last} = {value}", {**alone, layout.term(row, last): value}
+
+
+def _rate_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
+    """The range of rates about zero, its gain, and words that take a row to its limit."""
+    if not layout.rate:
+        return
+    at = layout.rate_word
+    for low, high in ((0, 0), (1, 1), (-1, -1), (0, INT32_MAX), (-INT32_MAX, 0), (INT32_MIN, 0)):
+        yield f"rates {low} to {high}", {at(_RATE_MIN): low, at(_RATE_MAX): high, at(_RATE_GAIN): 1}
+    fastest = max(-words[at(_RATE_MIN)], words[at(_RATE_MAX)])
+    fullest = INT32_MAX // fastest
+    for gain in (INT32_MIN, -1, 0, 1, fullest, fullest + 1, INT32_MAX):
+        yield f"gain {gain} of the rate", {at(_RATE_GAIN): gain}
+    for row in range(3):
+        here = at(_RATE_WORDS + row)
+        for value in (INT32_MIN, -INT32_MAX, INT32_MAX):
+            yield f"rate word {value} of row {row}", {here: value}
+        nothing = {
+            layout.coefficient(s, 4 * row + j, k): 0
+            for s, j, k in itertools.product(
+                range(layout.segments), range(4), range(layout.order + 1)
+            )
+        }
+        # The row is gains and 2 (b + |r| / 2 + 1): b takes what is left, some less and one more.
+        left = layout.row_limit // 2 - 3 * sum_of_floors(layout.order) - 2**30 - 1
+        for b in (left - 3, left - 2, left - 1, left, left + 1):
+            change = {**nothing, here: 2**31 - 2}
+            change |= {layout.coefficient(s, 4 * row + 3, 0): b for s in range(layout.segments)}
+            yield f"rate word and offset {b} of row {row}", change
 
 
 def case_vectors(plan: Plan) -> tuple[np.ndarray, np.ndarray]:

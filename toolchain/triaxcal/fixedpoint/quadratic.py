@@ -13,8 +13,8 @@ from triaxcal.model.positions import AXES
 from triaxcal.model.terms import PRODUCT_AXES, PRODUCT_NAMES
 from triaxcal.model.types import FloatArray, IntArray
 
-QUADRATIC_LIMIT = 2**30
-"""A row's |q| sum to this at most: the terms come to 1/8 of the range of int32 at its ends."""
+QUADRATIC_LIMIT = 2**31 - 1
+"""A row's |q| sum to this at most: the terms come to 1/4 of the range of int32 at its ends."""
 
 QUADRATIC_NAMES = tuple(f"Q{axis}{product}" for axis in AXES for product in PRODUCT_NAMES)
 """Names of the eighteen words, in image order."""

@@ -10,8 +10,8 @@ ROW_LIMIT = 2**32 - 8
 """|n_i0| + |n_i1| + |n_i2| + 2 |b_i| stays below this: the 64-bit sum and its high word plus b
 cannot overflow for any int32 raw codes (docs/fixed-point.md, step R)."""
 
-ROW_LIMIT_QUADRATIC = 3 * 2**30
-"""The same where quadratic terms need room beside the row."""
+ROW_LIMIT_WITH_TERMS = 3 * 2**30
+"""The same where quadratic terms or a g-sensitivity need room beside the row."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Shape:
     segments, order : int
         Of the piecewise polynomial.
     output_q : int
-        Acceleration LSB is 2^-output_q g.
+        Acceleration LSB is 2^-output_q g, rate LSB 2^-output_q deg/s.
     output_shift : int
         Right shift of the 64-bit sum, 32 + spare bits. Above 32 the result cannot leave int32.
     raw_min, raw_max : int
@@ -36,6 +36,10 @@ class Shape:
         Shifts of the inversion on the device.
     quadratic : bool
         Whether there are quadratic terms.
+    rate : bool
+        Whether there is a term in dT/dt.
+    gyro : bool
+        Whether it is a gyro triad: LSB 2^-output_q deg/s, and a g-sensitivity.
     """
 
     form: str
@@ -48,11 +52,23 @@ class Shape:
     raw_shift: int
     inverse: InverseShifts | None
     quadratic: bool = False
+    rate: bool = False
+    gyro: bool = False
+
+    @property
+    def adds_to_sums(self) -> bool:
+        """Whether terms are added to the 64-bit sums of a sample."""
+        return self.quadratic or self.gyro
+
+    @property
+    def unit(self) -> str:
+        """Unit of the result."""
+        return "deg/s" if self.gyro else "g"
 
     @property
     def row_limit(self) -> int:
         """Limit of a row, step R."""
-        return ROW_LIMIT_QUADRATIC if self.quadratic else ROW_LIMIT
+        return ROW_LIMIT_WITH_TERMS if self.adds_to_sums else ROW_LIMIT
 
     @property
     def saturates(self) -> bool:
