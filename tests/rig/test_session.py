@@ -143,6 +143,37 @@ def test_after_a_slip_the_position_has_to_be_taken_up_anew(tmp_path):
     assert len(texts(advance(engine, rig, 50), "accepted")) == 1
 
 
+def test_what_lay_through_a_change_of_temperature_is_taken_up_anew(tmp_path):
+    """A slip on the way has nothing before it to be seen against."""
+    setup = short_setup(tmp_path, temps="[25]")
+    engine, rig = Engine(setup, "test"), rig_of(setup)
+    rig.target_degc = 25.0
+    events = advance(engine, rig, LEARNED + 150)
+    (text,) = texts(events, "equilibrium")
+    assert text.endswith("degC; TP1 (+Z up) is to be left and taken up anew")
+    assert texts(events, "accepted") == []
+    now = view(engine.session)
+    assert now.headline == "TURN AWAY FROM TP1 (+Z up) AND BACK - it went through 5 K"
+    assert (now.phase, now.order) == ("turn", "RESEAT +Z UP")
+    rig.turn_to("TP2")
+    advance(engine, rig, 6)
+    rig.turn_to("TP1")
+    assert len(texts(advance(engine, rig, 50), "accepted")) == 1
+
+
+def test_what_was_taken_up_at_temperature_is_not_taken_up_twice(tmp_path):
+    setup = short_setup(tmp_path, temps="[25]")
+    engine, rig = Engine(setup, "test"), rig_of(setup)
+    rig.target_degc = 25.0
+    advance(engine, rig, 30)
+    rig.turn_to("TP2")
+    advance(engine, rig, 8)
+    rig.turn_to("TP1")
+    events = advance(engine, rig, LEARNED + 100)
+    assert "anew" not in texts(events, "equilibrium")[0]
+    assert len(texts(events, "accepted")) == 1
+
+
 def test_a_redo_supersedes(tmp_path):
     setup = short_setup(tmp_path, temps="[20]")
     engine, rig = Engine(setup, "test"), rig_of(setup)
