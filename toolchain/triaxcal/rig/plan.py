@@ -56,7 +56,7 @@ class Stillness:
     guard_s: int = 12
     noise_sigma: float = 3.5
     slope_t: float = 3.9
-    slip_t: float = 4.3
+    slip_t: float = 4.4
     creep_t: float = 3.7
     batches: int = 20
     u_max_micro_g: float = 3.0
