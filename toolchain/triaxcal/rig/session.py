@@ -13,7 +13,7 @@ from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.rig.blocks import Block
 from triaxcal.rig.equilibrium import Trend, trend, window_s
 from triaxcal.rig.events import DURABLE, AcceptedDwell, Agree, Command, Event, Redo
-from triaxcal.rig.faults import fault
+from triaxcal.rig.faults import complaint, fault
 from triaxcal.rig.orientation import described, recognised
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.stillness import Reference, average, make_reference, motion, refusals
@@ -133,8 +133,8 @@ class Session:
             self.plan.stillness,
             self.micro_g_per_code,
         )
-        if wrong:
-            self._say(events, "trouble", block, wrong)
+        if told := wrong or complaint(block):
+            self._say(events, "trouble", block, told)
         self._take_temperature(block)
         seen = recognised(block.mean, self.micro_g_per_code)
         if seen is None or seen != self.seen or self.seated_degc is None:
