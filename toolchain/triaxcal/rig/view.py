@@ -112,7 +112,7 @@ def _headline(session: Session, phase: str) -> str:
     wanted = described(session.wanted) if session.wanted else ""
     target = session.plan.steps[session.step].temp_degc
     if session.reseat is not None:
-        return f"TURN AWAY FROM {described(session.reseat)} AND BACK - it slipped"
+        return f"TURN AWAY FROM {described(session.reseat)} AND BACK - {session.reseat_why}"
     if session.offered is not None:
         return f"TURN TO {wanted} - or press y to take {described(session.offered)} now"
     return {
