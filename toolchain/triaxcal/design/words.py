@@ -38,11 +38,12 @@ def comparison(problem: Problem, usual: Design, found: Design) -> str:
 def observability(problem: Problem, found: Design) -> list[str]:
     """What the plan determines, what checks it and what no plan of this kind sees."""
     count, order = len(found.temps_degc), problem.order
+    spare = count - order - 1
     return [
         "Six positions determine all twelve constants at each temperature, and two residuals an",
         "output are left: they show noise and the tilter's squareness, half of it.",
-        f"{count} temperatures determine polynomials of order {order}; {count - order - 1} to spare:",
-        "with one left out the curve is still predicted there, and a wrong order shows.",
+        f"{count} temperatures determine polynomials of order {order}, {spare} to spare: with one",
+        "left out the curve is still predicted there, and a wrong order shows.",
         "Not seen by any of this: the tilter's level and alignment as a whole, local gravity, the",
         "thermometer's scale, hysteresis. Their uncertainty has to be stated.",
     ]

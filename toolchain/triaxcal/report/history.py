@@ -20,8 +20,8 @@ def history_text(
             for c in found
         ),
         "",
-        f"En: the largest of 36 differences over its expanded uncertainty (95 %). Above {EN_MAX:.2f},",
-        "which chance alone gives in one comparison of twenty, it is a contradiction.",
+        "En: the largest of 36 differences over its expanded uncertainty (95 %). Chance alone",
+        f"gives more than {EN_MAX:.2f} in one comparison of twenty: above it, the two contradict.",
     ]
     if repeat is None:
         lines.append("Repeatability: too few calibrations to tell.")
