@@ -40,6 +40,7 @@ MAY_IMPORT = {
     "codegen": {"ground", "model", "records", "fixedpoint"},
     "publish": {"ground"},
     "delivery": {"ground", "model", "records", "fit", "fixedpoint", "codegen"},
+    "design": {"ground", "model", "records"},
     "targets": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
     "uncertainty": {"ground", "model", "records", "fit", "fixedpoint"},
     "verify": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},

@@ -2,8 +2,9 @@
 
 Outliers. x is far out when |x - median| > f s, s = 1.4826 MAD, robust against the outliers
 themselves. For normal data the largest of n values of m quantities should stay below f with 95 %
-(Bonferroni): f is the two-sided normal quantile at 0.05 / (n m), widened by 1 + 2.3 / sqrt(n) for
-the scatter of the MAD, whose relative standard deviation is 1.17 / sqrt(n): two of them.
+(Bonferroni): f is the two-sided normal quantile at 0.05 / (n m), widened by 1 + 3.5 / sqrt(n) for
+the scatter of the MAD, whose relative standard deviation is 1.17 / sqrt(n): three of them, which
+the smallest of 36 is within 19 times of 20.
 
 Drift. The placement pattern (uncertainty.scatter) is the tilter's own, so its mean over the units
 of a run is the tilter's, with the standard error s / sqrt(units), s pooled within the runs. A run
@@ -31,7 +32,7 @@ FEWEST_UNITS = 20
 """Fewer units say nothing of outliers: the MAD itself is not known to better than a quarter."""
 FEWEST_IN_RUN = 3
 _RISK = 0.05
-_MAD_MARGIN = 2.3
+_MAD_MARGIN = 3.5
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class Run:
 
 
 def quantities(records: Sequence[dict[str, Any]]) -> list[Quantity]:
-    """Constants at T0 in mV and their two temperature coefficients in µV, 36 in all."""
+    """Constants at T0 in mV and their two temperature coefficients in µV and nV, 36 in all."""
     at_t0 = np.array([r["at_t0"] for r in records]) * 1e3
     by_temp = np.array([r["temperature_coefficients"] for r in records]) * 1e6
     found = []
@@ -107,7 +108,7 @@ def quantities(records: Sequence[dict[str, Any]]) -> list[Quantity]:
         per = "/g" if c < 9 else ""
         found.append(Quantity(name, f"mV{per}", at_t0[:, c]))
         found.append(Quantity(f"{name} per °C", f"µV{per}/°C", by_temp[:, c, 0]))
-        found.append(Quantity(f"{name} per °C²", f"µV{per}/°C²", by_temp[:, c, 1]))
+        found.append(Quantity(f"{name} per °C²", f"nV{per}/°C²", by_temp[:, c, 1] * 1e3))
     return found
 
 

@@ -17,7 +17,7 @@ from triaxcal.errors import RefusedError
 class _Commands(click.Group):
     """Commands of their own files are imported when they are asked for: `calib` waits for none."""
 
-    OTHERS = ("batch", "rig", "target", "verify")
+    OTHERS = ("batch", "design", "history", "rig", "target", "verify")
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted([*super().list_commands(ctx), *self.OTHERS])
@@ -59,6 +59,10 @@ def calib(unit: Path, build: Path) -> None:
     target = build / delivery.unit.name
     publish(files, target, SOMETIMES)
     click.echo(summary(made, files, str(target)))
+    if (unit / "history").is_dir():
+        from triaxcal.cli.history import warn_of_contradiction  # noqa: PLC0415
+
+        warn_of_contradiction(unit, delivery)
 
 
 @main.command()

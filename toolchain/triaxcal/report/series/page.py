@@ -175,11 +175,18 @@ def _histogram(
     return {
         "name": q.name,
         "unit": q.unit,
-        "median": f"{q.median:.6g}",
+        "median": _rounded(q.median, q.spread),
         "spread": f"{q.spread:.2g}",
         "bars": bars,
         "labels": [x for x in labels if 22 <= x["x"] <= WIDTH - 22],
     }
+
+
+def _rounded(value: float, spread: float) -> str:
+    """Value to the second digit of its spread."""
+    if spread <= 0.0:
+        return f"{value:.6g}"
+    return f"{value:.{max(0, 1 - math.floor(math.log10(spread)))}f}"
 
 
 def _run(r: Run) -> dict[str, Any]:
