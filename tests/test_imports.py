@@ -30,7 +30,7 @@ MAY_IMPORT = {
     "ground": set(),
     "model": {"ground"},
     "records": {"ground", "model"},
-    "simulation": {"ground", "model", "records"},
+    "simulation": {"ground", "model", "records", "dynamic"},
     "dynamic": {"ground", "model", "records"},
     "fit": {"ground", "model", "records"},
     "fixedpoint": {"ground", "model", "records"},
