@@ -51,6 +51,7 @@ MAY_IMPORT = {
         "codegen",
         "delivery",
         "uncertainty",
+        "dynamic",
     },
 }
 """rig -> records -> fit -> model -> fixedpoint -> codegen -> delivery -> cli, as data flow. A room
@@ -66,6 +67,8 @@ ONLY_IN = {
     "rich": {"rig", "cli"},
     "dask": {"batch"},
     "distributed": {"batch"},
+    "pyarrow": {"dynamic"},
+    "h5py": {"dynamic"},
 }
 
 
