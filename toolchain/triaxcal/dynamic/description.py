@@ -44,6 +44,7 @@ _LAYOUT: Layout = {
         "second_vrw_ug_per_sqrt_hz": False,
         "accel_lsb": False,
         "table_sd_arcsec": False,
+        "axis_wobble_arcsec": False,
     },
     "table": {"azimuth_deg": False, "elevation_deg": False, "mountings": False},
 }
@@ -243,6 +244,7 @@ def _noise(table: Table) -> DataSheet:
         "second_vrw_ug_per_sqrt_hz": (1e-3, 1e5),
         "accel_lsb": (0.0, 1e6),
         "table_sd_arcsec": (1e-3, 1e5),
+        "axis_wobble_arcsec": (1e-3, 1e5),
     }
     return DataSheet(**{k: table.number(k, *limits[k]) for k in limits if k in table})
 

@@ -8,15 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from triaxcal.dynamic.plausibility import refuse_wrong_units
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import WINDOW_S, Windows, read_windows
 from triaxcal.errors import RefusedError
-from triaxcal.model.types import FloatArray, IntArray
-
-BoolArray = npt.NDArray[np.bool_]
+from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
 STILL_MIN_S = 10.0
 """Shortest stand-still that an alignment may start from."""
