@@ -57,6 +57,7 @@ MAY_IMPORT = {
         "uncertainty",
         "batch",
         "publish",
+        "dynamic",
     },
 }
 """rig -> records -> fit -> model -> fixedpoint -> codegen -> delivery -> cli, as data flow. A room
@@ -74,6 +75,8 @@ ONLY_IN = {
     "rich": {"rig", "cli"},
     "dask": {"batch"},
     "distributed": {"batch"},
+    "pyarrow": {"dynamic"},
+    "h5py": {"dynamic"},
 }
 
 

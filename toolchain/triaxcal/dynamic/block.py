@@ -90,12 +90,15 @@ class StateBlock:
     states : tuple of State
     rate, force, motion, edges, force2, motion2, edges2 : callables, or None
         Rows; the names with 2 belong to the second accelerometer triad.
+    table : callable, or None
+        Rows of the unit's turn against the table's plate, rad.
     motion_curve : callable, or None
         The exact error for p, shape (points, 3), where rows p is not good enough.
     reset : bool
         Whether the states are new each time the unit is put on the table anew.
     needs : str
-        Column that must be recorded: "temp_degc", "force2", "table_angle_rad", or "".
+        Column that must be recorded: "temp_degc", "force2", "table_angle_rad"; "table" for the
+        table's axis in unit.toml; or "".
     """
 
     name: str
@@ -108,6 +111,7 @@ class StateBlock:
     force2: Rows | None = None
     motion2: Rows | None = None
     edges2: Rows | None = None
+    table: Rows | None = None
     motion_curve: Callable[[Signals, FloatArray], FloatArray] | None = None
     reset: bool = False
     needs: str = ""

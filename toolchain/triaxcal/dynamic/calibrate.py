@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from triaxcal.dynamic.block import StateBlock
 from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.passdata import PassResult, Reference, Task
 from triaxcal.dynamic.preintegrate import NODES
+from triaxcal.dynamic.reading import read_recording
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.survey import Survey, survey
 from triaxcal.dynamic.window import Frame
@@ -122,6 +125,27 @@ def calibrate_dynamic(
         expected="a recording that the model describes",
         remedy="look at units, axes, conventions and the noise that unit.toml states",
     )
+
+
+def calibrate_unit(
+    folder: Path, progress: Progress | None = None
+) -> tuple[DynamicDescription, DynamicResult]:
+    """Calibrate the unit in `folder` from the recording that its unit.toml names.
+
+    Raises
+    ------
+    RefusedError
+        As `read_dynamic`, `read_recording` and `calibrate_dynamic`.
+    """
+    unit = read_dynamic(folder)
+    result = calibrate_dynamic(
+        read_recording(unit),
+        unit.noise,
+        unit.state_blocks(),
+        reference_degc=unit.reference_degc,
+        progress=progress,
+    )
+    return unit, result
 
 
 def _block_size(recording: ImuRecording, found: Survey) -> int:

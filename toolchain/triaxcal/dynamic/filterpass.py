@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from triaxcal.dynamic.attitude import level, rotation_of
+from triaxcal.dynamic.channels import Moments, extra_rows
 from triaxcal.dynamic.passdata import History, PassResult, Reference, Task
 from triaxcal.dynamic.preintegrate import BlockEquations, equations
 from triaxcal.dynamic.recording import ImuRecording, ImuSamples, joined
@@ -24,15 +25,15 @@ from triaxcal.dynamic.rootfilter import RootFilter
 from triaxcal.dynamic.survey import Section
 from triaxcal.dynamic.whiten import whitened
 from triaxcal.dynamic.window import About, Window, gamma_matrix, inverse_of_one_plus
-from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
 EARTH_RATE_RAD_PER_S = 7.292115e-5
-SEGMENT_S = 60.0
+SEGMENT_S = 30.0
 FIRST_SEGMENT_S = 1.0
 FEEDBACK_RAD = 0.01
 """A larger tilt shortens the segments: its square is what the filter leaves out."""
 RELEVEL_S = 1.0
-CHECKPOINT_S = 20.0
+CHECKPOINT_S = 30.0
 LEVEL_SD_RAD = 0.1
 HEADING_SD_RAD = math.pi / math.sqrt(3)
 """Nothing known: a uniform distribution over the whole circle."""
@@ -137,6 +138,7 @@ class _Pass:
                     pool = piece if pool is None else joined([pool, piece])
             assert pool is not None
             blocks = min(self.blocks, (len(pool) - lead - 1) // size)
+            blocks = self._until_next_stage(float(pool.time_s[lead]), blocks)
             if blocks == 0:
                 return
             end = lead + blocks * size
@@ -145,15 +147,25 @@ class _Pass:
             keep = max(0, end - 2)
             pool, lead = pool[keep:], end - keep
 
+    def _until_next_stage(self, time_s: float, blocks: int) -> int:
+        """At most so many blocks that a segment ends where the unit was put on the table anew."""
+        self._next_stage(time_s)
+        if blocks == 0 or self.stage + 1 >= len(self.found.stages):
+            return blocks
+        left_s = self.found.stages[self.stage + 1].start_s - time_s
+        return min(blocks, max(1, math.ceil(left_s / (self.frame.block * self.frame.interval_s))))
+
     def _segment(self, samples: ImuSamples, lead: int, blocks: int, C: FloatArray) -> FloatArray:
         time_s = samples.time_s[lead : lead + blocks * self.frame.block + 1 : self.frame.block]
-        self._next_stage(float(time_s[0]))
         about = About(C, self.p, self._earth())
         made = equations(Window(samples, lead, blocks, about, self.frame))
         use = self._used((time_s[:-1] + time_s[1:]) / 2)
         rows = whitened(made, use, self.frame, self.noise)
-        channels = 1 if made.y2 is None else 2
-        self.filter.run(rows, 3 * channels * use)
+        freedom = 3 * (1 if made.y2 is None else 2) * use
+        for more, where in self._table_rows(samples, lead, made, use):
+            rows = np.concatenate([rows, more], axis=1)
+            freedom = freedom + more.shape[1] * where
+        self.filter.run(rows, freedom)
         beta = self._level_again(made, use)
         self.filter.shift(beta, np.zeros_like(self.p))
         size = float(np.abs(beta).max())
@@ -166,6 +178,36 @@ class _Pass:
             self._checkpoint(self._time_s)
         fed_back: FloatArray = rotation_of(beta) @ made.C[-1]
         return fed_back
+
+    def _table_rows(
+        self, samples: ImuSamples, lead: int, made: BlockEquations, use: IntArray
+    ) -> list[tuple[FloatArray, BoolArray]]:
+        """Rows of the turntable's measurements, once the heading is known."""
+        table = self.recording.table
+        if table is None or not table.mountings or self.start.heading_rad is None:
+            return []
+        size = self.frame.block
+        blocks = len(use)
+        end_s = samples.time_s[lead::size][: blocks + 1]
+        windows = self.found.windows
+        first = np.searchsorted(windows.start_s, end_s[:-1], side="right") - 1
+        last = np.searchsorted(windows.start_s, end_s[1:], side="right") - 1
+        still = self.found.still & self.found.use
+        resting = still[np.maximum(first, 0)] & still[last]
+        angle = samples.table_angle_rad
+        inner = made.C[:-1].swapaxes(1, 2) @ made.C[1:]
+        cosine = np.clip((np.trace(inner, axis1=1, axis2=2) - 1) / 2, -1, 1)
+        moments = Moments(
+            made.C[1:],
+            None if angle is None else angle[lead + 1 :][: blocks * size].reshape(-1, size).mean(1),
+            np.arccos(cosine),
+            resting,
+            use.astype(bool) & ~resting,
+            size,
+            self.frame.gravity,
+        )
+        mounting = table.mountings[min(self.stage, len(table.mountings) - 1)][1]
+        return extra_rows(moments, self.frame.layout, self.p, self.noise, (table, mounting))
 
     def _level_again(self, made: BlockEquations, use: IntArray) -> FloatArray:
         """Tilt (3,) that takes the mean of y (9) away at the segment's end; none while handled."""

@@ -28,12 +28,18 @@ class DataSheet:
         Of the second accelerometer triad; as the first where None.
     accel_lsb : float
         One count of the accelerometers: micro-g for instants, mm/s for increments.
+    table_sd_arcsec : float or None
+        One reading of the plate's attitude, about each axis, at rest.
+    axis_wobble_arcsec : float or None
+        How far the table's axis leans while it turns.
     """
 
     gyro_arw_deg_per_sqrt_h: float
     accel_vrw_ug_per_sqrt_hz: float
     second_vrw_ug_per_sqrt_hz: float | None = None
     accel_lsb: float = 0.0
+    table_sd_arcsec: float | None = None
+    axis_wobble_arcsec: float | None = None
 
     @property
     def rate_density(self) -> float:

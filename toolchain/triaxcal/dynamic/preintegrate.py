@@ -238,9 +238,11 @@ def _mean_force(window: Window, triad: _Triad, inner: FloatArray) -> FloatArray:
     force = (force - triad.bias) @ triad.A_inverse.T
     time = window.time[inside]
     if frame.force_is_increment:
-        # The mean over an interval is short of the value in its middle by the arc's bend.
-        step, turn = window.step_s[inside], window.rate[inside]
-        force = force - step[:, None] ** 2 / 24 * np.cross(turn, np.cross(turn, force))
+        # Mean over an interval against the value at half of its turn, to second order: the arc's
+        # bend, and, while the rate changes, half of the turn is not in the mean attitude.
+        step = window.step_s[inside]
+        turn, change = window.turns[inside], window.turn_change[inside]
+        force = force - (np.cross(turn, np.cross(turn, force)) + np.cross(change, force)) / 24
         time = time - step / 2
     turned = np.einsum("nij,nj->ni", matrix_of(inner), force)
     means = turned.reshape(window.blocks, frame.block, 3).mean(axis=1)

@@ -103,7 +103,8 @@ class Turntable:
         Of the axis of rotation above the horizon.
     mountings : tuple of (float, array of shape (3, 3))
         Since which time (s), and the matrix from plate axes to instrument axes as mounted, without
-        the small mounting angles theta. One for each axis put on the table.
+        the small mounting angles theta. One for each axis put on the table; where the time is nan
+        they belong to the stages that are found in the recording, in their order.
     """
 
     azimuth_rad: float

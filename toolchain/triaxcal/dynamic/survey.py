@@ -6,55 +6,27 @@ The survey reads the recording once and keeps means over short windows; nothing 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from triaxcal.dynamic.recording import INCREMENT, ImuRecording
+from triaxcal.dynamic.plausibility import refuse_wrong_units
+from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.windows import WINDOW_S, Windows, read_windows
 from triaxcal.errors import RefusedError
-from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
-BoolArray = npt.NDArray[np.bool_]
-
-WINDOW_S = 0.25
 STILL_MIN_S = 10.0
 """Shortest stand-still that an alignment may start from."""
 STILL_RAD_PER_S = np.radians(0.25)
 """Change of the rate, against the stand-still before, that is no noise any more."""
-GAP_INTERVALS = 1.5
-"""A step of time longer than so many intervals is a gap."""
 AXIS_COSINE = np.cos(np.radians(25.0))
 """A turn counts as one about an instrument axis within 25 deg."""
+AXIS_TURN_MIN_RAD = 2 * np.pi
+"""An axis that turned less in all was never put on the table."""
 STAGE_TURN_RAD = np.pi
 """Less than half a turn about an axis is handling, not a stage."""
 GUARD_S = 2.0
 """Around handling nothing is believed: what lifts the unit starts and ends slowly."""
-CHUNK = 1 << 16
-
-
-@dataclass(frozen=True)
-class Windows:
-    """Means over windows of `WINDOW_S`.
-
-    Attributes
-    ----------
-    start_s, duration_s : arrays, shape (w,)
-    first : array, shape (w,)
-        Number of the first sample.
-    rate, force : arrays, shape (w, 3)
-        rad/s, m/s^2, as measured.
-    section : array, shape (w,)
-        Number of the section without a gap.
-    """
-
-    start_s: FloatArray
-    duration_s: FloatArray
-    first: IntArray
-    rate: FloatArray
-    force: FloatArray
-    section: IntArray
 
 
 @dataclass(frozen=True)
@@ -132,9 +104,11 @@ def survey(recording: ImuRecording) -> Survey:
     Raises
     ------
     RefusedError
-        When a section does not begin with a stand-still of `STILL_MIN_S`.
+        As `read_windows` and `refuse_wrong_units`; when a section does not begin with a stand-still
+        of `STILL_MIN_S`; when an axis was never rotated.
     """
-    windows, edges, temp_mean = _windows(recording)
+    windows, edges, temp_mean = read_windows(recording)
+    refuse_wrong_units(recording, windows)
     sections, still = [], np.zeros(len(windows.first), dtype=bool)
     for number, (first, last) in enumerate(edges):
         inside = np.flatnonzero(windows.section == number)
@@ -142,53 +116,10 @@ def survey(recording: ImuRecording) -> Survey:
         sections.append(section)
         still[inside] = standing
     stages, use = _stages(windows, sections, still)
+    _refuse_missing_axis(recording.name, stages)
     speed = np.linalg.norm(windows.rate, axis=1)
     rate_max = float(speed[use].max())
     return Survey(windows, tuple(sections), stages, use, still, rate_max, temp_mean)
-
-
-def _windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]], float]:
-    length = max(1, round(WINDOW_S * recording.rate_hz))
-    interval = 1 / recording.rate_hz
-    rows: list[tuple[Any, ...]] = []
-    edges: list[tuple[int, int]] = [(0, -1)]
-    previous_s, count = None, 0
-    temps = []
-    for chunk in recording.chunks(CHUNK // length * length):
-        step = np.diff(chunk.time_s, prepend=chunk.time_s[0] - interval)
-        if previous_s is not None:
-            step[0] = chunk.time_s[0] - previous_s
-        cuts = [0, *np.flatnonzero(step > GAP_INTERVALS * interval), len(chunk)]
-        rate = chunk.rate / step[:, None] if recording.rate_convention == INCREMENT else chunk.rate
-        force = chunk.force
-        if recording.force_convention == INCREMENT:
-            force = force / step[:, None]
-        for number, (a, b) in enumerate(pairwise(cuts)):
-            if number > 0:
-                edges[-1] = (edges[-1][0], count + int(a) - 1)
-                edges.append((count + int(a), -1))
-            begin = int(a) + (1 if number > 0 else 0)  # an increment over a gap is none
-            starts = np.arange(begin, int(b), length)
-            if len(starts) == 0:
-                continue
-            sizes = np.diff(starts, append=int(b))
-            rows.append(
-                (
-                    chunk.time_s[starts],
-                    sizes * interval,
-                    count + starts,
-                    np.add.reduceat(rate[: int(b)], starts) / sizes[:, None],
-                    np.add.reduceat(force[: int(b)], starts) / sizes[:, None],
-                    np.full(len(starts), len(edges) - 1),
-                )
-            )
-        if chunk.temp_degc is not None:
-            temps.append(float(chunk.temp_degc.mean()))
-        count += len(chunk)
-        previous_s = float(chunk.time_s[-1])
-    edges[-1] = (edges[-1][0], count - 1)
-    columns = [np.concatenate(column) for column in zip(*rows, strict=True)]
-    return Windows(*columns), edges, float(np.mean(temps)) if temps else float("nan")
 
 
 def _section(
@@ -252,3 +183,15 @@ def _widened(marked: BoolArray, by: int) -> BoolArray:
     """Marks, and `by` windows more on each side of them."""
     near: BoolArray = np.convolve(marked.astype(np.float64), np.ones(2 * by + 1), mode="same") > 0.5
     return near
+
+
+def _refuse_missing_axis(name: str, stages: tuple[Stage, ...]) -> None:
+    for axis in range(3):
+        turn = sum(stage.turned_rad for stage in stages if stage.axis == axis)
+        if turn < AXIS_TURN_MIN_RAD:
+            raise RefusedError(
+                name,
+                f"turns about axis {'xyz'[axis]} by {turn / (2 * np.pi):.2f} revolutions in all",
+                expected="some revolutions about each axis x, y, z in turn",
+                remedy="put that axis along the table's and rotate",
+            )

@@ -168,21 +168,33 @@ class Window:
         return corrected
 
     @cached_property
-    def turns(self) -> FloatArray:
-        """Rotation vector of each sample's interval (n, 3), rad.
+    def angles(self) -> FloatArray:
+        """Integral of the rate over each sample's interval (n, 3), rad.
 
-        From instants the angle is the trapezium less the change of slope at its ends, exact for
-        cubics. A rate that turns adds angle x (next angle - last angle)/24, exact to third order.
+        From instants it is the trapezium less the change of slope at its ends, exact for cubics.
         """
         if self.frame.rate_is_increment:
-            angle = self.rate * self.step_s[:, None]
-        else:
-            slope = np.gradient(self.rate, self.time, axis=0)
-            angle = np.zeros_like(self.rate)
-            h = self.step_s[1:, None]
-            trapezium = h * (self.rate[:-1] + self.rate[1:]) / 2
-            angle[1:] = trapezium - h**2 * np.diff(slope, axis=0) / 12
-        last = np.concatenate([angle[:1], angle[:-1]])
-        following = np.concatenate([angle[1:], angle[-1:]])
-        turns: FloatArray = angle + np.cross(angle, following - last) / 24
+            return self.rate * self.step_s[:, None]
+        slope = np.gradient(self.rate, self.time, axis=0)
+        angles = np.zeros_like(self.rate)
+        h = self.step_s[1:, None]
+        trapezium = h * (self.rate[:-1] + self.rate[1:]) / 2
+        angles[1:] = trapezium - h**2 * np.diff(slope, axis=0) / 12
+        return angles
+
+    @cached_property
+    def turn_change(self) -> FloatArray:
+        """Next angle less the last one (n, 3), rad: twice what the rate gains in an interval."""
+        angles = self.angles
+        last = np.concatenate([angles[:1], angles[:-1]])
+        change: FloatArray = np.concatenate([angles[1:], angles[-1:]]) - last
+        return change
+
+    @cached_property
+    def turns(self) -> FloatArray:
+        """Rotation vector of each interval (n, 3), rad.
+
+        A rate that turns adds angle x (next angle - last angle)/24, exact to third order.
+        """
+        turns: FloatArray = self.angles + np.cross(self.angles, self.turn_change) / 24
         return turns
