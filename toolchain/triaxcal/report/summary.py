@@ -87,8 +87,8 @@ def _findings(calibration: Calibration) -> list[str]:
     recording = calibration.recording
     if recording is None:
         return []
-    worth = f"condition number {recording.condition:.3g} (1 is the best); the poses see "
-    worth += f"{recording.weakest} least"
+    worth = f"condition number {recording.condition:.3g} (1 is the best)"
+    worth += f"; the poses see {recording.weakest} least" if recording.weakest else ""
     found = [_entry("found", *_wrap(finding)) for finding in recording.findings]
     return [_entry("observability", *_wrap(worth)), *found]
 
