@@ -17,7 +17,7 @@ from triaxcal.errors import RefusedError
 class _Commands(click.Group):
     """Commands of their own files are imported when they are asked for: `calib` waits for none."""
 
-    OTHERS = ("rig", "target", "verify")
+    OTHERS = ("crosscoupling", "drift", "poses", "rig", "target", "verify")
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted([*super().list_commands(ctx), *self.OTHERS])

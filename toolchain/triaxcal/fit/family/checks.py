@@ -141,7 +141,12 @@ def refuse_few(poses: PoseSet, orientations: int, needed: int) -> None:
         + (f" ({refused})" if refused else ""),
         expected=f"{needed} different orientations at least, 9 for all constants, 12 and more to "
         "have some left to check on",
-        remedy="add poses that are not alike: six faces, then edges and corners",
+        remedy="add poses that are not alike: six faces, then edges and corners"
+        + (
+            "; `triaxcal drift` shows one orientation over temperature"
+            if len(poses.poses) == 1
+            else ""
+        ),
     )
 
 

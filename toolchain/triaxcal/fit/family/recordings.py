@@ -82,6 +82,7 @@ def _prepared(
     refuse_wrong_unit(poses.source, poses.readings, layout)
     recorded = poses.temps_degc
     temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
+    refuse_few(poses, len(poses.poses), MODELS[0].parameters)
     ones = np.ones(len(temps))
     rough = scalar_data(poses.readings, ones[:, None], ones, unit.gravity_g)
     refuse_left_handed(samples, rough.centre)
