@@ -245,7 +245,7 @@ REFUSED = {
     "coplanar": (
         log(np.array([[np.cos(t), np.sin(t), 0.0] for t in np.arange(0, 6.2, 0.5)])),
         {},
-        ", which lie near one plane, leave K, U0z open (condition number",
+        "poses, which lie near one plane, leave ",
     ),
     "m/s^2-for-g": (
         log(directions(12)),

@@ -199,12 +199,16 @@ def _coefficient(value: float, sd: float, unit: str) -> list[str]:
 
 
 def pair_picture(recursion: Recursion) -> bytes:
-    """Estimates of both Kip after each position, with their sd on either side."""
-    x = np.arange(len(NAMES), len(NAMES) + len(recursion.values), dtype=np.float64)
+    """Estimates of both Kip after each position, with their sd on either side.
+
+    From twice as many positions as unknowns: before, they are off any scale that shows the end.
+    """
+    first = min(len(NAMES), len(recursion.values) - 2)
+    x = np.arange(first, len(recursion.values), dtype=np.float64) + len(NAMES)
     panels = []
     for k, name in ((4, "KipA"), (5, "KipB"), (6, "b0")):
         scale, unit = (_ARCSEC_PER_RAD, "arcsec") if k == 6 else (1e6, "1e-6 g/g^2")
-        values, sd = recursion.values[:, k] * scale, recursion.sd[:, k] * scale
+        values, sd = recursion.values[first:, k] * scale, recursion.sd[first:, k] * scale
         last, room = float(values[-1]), 12.0 * float(sd[-1]) or 1.0
         lines = [
             Line("estimate", COLOURS[0], x, values),

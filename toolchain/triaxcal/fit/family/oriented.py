@@ -165,6 +165,11 @@ def table_error_g(
     return result
 
 
+def design_condition(force: FloatArray) -> float:
+    """Condition number of the linear design of forces or directions (n, 3)."""
+    return _condition(_with_one(force))
+
+
 def _with_one(values: FloatArray) -> FloatArray:
     return np.concatenate([np.ones((len(values), 1)), values], axis=1)
 

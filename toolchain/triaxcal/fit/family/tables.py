@@ -16,6 +16,7 @@ from triaxcal.fit.family.harmonics import table_findings
 from triaxcal.fit.family.oriented import (
     OrientedFit,
     SerialGrid,
+    design_condition,
     inverse_linear,
     inverse_quadratic,
 )
@@ -98,6 +99,7 @@ def calibrate_table(
     refuse_wrong_unit(poses.source, readings, layout)
     _refuse_few(poses)
     _refuse_degrees(poses.source, angles, readings, table, unit.gravity_g)
+    _refuse_open(poses, gravity_direction(angles.kind, table))
     temps = _one_temperature(unit, poses)
     force, sign = _force(poses.source, angles, readings, table, unit.gravity_g)
     rows = [
@@ -138,6 +140,18 @@ def _refuse_few(poses: PoseSet) -> None:
         )
 
 
+def _refuse_open(poses: PoseSet, direction: FloatArray) -> None:
+    condition = design_condition(direction)
+    if condition > CONDITION_MAX:
+        raise RefusedError(
+            poses.source,
+            f"the angles of the {len(poses.poses)} poses leave constants open (condition number "
+            f"{condition:.3g})",
+            expected=f"{CONDITION_MAX:g} at most",
+            remedy="add poses over both angles",
+        )
+
+
 def _one_temperature(unit: UnitDescription, poses: PoseSet) -> FloatArray:
     recorded = poses.temps_degc
     temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
@@ -159,8 +173,10 @@ def _one_temperature(unit: UnitDescription, poses: PoseSet) -> FloatArray:
 
 
 def _linear_residual(readings: FloatArray, force: FloatArray) -> float:
-    fit = inverse_linear(readings, force)
-    return float(np.sqrt(np.mean((fit.force_g(readings) - force) ** 2)))
+    centred = readings - readings.mean(axis=0)
+    design = np.concatenate([np.ones((len(centred), 1)), centred], axis=1)
+    left = force - design @ np.linalg.lstsq(design, force, rcond=None)[0]
+    return float(np.sqrt(np.mean(left**2)))
 
 
 def _refuse_degrees(
