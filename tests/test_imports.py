@@ -58,6 +58,7 @@ MAY_IMPORT = {
         "batch",
         "publish",
         "dynamic",
+        "recording",
     },
 }
 """rig -> records -> fit -> model -> fixedpoint -> codegen -> delivery -> cli, as data flow. A room
@@ -68,14 +69,13 @@ ONLY_IN = {
     "can": {"rig"},
     "cantools": {"rig"},
     "asammdf": {"rig"},
-    "pyarrow": {"rig"},
+    "pyarrow": {"rig", "dynamic"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report"},
     "rich": {"rig", "cli"},
     "dask": {"batch"},
     "distributed": {"batch"},
-    "pyarrow": {"dynamic"},
     "h5py": {"dynamic"},
 }
 

@@ -123,6 +123,8 @@ class Calibration:
     recording : RecordingFit or None
         The poses, where the readings are a recording and no tilter's; `points` then has the
         constants at T0 alone, and `parameter_covariance` only the blocks of each output.
+    reading_unit : str
+        Unit of U0; K has it per g. That of the recording, where there is one.
     """
 
     serial: str
@@ -138,11 +140,7 @@ class Calibration:
     check_dwells: tuple[CheckResult, ...]
     terms: Terms = NO_TERMS
     recording: RecordingFit | None = None
-
-    @property
-    def reading_unit(self) -> str:
-        """Unit of U0."""
-        return "V" if self.recording is None else self.recording.reading_unit
+    reading_unit: str = "V"
 
     @property
     def gain_unit(self) -> str:

@@ -18,6 +18,8 @@ _DRIFT_MAX = 6.0
 """Of its standard error: how far the two halves of a pose may differ."""
 _NOTED = 0.25
 """Of the shortest pose: still stretches shorter than this are part of the movement."""
+_MOVING = 0.1
+"""Of 1 g: a pose whose readings scatter by more was not held still."""
 ALIKE_DEG = 5.0
 """Poses nearer than this to each other are one orientation."""
 
@@ -100,6 +102,22 @@ class PoseSet:
         return np.array(temps) if len(temps) == len(self.poses) and temps else None
 
 
+@dataclass(frozen=True)
+class _Scale:
+    """Lowest and highest readings of the file, shape (3,), and about what 1 g reads."""
+
+    low: FloatArray
+    high: FloatArray
+    one_g: float
+
+    @staticmethod
+    def of(samples: Samples, layout: RecordingLayout) -> _Scale:
+        low, high = samples.reading.min(axis=0), samples.reading.max(axis=0)
+        # Counts do not say: half of what nine tenths of the samples span on the widest axis.
+        spans = np.ptp(np.percentile(samples.reading, [5.0, 95.0], axis=0), axis=0)
+        return _Scale(low, high, layout.reading_of_1_g or float(spans.max()) / 2.0)
+
+
 def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     """Poses of samples: one a row, one a labelled section, or found by stillness.
 
@@ -111,7 +129,7 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     if layout.rows == POSES:
         return PoseSet(samples.source, _row_poses(samples), (), None, samples.findings)
     stillness = find_stillness(samples, layout.still_s)
-    extremes = samples.reading.min(axis=0), samples.reading.max(axis=0)
+    scale = _Scale.of(samples, layout)
     poses: list[Pose] = []
     refused: list[RefusedPose] = []
     number = 0
@@ -121,7 +139,7 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
             continue
         number += 1
         pose = _pose(samples, run, number)
-        reason = _reason(samples, run, pose, layout, extremes)
+        reason = _reason(samples, run, pose, layout, scale)
         if reason:
             refused.append(RefusedPose(number, pose.line, pose.start_s, length, reason))
         elif not layout.faces or pose.label in layout.faces:
@@ -175,7 +193,7 @@ def _reason(
     run: tuple[int, int],
     pose: Pose,
     layout: RecordingLayout,
-    extremes: tuple[FloatArray, FloatArray],
+    scale: _Scale,
 ) -> str:
     """Why a still stretch is no pose; "" when it is one."""
     if pose.duration_s < layout.still_s:
@@ -184,11 +202,17 @@ def _reason(
     deviation = reading.std(axis=0)
     for axis in range(3):
         stuck = deviation[axis] == 0.0 and (np.delete(deviation, axis) > 0.0).any()
-        if stuck and reading[0, axis] in (extremes[0][axis], extremes[1][axis]):
+        if stuck and reading[0, axis] in (scale.low[axis], scale.high[axis]):
             return (
                 f"axis {AXES[axis]} is clipped: it stays at {reading[0, axis]:g}, the end of what "
                 "the file shows; measure with a wider range"
             )
+    if deviation.max() > _MOVING * scale.one_g:
+        axis = int(deviation.argmax())
+        return (
+            f"axis {AXES[axis]} scatters by {deviation[axis]:.3g} {layout.acceleration_unit}: "
+            "it is not held still"
+        )
     half = len(reading) // 2
     drift = np.abs(reading[half:].mean(axis=0) - reading[:half].mean(axis=0))
     assert pose.sd_mean is not None

@@ -45,7 +45,7 @@ def _wrap(text: str, width: int = 80 - _LABEL) -> list[str]:
     return [line.strip() for line in lines]
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Columns two spaces apart, the first to the left, the others to the right."""
     cells = [list(head), *map(list, rows)]
     widths = [max(len(row[c]) for row in cells) for c in range(len(head))]
@@ -87,8 +87,8 @@ def _findings(calibration: Calibration) -> list[str]:
     recording = calibration.recording
     if recording is None:
         return []
-    worth = f"condition number {recording.condition:.3g} (1 is the best); the poses see "
-    worth += f"{recording.weakest} least"
+    worth = f"condition number {recording.condition:.3g} (1 is the best)"
+    worth += f"; the poses see {recording.weakest} least" if recording.weakest else ""
     found = [_entry("found", *_wrap(finding)) for finding in recording.findings]
     return [_entry("observability", *_wrap(worth)), *found]
 
@@ -122,7 +122,7 @@ def _constants(calibration: Calibration) -> str:
     ]
     of_gain = [f"K.{axis} {calibration.gain_unit}" for axis in AXES]
     head = [f"constants at {t0:g} degC", *of_gain, f"U0 {name}"]
-    return "\n".join(_table(head, rows))
+    return "\n".join(table(head, rows))
 
 
 def _candidates(calibration: Calibration) -> str:
@@ -139,7 +139,7 @@ def _candidates(calibration: Calibration) -> str:
     ]
     head = ["candidates, rms micro-g", "bias estimator", "parameters", "fitted", "held out"]
     head += ["condition"] if calibration.recording else []
-    return "\n".join(_table(head, rows))
+    return "\n".join(table(head, rows))
 
 
 def _short_label(candidate: Candidate) -> str:
@@ -161,7 +161,7 @@ def _residuals(delivery: Delivery) -> str:
             rows.append([f"  {degrees(temp)} degC, {kind}", *(f"{v * 1e3:.4f}" for v in largest)])
     names = [m.method.replace("additive-", "add.-") for m in methods]
     head = ["max | |a| - g |, mg", *names]
-    lines = _table(head, rows)
+    lines = table(head, rows)
     lines += [f"  {m.method}: {m.refusal}" for m in delivery.methods if m.refusal]
     return "\n".join(lines)
 

@@ -142,9 +142,9 @@ def uncertainty(
     """
     temps = _temperatures(unit, calibration) if temps_degc is None else temps_degc
     t0_index = int(np.argmin(np.abs(temps - unit.t0_degc)))
+    units = (calibration.gain_unit,) * 9 + (calibration.reading_unit,) * 3
     if calibration.recording is not None:
         curves = Curves(unit, measurements, calibration, temps)
-        units = (calibration.gain_unit,) * 9 + (calibration.reading_unit,) * 3
         found = recording_sources(curves, calibration.recording)
         return Uncertainty(
             temps,
@@ -167,7 +167,7 @@ def uncertainty(
         thermal_model(p, s),
         *_of_device(p, device),
     ]
-    return Uncertainty(temps, t0_index, tuple(sources), s, tuple(_warnings(unit, s)))
+    return Uncertainty(temps, t0_index, tuple(sources), s, tuple(_warnings(unit, s)), units)
 
 
 def _of_device(p: Curves, device: Device | None) -> list[Source]:

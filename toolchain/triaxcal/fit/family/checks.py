@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import permutations, product
+
 import numpy as np
 
 from triaxcal.errors import RefusedError
+from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.poses import ALIKE_DEG, PoseSet
 from triaxcal.recording.samples import Samples
@@ -14,8 +17,8 @@ CONDITION_MAX = 100.0
 """Of the scaled Jacobian: beyond it a hundredth of a constant's effect tells it from the others."""
 _CROWD = 0.6
 """Of the poses in one orientation: a crowd that is told."""
-_HANDED_MIN = 0.3
-"""Correlation of the movement with the gyro beyond which it decides."""
+_HANDED_MIN = 0.35
+"""Correlation of the movement with the gyro that can decide: logs turned by hand have about 0.5."""
 _MOVING_MIN = 50
 """Samples of movement that can decide."""
 
@@ -50,8 +53,7 @@ def refuse_left_handed(samples: Samples, centre: FloatArray) -> None:
     """Refuse readings that turn the other way than the gyro says; `centre` is a rough bias, (3,).
 
     A force fixed in the world, seen from the turning unit, obeys da/dt = a x w. Over slow movement
-    the correlation of both sides is near +1 for a right-handed pair of triads and near -1 when an
-    axis, or all of the gyro, is turned.
+    both sides correlate for one way of naming and signing the axes: it must be theirs.
     """
     if samples.gyro is None or len(samples.reading) < _MOVING_MIN:
         return
@@ -65,18 +67,48 @@ def refuse_left_handed(samples: Samples, centre: FloatArray) -> None:
     moving = (np.abs(length - middle) < 0.1 * middle) & (speed > np.percentile(speed, 70))
     if moving.sum() < _MOVING_MIN:
         return
-    seen, predicted = change[moving].ravel(), np.cross(force, rate)[moving].ravel()
-    size = float(np.linalg.norm(seen) * np.linalg.norm(predicted))
-    correlation = float(seen @ predicted) / size if size else 0.0
-    if correlation >= -_HANDED_MIN:
+    scores = {
+        turned: _correlation(change[moving] @ matrix.T, force[moving] @ matrix.T, rate[moving])
+        for turned, matrix in _TURNS.items()
+    }
+    best = max(scores, key=lambda turned: scores[turned])
+    own = scores["x, y, z"]
+    if scores[best] < _HANDED_MIN or scores[best] < 2.0 * own:
         return
     raise RefusedError(
         samples.source,
-        f"the readings turn against the gyro (correlation {correlation:.2f})",
+        f"the readings turn with the gyro as x, y, z = {best} would (correlation "
+        f"{scores[best]:.2f}; {own:.2f} as they are)",
         expected="da/dt = a x w, right-handed axes for both",
-        remedy='left-handed axes? turn one sign or exchange two columns, as ["ax", "-ay", "az"]; '
-        "if only the gyro is turned, leave it out",
+        remedy='left-handed axes? set signs and columns so, as ["ax", "-ay", "az"]; if only the '
+        "gyro is turned, leave it out",
     )
+
+
+def _correlation(change: FloatArray, force: FloatArray, rate: FloatArray) -> float:
+    predicted = np.cross(force, rate)
+    size = float(np.linalg.norm(change) * np.linalg.norm(predicted))
+    return float((change * predicted).sum()) / size if size else 0.0
+
+
+def _turns() -> dict[str, FloatArray]:
+    """The 24 ways to name and sign three axes, by their names.
+
+    A sign of all three changes nothing here: of two such ways the one with fewer signs.
+    """
+    turns = {}
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            if sum(signs) < 0.0:
+                continue
+            matrix = np.zeros((3, 3))
+            matrix[np.arange(3), list(order)] = signs
+            words = [("" if s > 0 else "-") + AXES[k] for k, s in zip(order, signs, strict=True)]
+            turns[", ".join(words)] = matrix
+    return turns
+
+
+_TURNS = _turns()
 
 
 def _smooth(values: FloatArray, window: int) -> FloatArray:
@@ -109,16 +141,21 @@ def refuse_few(poses: PoseSet, orientations: int, needed: int) -> None:
         + (f" ({refused})" if refused else ""),
         expected=f"{needed} different orientations at least, 9 for all constants, 12 and more to "
         "have some left to check on",
-        remedy="add poses that are not alike: six faces, then edges and corners",
+        remedy="add poses that are not alike: six faces, then edges and corners"
+        + (
+            "; `triaxcal drift` shows one orientation over temperature"
+            if len(poses.poses) == 1
+            else ""
+        ),
     )
 
 
-def refuse_unseen(poses: PoseSet, condition: float, unseen: str, directions: FloatArray) -> None:
+def refuse_unseen(poses: PoseSet, condition: float, unseen: str) -> None:
     """Refuse poses that leave a constant open; tell a plane from another lack."""
     if condition <= CONDITION_MAX:
         return
-    flat = float(np.linalg.svd(directions, compute_uv=False)[-1]) / np.sqrt(len(directions))
-    plane = ", which lie near one plane," if flat < 0.1 else ""
+    spread = np.linalg.svd(poses.readings - poses.readings.mean(axis=0), compute_uv=False)
+    plane = ", which lie near one plane," if spread[-1] < 0.1 * spread[0] else ""
     raise RefusedError(
         poses.source,
         f"the {len(poses.poses)} poses{plane} leave {unseen} open (condition number "

@@ -61,7 +61,7 @@ def calibrate_poses(
     rows = [judge(trial, data, temps, left_out, unit.loss) for trial in trials]
     if not any(row.able for row in rows):
         largest = max(rows, key=lambda row: -row.trial.parameters)
-        refuse_unseen(poses, largest.fit.condition, largest.fit.unseen(), _directions(data))
+        refuse_unseen(poses, largest.fit.condition, largest.fit.unseen())
         refuse_few(poses, len(orientations), rows[0].trial.parameters + 1)
     values = sum(int(mask.sum()) for mask in left_out)
     deliverable = [row for row in rows if QUADRATIC_IN_C or not len(row.trial.model.quadratic)]
@@ -69,7 +69,7 @@ def calibrate_poses(
     turns = _turns(orientations, temperatures)
     why = reason(deliverable, best, turns, values)
     findings += _outlier(best, poses) + _passed_over(rows, best)
-    measurements = MeasurementSet(poses.source, _dwells(poses, temps))
+    measurements = MeasurementSet(poses.source, pose_dwells(poses, temps))
     made = _Made(unit, layout, poses, temps, rows, best, why, findings)
     return measurements, made.calibration()
 
@@ -82,6 +82,7 @@ def _prepared(
     refuse_wrong_unit(poses.source, poses.readings, layout)
     recorded = poses.temps_degc
     temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
+    refuse_few(poses, len(poses.poses), MODELS[0].parameters)
     ones = np.ones(len(temps))
     rough = scalar_data(poses.readings, ones[:, None], ones, unit.gravity_g)
     refuse_left_handed(samples, rough.centre)
@@ -203,7 +204,8 @@ def _passed_over(rows: list[Judged], best: Judged) -> list[str]:
     return [f"{rival.trial.label} would have {score * 1e3:.3g} mg held out; the firmware is linear"]
 
 
-def _dwells(poses: PoseSet, temps: FloatArray) -> tuple[Dwell, ...]:
+def pose_dwells(poses: PoseSet, temps: FloatArray) -> tuple[Dwell, ...]:
+    """Poses as dwells, named P and their number."""
     return tuple(
         Dwell(
             row=pose.line,
@@ -262,7 +264,6 @@ class _Made:
         terms = Terms(quadratic_per_g=quadratic) if len(fit.model.quadratic) else NO_TERMS
         result = RecordingFit(
             poses=self.poses,
-            reading_unit=self.layout.acceleration_unit,
             route=f"only |a| = g known; frame: {self.layout.frame}",
             covariance=covariance,
             dof=dof,
@@ -299,6 +300,7 @@ class _Made:
             check_dwells=(),
             terms=terms,
             recording=result,
+            reading_unit=self.layout.acceleration_unit,
         )
 
 

@@ -15,8 +15,6 @@ class RecordingFit:
     Attributes
     ----------
     poses : PoseSet
-    reading_unit : str
-        Unit of the readings, which K (unit/g) and U0 carry instead of V.
     route : str
         What was known of the poses, in words.
     covariance : array, shape (12, P, 12, P)
@@ -38,7 +36,6 @@ class RecordingFit:
     """
 
     poses: PoseSet
-    reading_unit: str
     route: str
     covariance: FloatArray
     dof: int

@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.errors import RefusedError
-from triaxcal.fit.calibrate import Calibration
+from triaxcal.fit.acceptance import refuse_unacceptable
+from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.fit.family.faces import face_measurements
 from triaxcal.fit.family.recordings import calibrate_poses
+from triaxcal.fit.family.tables import calibrate_table
 from triaxcal.recording.samples import Samples, read_samples
 from triaxcal.recordinglayout import RecordingLayout
 from triaxcal.records import MeasurementSet
@@ -31,7 +34,15 @@ def calibrate_recording(
     """
     samples = read_samples(folder, layout, unit.temperature_sensor)
     unit = replace(unit, adc=_wide_enough(unit, layout, samples))
-    measurements, calibration = calibrate_poses(unit, layout, samples)
+    if layout.faces:
+        measurements = face_measurements(unit, layout, samples)
+        found = calibrate(unit, measurements)
+        refuse_unacceptable(unit, found, measurements)
+        return unit, measurements, replace(found, reading_unit=layout.acceleration_unit)
+    if layout.angles is not None:
+        measurements, calibration = calibrate_table(unit, layout, layout.angles, samples)
+    else:
+        measurements, calibration = calibrate_poses(unit, layout, samples)
     _refuse_beyond_limits(unit, calibration)
     return unit, measurements, calibration
 

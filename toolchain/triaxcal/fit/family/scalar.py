@@ -17,6 +17,7 @@ singular value of the Jacobian means the same in counts and in m/s^2.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -26,7 +27,10 @@ from scipy.optimize import least_squares
 from triaxcal.model.terms import PRODUCT_AXES, products
 from triaxcal.model.types import BoolArray, FloatArray
 
-LOSSES = ("linear", "huber", "cauchy")
+_STEPS_MAX = 60
+_STEPS_NEAR = 12
+_SETTLED = 1e-13
+"""Of the scaled constants, which are about 1: rounding."""
 _NINE = (("Kxx", 0, 0), ("Kyy", 1, 1), ("Kzz", 2, 2), ("Kxy", 0, 1), ("Kxz", 0, 2), ("Kyz", 1, 2))
 
 
@@ -280,7 +284,7 @@ def fit_scalar(
     gain_functions : int
         How many functions of temperature, the first ones, the entries of K have.
     loss : str
-        One of `LOSSES`; the others than "linear" turn at three robust deviations of its residuals.
+        One of `unitfile.LOSSES`; the robust ones turn at three robust deviations.
     start : array or None
         Theta to start from; None is K = 1 and no bias, in scaled readings.
     """
@@ -292,17 +296,48 @@ def fit_scalar(
     def jacobian(theta: FloatArray) -> FloatArray:
         return _residual(model, gain_functions, data, theta)[1] * data.weight[:, None]
 
+    if start is not None and loss == "linear":
+        theta = _gauss_newton(residual, jacobian, first)
+        if theta is not None:
+            return _fitted(model, gain_functions, data, theta)
     # trf takes fewer poses than parameters: the minimum-norm step, told by the condition number.
     solve = partial(
-        least_squares, residual, jac=jacobian, method="trf", xtol=1e-14, ftol=1e-14, gtol=1e-15
+        least_squares,
+        residual,
+        jac=jacobian,
+        method="trf",
+        xtol=1e-14,
+        ftol=1e-14,
+        gtol=1e-15,
+        max_nfev=_STEPS_MAX,
     )
     found = solve(first)
     if loss != "linear":
         scale = 3.0 * 1.4826 * float(np.median(np.abs(found.fun))) or 1e-9
         found = solve(found.x, loss="huber" if loss == "huber" else "cauchy", f_scale=scale)
-    theta = np.asarray(found.x, dtype=np.float64)
+    return _fitted(model, gain_functions, data, np.asarray(found.x, dtype=np.float64))
+
+
+def _fitted(
+    model: ScalarModel, gain_functions: int, data: ScalarData, theta: FloatArray
+) -> ScalarFit:
     errors, slopes = _residual(model, gain_functions, data, theta)
     return ScalarFit(model, gain_functions, theta, data, slopes * data.weight[:, None], errors)
+
+
+def _gauss_newton(
+    residual: Callable[[FloatArray], FloatArray],
+    jacobian: Callable[[FloatArray], FloatArray],
+    start: FloatArray,
+) -> FloatArray | None:
+    """Solution from a near start in a few steps; None when they do not settle."""
+    theta = start
+    for _ in range(_STEPS_NEAR):
+        step = np.linalg.lstsq(jacobian(theta), -residual(theta), rcond=1e-10)[0]
+        theta = (theta + step).astype(np.float64)
+        if np.abs(step).max() < _SETTLED:
+            return theta
+    return None
 
 
 def _start(model: ScalarModel, data: ScalarData, gain_functions: int) -> FloatArray:
