@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from dataclasses import dataclass
 from functools import cache
@@ -119,12 +120,11 @@ def _render(name: str, context: dict[str, Any], source: str) -> str:
 
 
 _GYRO_WORDS = (
-    ("triax_", "triax_gyro_"), ("TRIAX_", "TRIAX_GYRO_"), ("accel[", "rate["), ("accel)", "rate)"),
-    (" accel ", " rate "), ("TRIAX_GYRO_ACCEL_Q", "TRIAX_GYRO_RATE_Q"),
-    ("TRIAX_GYRO_RATE_Q of the accelerometer", "TRIAX_ACCEL_Q of the accelerometer"),
-    ("TRIAX_GYRO_STATUS", "TRIAX_STATUS"), ("TRIAX_GYRO_ARITHMETIC", "TRIAX_ARITHMETIC"),
-    ("TRIAX_GYRO_PORTABLE", "TRIAX_PORTABLE"), ("TRIAX_GYRO_LIMBS", "TRIAX_LIMBS"),
-    ("TRIAX_GYRO_THUMB2", "TRIAX_THUMB2"),
+    ("triax_", "triax_gyro_"), ("TRIAX_", "TRIAX_GYRO_"),
+    ("TRIAX_GYRO_ACCEL_Q of the accelerometer", "TRIAX_ACCEL_Q of the accelerometer"),
+    ("TRIAX_GYRO_ACCEL_Q", "TRIAX_GYRO_RATE_Q"), ("TRIAX_GYRO_STATUS", "TRIAX_STATUS"),
+    ("TRIAX_GYRO_ARITHMETIC", "TRIAX_ARITHMETIC"), ("TRIAX_GYRO_PORTABLE", "TRIAX_PORTABLE"),
+    ("TRIAX_GYRO_LIMBS", "TRIAX_LIMBS"), ("TRIAX_GYRO_THUMB2", "TRIAX_THUMB2"),
 )  # fmt: skip
 
 
@@ -132,7 +132,7 @@ def gyro_text(text: str) -> str:
     """The same text with a gyro's names; status bits and TRIAX_ARITHMETIC are common to both."""
     for old, new in _GYRO_WORDS:
         text = text.replace(old, new)
-    return text
+    return re.sub(r"\baccel\b", "rate", text)
 
 
 def _routine_context(plan: Plan) -> dict[str, Any]:

@@ -91,10 +91,10 @@ def find_all(work: Workspace) -> list[Finding]:
     ------
     MissingToolError, BrokenToolError
     """
-    (work.folder / USER).write_text(f'#include "{CONSTANTS}"\n')
+    (work.folder / USER).write_text(f'#include "{work.named(CONSTANTS)}"\n')
     lines: dict[str, None] = {}
     for form in FORMS:
-        answer = run([CPPCHECK.find(), *OPTIONS, form, ROUTINE, USER], work.folder)
+        answer = run([CPPCHECK.find(), *OPTIONS, form, work.named(ROUTINE), USER], work.folder)
         if answer.code:
             raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
         lines |= dict.fromkeys(answer.text.splitlines())
