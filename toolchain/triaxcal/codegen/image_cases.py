@@ -279,8 +279,8 @@ def _inverse_edges(layout: Layout, plan: Plan) -> Iterator[Change]:
     if shape.inverse is None:
         return
     largest = INT32_MAX - sum_of_floors(layout.order)
-    for name, k00, k01, u0 in inverse_edges(shape.inverse, largest, shape.rounding_in_offset):
-        constant = {0: k00, 1: k01, 3: u0, 5: largest, 10: largest}
+    for name, k00, k01, u0, k10 in inverse_edges(shape.inverse, largest, shape.rounding_in_offset):
+        constant = {0: k00, 1: k01, 3: u0, 4: k10, 5: largest, 10: largest}
         yield (
             name,
             {

@@ -46,6 +46,7 @@ from triaxcal.fit.tilter import (
     refuse_ill_conditioned,
 )
 from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.thermal import ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.records import Dwell, MeasurementSet
@@ -116,6 +117,8 @@ class Calibration:
         Why this candidate, in words.
     check_dwells : tuple of CheckResult
         In the order of the file.
+    terms : Terms
+        Quadratic and dT/dt terms, where the data carried them.
     """
 
     serial: str
@@ -129,6 +132,7 @@ class Calibration:
     candidates: tuple[Candidate, ...]
     selection_reason: str
     check_dwells: tuple[CheckResult, ...]
+    terms: Terms = NO_TERMS
 
     def constants_covariance(self, temp_degc: FloatArray | float) -> FloatArray:
         """Covariance of the curves' constants, (..., 12, 12), at temperatures of shape (...)."""

@@ -25,6 +25,10 @@ from triaxcal.fixedpoint.formats import FUNCTION_NAMES, ROW_LIMIT
 from triaxcal.fixedpoint.horner import Segment
 from triaxcal.fixedpoint.integer_model import State, set_temperature
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.types import IntArray
+
+_GUARD_BITS = 20
+"""Bits below a coefficient's last to which the worst code is looked for."""
 
 
 @dataclass(frozen=True)
@@ -179,23 +183,37 @@ def _dyadic_shift(plan: Plan, s: int, function: int) -> int:
 
 
 def _direct_errors(plan: Plan, state: State, axis: int) -> list[float]:
-    """Error in LSB, less the final 1/2, at every code."""
+    """Error in LSB, less the final 1/2, at every code that may be the worst; 0 elsewhere."""
     columns = [state.gain[:, axis, j] for j in range(3)]
     columns.append(state.offset[:, axis] - plan.shape.rounding_in_offset)
     exact, shift = _exact_values(plan, range(4 * axis, 4 * axis + 4))
-    errors = [
-        [
-            abs((found << shift) - value)
-            for found, value in zip(column.tolist(), values, strict=True)
-        ]
-        for column, values in zip(columns, exact, strict=True)
-    ]
     box = plan.shape.raw_box
     denominator = 1 << (shift + plan.shape.output_shift)
-    return [
-        ((e0 + e1 + e2) * box + (eb << 32)) / denominator
-        for e0, e1, e2, eb in zip(*errors, strict=True)
-    ]
+    errors = [0.0] * len(exact[0])
+    for t in _candidates(columns, exact, shift, box):
+        e0, e1, e2, eb = (
+            abs((int(column[t]) << shift) - values[t])
+            for column, values in zip(columns, exact, strict=True)
+        )
+        errors[t] = ((e0 + e1 + e2) * box + (eb << 32)) / denominator
+    return errors
+
+
+def _candidates(
+    columns: Sequence[IntArray], exact: Sequence[list[int]], shift: int, box: int
+) -> list[int]:
+    """Codes that the largest error may belong to, by distances known to 2^-20 of a coefficient."""
+    drop = shift - _GUARD_BITS
+    weights = (box, box, box, 1 << 32)
+    total = np.zeros(len(columns[0]))
+    for column, values, weight in zip(columns, exact, weights, strict=True):
+        floor = [v >> drop for v in values] if drop >= 0 else [v << -drop for v in values]
+        distance = np.abs((column << np.int64(_GUARD_BITS)) - np.array(floor, dtype=np.int64))
+        total += distance.astype(np.float64) * float(weight)
+    # Each distance is wrong by less than 1, and each of eight roundings by 2^-53 of the sum.
+    slack = sum(weights) + 2.0**-50 * total.max()
+    found: list[int] = np.flatnonzero(total >= total.max() - 2 * slack).tolist()
+    return found
 
 
 def _inverse_errors(plan: Plan, state: State, axis: int) -> list[float]:
