@@ -98,6 +98,7 @@ def test_the_operators_keys(tmp_path):
     assert terminal.text.rindex("\x1b[?25h") > terminal.text.rindex("\x1b[?25l")
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_a_session_like_q(tmp_path):
     unit, setup = bench_copy(tmp_path), short_setup(tmp_path, temps="[20]")
     terminal = Terminal(["rig", "run", "--bus", "virtual", "--unit", unit, "--plain",
