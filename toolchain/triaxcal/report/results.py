@@ -51,6 +51,8 @@ def calibration_json(delivery: Delivery) -> bytes:
         ],
         "parameter_covariance": calibration.parameter_covariance.tolist(),
         "covariance_source": calibration.covariance_source,
+        "covariance_contains": "the noise of the calibration readings alone; rig, gravity, "
+        "thermometer and thermal model are in passport.json",
         "candidates": [
             {
                 "label": c.label,
