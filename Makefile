@@ -72,6 +72,7 @@ bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 	@$(BIN)/python bench/rig_decode.py
 	@$(BIN)/python bench/rig_receive.py
 	@$(BIN)/python bench/rig_stillness.py
+	@$(BIN)/python bench/rig_kill.py
 
 test-can: $(DEVELOPER)  ## The bench on real SocketCAN: this machine's vcan, or QEMU (2 minutes)
 	@rig/test-can.sh

@@ -14,6 +14,7 @@ PACKAGE = Path(__file__).parent.parent / "toolchain" / "triaxcal"
 ROOM_OF_MODULE = {
     "records": "records",
     "records_csv": "records",
+    "recordinglayout": "records",
     "certificate": "records",
     "measured": "records",
     "tomltable": "records",
@@ -32,9 +33,10 @@ MAY_IMPORT = {
     "ground": set(),
     "model": {"ground"},
     "records": {"ground", "model"},
-    "simulation": {"ground", "model", "records"},
+    "simulation": {"ground", "model", "records", "dynamic"},
     "dynamic": {"ground", "model", "records"},
-    "fit": {"ground", "model", "records"},
+    "recording": {"ground", "model", "records"},
+    "fit": {"ground", "model", "records", "recording"},
     "fixedpoint": {"ground", "model", "records"},
     "codegen": {"ground", "model", "records", "fixedpoint"},
     "publish": {"ground"},
@@ -56,21 +58,26 @@ MAY_IMPORT = {
         "uncertainty",
         "batch",
         "publish",
+        "dynamic",
+        "recording",
     },
 }
 """rig -> records -> fit -> model -> fixedpoint -> codegen -> delivery -> cli, as data flow. A room
 imports what lies before it; none imports report, which reads all, nor cli, which calls all."""
 
 ONLY_IN = {
-    "scipy": {"fit", "dynamic"},
+    "scipy": {"fit", "dynamic", "recording"},  # recording reads MAT-files by it
     "can": {"rig"},
     "cantools": {"rig"},
+    "asammdf": {"rig"},
+    "pyarrow": {"rig", "dynamic"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report"},
     "rich": {"rig", "cli"},
     "dask": {"batch"},
     "distributed": {"batch"},
+    "h5py": {"dynamic"},
 }
 
 

@@ -134,7 +134,8 @@ def outliers(records: Sequence[dict[str, Any]], found: Sequence[Quantity]) -> li
 
 
 def runs(records: Sequence[dict[str, Any]]) -> list[Run]:
-    """Runs by rig and day, each against the run before on its rig."""
+    """Runs of tilters by rig and day, each against the run before on its rig."""
+    records = [r for r in records if r["placement_pattern_g"] is not None]
     groups: dict[tuple[str, str], list[int]] = defaultdict(list)
     for k, r in enumerate(records):
         if r["rig"] or r["date"]:

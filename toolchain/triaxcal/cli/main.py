@@ -17,7 +17,10 @@ from triaxcal.errors import RefusedError
 class _Commands(click.Group):
     """Commands of their own files are imported when they are asked for: `calib` waits for none."""
 
-    OTHERS = ("batch", "design", "history", "rig", "target", "verify")
+    OTHERS = (
+        "batch", "crosscoupling", "design", "drift", "dynamic", "history", "poses", "rig", "target",
+        "verify",
+    )  # fmt: skip
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted([*super().list_commands(ctx), *self.OTHERS])

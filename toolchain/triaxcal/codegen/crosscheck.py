@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from triaxcal.codegen.forces import forces_of, rates_of
 from triaxcal.codegen.routines import Answers, Generated, Int32Array, Routine
 from triaxcal.codegen.ties import ties
 from triaxcal.errors import RefusedError
@@ -22,10 +23,12 @@ from triaxcal.fixedpoint.integer_model import (
     STATUS_TEMP_HIGH,
     STATUS_TEMP_LOW,
     State,
+    add_rate,
     apply,
     set_temperature,
 )
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray, IntArray
 
 NumberArray = TypeVar("NumberArray", IntArray, FloatArray)
@@ -140,13 +143,17 @@ def python_routine(plan: Plan) -> Routine:
             codes = temp[block].astype(np.int64)
             index = np.clip(codes, plan.temp_min_code, plan.temp_max_code) - plan.temp_min_code
             rows = _gather(table, index)
-            state = State(rows[:, :, :3], rows[:, :, 3])
+            offset, flags = rows[:, :, 3], np.zeros(len(codes), np.int64)
+            if plan.rate is not None:
+                offset, flags = add_rate(plan.rate, offset, rates_of(plan.rate, codes))
+            state = State(rows[:, :, :3], offset)
             # Axis by axis in memory, as the integer model works.
             axes = np.ascontiguousarray(raw[block].T, dtype=np.int64).T
-            result, flags = apply(plan, state, axes)
+            force = forces_of(temp[block], raw[block]) if plan.shape.gyro else None
+            result, sample = apply(plan, state, axes, force)
             accel[block] = result
             low, high = codes < plan.temp_min_code, codes > plan.temp_max_code
-            status[block] = flags | low * STATUS_TEMP_LOW | high * STATUS_TEMP_HIGH
+            status[block] = flags | sample | low * STATUS_TEMP_LOW | high * STATUS_TEMP_HIGH
         return accel, status
 
     return run
@@ -218,28 +225,44 @@ def _largest_error(plan: Plan, table: FloatArray, vectors: VectorSet, answers: A
     computed exactly where it was found.
     """
     shape = plan.shape
+    fraction = 2.0 ** (32 - shape.output_shift)
     clean = np.flatnonzero(answers[1] == STATUS_OK)
     found = [(0.0, -1)] * 3
     for start in range(0, len(clean), _BLOCK):
         chosen = clean[start : start + _BLOCK]
         rows = _gather(table, vectors.temp[chosen].astype(np.int64) - plan.temp_min_code)
         u = vectors.raw[chosen].astype(np.float64) * 2.0 ** (shape.raw_shift - 32)
+        real = np.empty((3, len(chosen)))
         for i in range(3):
-            exact = rows[:, i, 3].copy()
+            real[i] = rows[:, i, 3]
             for j in range(3):
-                exact += rows[:, i, j] * u[:, j]
-            error = np.abs(answers[0][chosen, i] - exact * 2.0 ** (32 - shape.output_shift))
+                real[i] += rows[:, i, j] * u[:, j]
+        if plan.rate is not None:
+            fullest = rates_of(plan.rate, vectors.temp[chosen]) * (plan.rate.gain / 2.0**32)
+            real += plan.rate.real[:, None] * fullest
+        if plan.real_quadratic is not None:
+            real = real + plan.real_quadratic @ products(real.T).T * 2.0**-64
+        if plan.real_sensitivity is not None:
+            force = forces_of(vectors.temp[chosen], vectors.raw[chosen]).astype(np.float64)
+            real += plan.real_sensitivity @ force.T * 2.0**-32
+        for i in range(3):
+            error = np.abs(answers[0][chosen, i] - real[i] * fraction)
             worst = int(error.argmax())
             found[i] = max(found[i], (float(error[worst]), int(chosen[worst])))
     return max(
         (
-            abs(
-                exact_error_lsb(
-                    plan, int(vectors.temp[v]), vectors.raw[v].tolist(), i, int(answers[0][v, i])
-                )
-            )
+            abs(_exact_error(plan, vectors, v, i, int(answers[0][v, i])))
             for i, (_, v) in enumerate(found)
             if v >= 0
         ),
         default=0.0,
+    )
+
+
+def _exact_error(plan: Plan, vectors: VectorSet, v: int, axis: int, answer: int) -> float:
+    temp, raw = vectors.temp[v : v + 1], vectors.raw[v : v + 1]
+    rate = 0 if plan.rate is None else int(rates_of(plan.rate, temp)[0])
+    force = forces_of(temp, raw)[0].tolist()
+    return exact_error_lsb(
+        plan, int(temp[0]), raw[0].tolist(), axis, answer, rate_code=rate, force_code=force
     )

@@ -9,20 +9,45 @@ import numpy as np
 
 from triaxcal.fixedpoint.horner import segment_of
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.terms import PRODUCT_AXES
 
 
 def exact_error_lsb(
-    plan: Plan, temp_code: int, raw_code: Sequence[int], axis: int, answer: int
+    plan: Plan,
+    temp_code: int,
+    raw_code: Sequence[int],
+    axis: int,
+    answer: int,
+    *,
+    rate_code: int = 0,
+    force_code: Sequence[int] = (0, 0, 0),
 ) -> float:
     """Signed error of one axis' answer in output LSB, rounded once.
 
-    `temp_code` lies in the working range; the answer is one that no limit touched.
+    `temp_code` and `rate_code` lie in their ranges; the answer is one that no limit touched.
+    `force_code` is what a gyro's g-sensitivity takes.
     """
-    shape = plan.shape
+    exact = _linear(plan, temp_code, raw_code, axis, rate_code)
+    if plan.real_quadratic is not None:
+        linear = [_linear(plan, temp_code, raw_code, i, rate_code) for i in range(3)]
+        for word, (a, b) in zip(plan.real_quadratic[axis].tolist(), PRODUCT_AXES, strict=True):
+            exact += Fraction(word) * linear[a] * linear[b] / 2**64
+    if plan.real_sensitivity is not None:
+        for word, force in zip(plan.real_sensitivity[axis].tolist(), force_code, strict=True):
+            exact += Fraction(word) * force / 2**32
+    return float(answer - exact * Fraction(2) ** (32 - plan.shape.output_shift))
+
+
+def _linear(
+    plan: Plan, temp_code: int, raw_code: Sequence[int], axis: int, rate_code: int
+) -> Fraction:
+    """The linear result of one axis, in units of the state's offset."""
     row = exact_row(plan, temp_code, axis)
-    scaled = [Fraction(u) * Fraction(2) ** (shape.raw_shift - 32) for u in raw_code]
-    exact = row[3] + sum((n * u for n, u in zip(row, scaled, strict=False)), Fraction(0))
-    return float(answer - exact * Fraction(2) ** (32 - shape.output_shift))
+    scale = Fraction(2) ** (plan.shape.raw_shift - 32)
+    total = row[3] + sum((n * u * scale for n, u in zip(row, raw_code, strict=False)), Fraction(0))
+    if plan.rate is not None:
+        total += Fraction(float(plan.rate.real[axis])) * rate_code * plan.rate.gain / 2**32
+    return total
 
 
 def exact_row(plan: Plan, temp_code: int, axis: int) -> list[Fraction]:

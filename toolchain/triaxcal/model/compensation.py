@@ -19,6 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from triaxcal.model.metrological import pack_constants, unpack_constants
+from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
 
@@ -41,11 +42,14 @@ class Compensation:
         "inverse": functions are K (V/g) and U0 (V), a = K^-1 (U - U0).
     curves : PiecewisePolynomial
         Twelve functions, matrix row by row and then the offset, over the working range.
+    terms : Terms
+        Quadratic and dT/dt terms, of the linear result in g.
     """
 
     method: str
     form: str
     curves: PiecewisePolynomial
+    terms: Terms = NO_TERMS
 
     def gain_and_offset(self, temp_degc: FloatArray | float) -> tuple[FloatArray, FloatArray]:
         """N (..., 3, 3) in g/V and b (..., 3) in g at temperatures of shape (...)."""
@@ -53,6 +57,17 @@ class Compensation:
         if self.form == DIRECT:
             return unpack_constants(functions)
         return exact_gain_and_offset(functions)
+
+    def evaluate(
+        self,
+        voltage_v: FloatArray,
+        temp_degc: FloatArray | float,
+        rate_k_per_s: FloatArray | float = 0.0,
+    ) -> FloatArray:
+        """Specific force (..., 3) in g of voltages (..., 3), temperatures and dT/dt (...)."""
+        N, b = self.gain_and_offset(temp_degc)
+        linear = np.einsum("...ij,...j->...i", N, voltage_v) + b
+        return self.terms.force_g(linear, rate_k_per_s)
 
 
 def exact_gain_and_offset(constants: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -82,22 +97,24 @@ def compensate(
     range_degc: tuple[float, float],
     voltage_max_v: float,
     error_max_g: float,
+    *,
+    terms: Terms = NO_TERMS,
 ) -> Compensation:
     """Functions that the device evaluates for a fitted thermal model.
 
     For "matrix" the order of N(T) is the lowest whose error against K(T)^-1 (U - U0(T)) stays
     within `error_max_g` over the range and the box |U_j| <= voltage_max_v, or `MAX_ORDER`: the
-    caller measures what was reached, by `worst_force_error_g`, at every temperature code.
+    caller measures what was reached, by `worst_force_error_g`, at every temperature code. `terms`
+    are taken over as they are: they apply to the linear result, whatever computes it.
     """
     curves = _restrict(thermal.curves, range_degc)
     if method == "inverse":
-        return Compensation(method, INVERSE, curves)
+        return Compensation(method, INVERSE, curves, terms)
     if method == "matrix":
-        return Compensation(
-            method, DIRECT, _fit_inverse(thermal, curves.breaks_degc, voltage_max_v, error_max_g)
-        )
+        fitted = _fit_inverse(thermal, curves.breaks_degc, voltage_max_v, error_max_g)
+        return Compensation(method, DIRECT, fitted, terms)
     correction = _ADDITIVE[method]
-    return Compensation(method, DIRECT, _additive(thermal, curves, correction))
+    return Compensation(method, DIRECT, _additive(thermal, curves, correction), terms)
 
 
 def _restrict(curves: PiecewisePolynomial, range_degc: tuple[float, float]) -> PiecewisePolynomial:

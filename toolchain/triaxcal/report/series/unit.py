@@ -87,7 +87,8 @@ def unit_record(made: Passport) -> dict[str, Any]:
         "at_t0": thermal.constants_at(thermal.t0_degc).tolist(),
         "temperature_coefficients": coefficients(thermal, d.calibration.range_degc).tolist(),
         "at_t0_expanded_uncertainty": u.constants_u[u.t0_index].tolist(),
-        "placement_pattern_g": u.scatter.pattern_g.tolist(),
+        # A recording of poses has no tilter to judge.
+        "placement_pattern_g": None if u.scatter is None else u.scatter.pattern_g.tolist(),
         "bound_lsb": d.bound.lsb,
         "vectors": d.check.total,
         "shape": _shape(d),
