@@ -20,6 +20,7 @@ ROOM_OF_MODULE = {
     "tomltable": "records",
     "unitfile": "records",
     "errors": "ground",
+    "jsontext": "ground",
     "resources": "ground",
     "__init__": "ground",
     "__main__": "cli",
