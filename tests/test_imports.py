@@ -16,6 +16,7 @@ ROOM_OF_MODULE = {
     "records_csv": "records",
     "recordinglayout": "records",
     "certificate": "records",
+    "measured": "records",
     "tomltable": "records",
     "unitfile": "records",
     "errors": "ground",
@@ -31,7 +32,7 @@ MAY_IMPORT = {
     "ground": set(),
     "model": {"ground"},
     "records": {"ground", "model"},
-    "simulation": {"ground", "model", "records"},
+    "simulation": {"ground", "model", "records", "dynamic"},
     "dynamic": {"ground", "model", "records"},
     "recording": {"ground", "model", "records"},
     "fit": {"ground", "model", "records", "recording"},
@@ -39,6 +40,7 @@ MAY_IMPORT = {
     "codegen": {"ground", "model", "records", "fixedpoint"},
     "publish": {"ground"},
     "delivery": {"ground", "model", "records", "fit", "fixedpoint", "codegen"},
+    "design": {"ground", "model", "records"},
     "targets": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
     "uncertainty": {"ground", "model", "records", "fit", "fixedpoint"},
     "verify": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
@@ -53,6 +55,10 @@ MAY_IMPORT = {
         "codegen",
         "delivery",
         "uncertainty",
+        "batch",
+        "publish",
+        "dynamic",
+        "recording",
     },
 }
 """rig -> records -> fit -> model -> fixedpoint -> codegen -> delivery -> cli, as data flow. A room
@@ -62,12 +68,15 @@ ONLY_IN = {
     "scipy": {"fit", "dynamic", "recording"},  # recording reads MAT-files by it
     "can": {"rig"},
     "cantools": {"rig"},
+    "asammdf": {"rig"},
+    "pyarrow": {"rig", "dynamic"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report"},
     "rich": {"rig", "cli"},
     "dask": {"batch"},
     "distributed": {"batch"},
+    "h5py": {"dynamic"},
 }
 
 

@@ -21,6 +21,7 @@ from triaxcal.codegen.routines import (
     Generated,
     Reference,
     Routine,
+    routines_of,
     start_generated,
     start_reference,
 )
@@ -76,8 +77,11 @@ class Delivery:
     files: dict[str, bytes]
 
 
-def deliver(folder: Path) -> Delivery:
+def deliver(folder: Path, reference: Reference | None = None) -> Delivery:
     """Calibrate the unit in `folder`, generate its C and check it.
+
+    `reference` is the handwritten C, which does not depend on the unit, where it has been compiled
+    already.
 
     Raises
     ------
@@ -88,7 +92,8 @@ def deliver(folder: Path) -> Delivery:
         work = Path(name)
         unit = read_unit(folder)
         inputs = inputs_sha256(folder, unit)
-        started.append(start_reference(work))
+        if reference is None:
+            started.append(start_reference(work))
         unit, measurements, calibration = _calibrated(unit, folder)
         dwells = dwells_in_range(unit, calibration.range_degc, measurements)
         compensation = compensation_of(unit, calibration, unit.method)
@@ -103,10 +108,12 @@ def deliver(folder: Path) -> Delivery:
         started.append(start_generated(work, work))
         bound = prove(plan)
         sets = vector_sets(plan)
-        reference, generated = Reference(started[0].load()), Generated(started[1].load())
+        reference = reference or Reference(started[0].load())
+        generated = Generated(started[-1].load())
         image = files[IMAGE_FILE]
-        check = cross_check(plan, sets, generated, reference.routine(image), image)
-        check = replace(check, images=check_images(plan, image, generated, reference))
+        tried = routines_of(plan.rate, generated.library, reference.library)
+        check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
+        check = replace(check, images=check_images(plan, image, *tried))
         _refuse_wrong_bound(unit, bound, check)
         routines = {unit.method: generated.run, **_other_routines(unit, calibration, reference)}
         thermal = calibration.thermal
@@ -130,6 +137,7 @@ def compensation_of(unit: UnitDescription, calibration: Calibration, method: str
         calibration.range_degc,
         voltage_max_v,
         unit.model_error_max_micro_g * 1e-6,
+        terms=calibration.terms,
     )
 
 

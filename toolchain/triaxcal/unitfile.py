@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
 from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certificate_details
 from triaxcal.errors import RefusedError
+from triaxcal.measured import MEASURED_KEYS, Measured, measured_details
 from triaxcal.recordinglayout import DEFAULT_LSB, KEYS, RecordingLayout, recording_layout
 from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
 
@@ -54,6 +55,7 @@ _LAYOUT: Layout = {
     "uncertainty": dict.fromkeys(UNCERTAINTY_MAX, False),
     "certificate": dict.fromkeys(CERTIFICATE_KEYS, False),
     "recording": dict.fromkeys(KEYS, False),
+    "measured": dict.fromkeys(MEASURED_KEYS, False),
 }
 _OF_RECORDING: Layout = {
     **_LAYOUT,
@@ -197,6 +199,7 @@ class UnitDescription:
     terms: str = "auto"
     loss: str = "linear"
     adc_open: bool = False
+    measured: Measured = field(default_factory=Measured)
 
 
 def read_unit(folder: Path) -> UnitDescription:
@@ -318,6 +321,7 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
         terms=_choice(tables["fit"], "terms", TERMS),
         loss=_choice(tables["fit"], "loss", LOSSES),
         adc_open=recording is not None and not tables["adc"].values,
+        measured=measured_details(tables["measured"]),
     )
 
 
