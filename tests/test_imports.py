@@ -14,10 +14,13 @@ PACKAGE = Path(__file__).parent.parent / "toolchain" / "triaxcal"
 ROOM_OF_MODULE = {
     "records": "records",
     "records_csv": "records",
+    "recordinglayout": "records",
     "certificate": "records",
+    "measured": "records",
     "tomltable": "records",
     "unitfile": "records",
     "errors": "ground",
+    "jsontext": "ground",
     "resources": "ground",
     "__init__": "ground",
     "__main__": "cli",
@@ -30,16 +33,18 @@ MAY_IMPORT = {
     "ground": set(),
     "model": {"ground"},
     "records": {"ground", "model"},
-    "simulation": {"ground", "model", "records"},
+    "simulation": {"ground", "model", "records", "dynamic"},
     "dynamic": {"ground", "model", "records"},
-    "fit": {"ground", "model", "records"},
+    "recording": {"ground", "model", "records"},
+    "fit": {"ground", "model", "records", "recording"},
     "fixedpoint": {"ground", "model", "records"},
     "codegen": {"ground", "model", "records", "fixedpoint"},
     "publish": {"ground"},
     "delivery": {"ground", "model", "records", "fit", "fixedpoint", "codegen"},
+    "design": {"ground", "model", "records"},
     "targets": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
     "uncertainty": {"ground", "model", "records", "fit", "fixedpoint"},
-    "verify": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
+    "verify": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery", "targets"},
     "rig": {"ground", "model", "records", "simulation"},
     "batch": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery", "publish"},
     "report": {
@@ -51,23 +56,28 @@ MAY_IMPORT = {
         "codegen",
         "delivery",
         "uncertainty",
+        "batch",
+        "publish",
+        "dynamic",
+        "recording",
     },
 }
 """rig -> records -> fit -> model -> fixedpoint -> codegen -> delivery -> cli, as data flow. A room
 imports what lies before it; none imports report, which reads all, nor cli, which calls all."""
 
 ONLY_IN = {
-    "scipy": {"fit", "dynamic"},
+    "scipy": {"fit", "dynamic", "recording"},  # recording reads MAT-files by it
     "can": {"rig"},
     "cantools": {"rig"},
     "asammdf": {"rig"},
-    "pyarrow": {"rig"},
+    "pyarrow": {"rig", "dynamic"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report"},
     "rich": {"rig", "cli"},
     "dask": {"batch"},
     "distributed": {"batch"},
+    "h5py": {"dynamic"},
 }
 
 

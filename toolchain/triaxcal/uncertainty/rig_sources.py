@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from triaxcal.uncertainty.propagation import RADIANS_PER_ARCSEC, Propagation, mapped
+from triaxcal.uncertainty.propagation import RADIANS_PER_ARCSEC, Curves, Propagation, mapped
 from triaxcal.uncertainty.scatter import Scatter
 from triaxcal.uncertainty.source import NORMAL, STUDENT, Source, from_factor, stated_or
 from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
@@ -27,6 +27,8 @@ def noise(p: Propagation, s: Scatter) -> Source:
     covariance = constants.reshape(-1, 12, 12)
     sd_v = math.sqrt(float(np.mean(s.variance_v2)))
     origin = "dwell statistics, sd / sqrt(count)"
+    if p.data.readings.pooled:
+        origin += ", sd pooled over the dwells: they have few readings"
     if not s.recorded:
         origin = "scatter of the residuals from temperature to temperature"
         if p.groups == 1:
@@ -143,7 +145,7 @@ def gravity(p: Propagation) -> Source:
     )
 
 
-def thermometer(p: Propagation) -> Source:
+def thermometer(p: Curves) -> Source:
     """What the thermometer shows wrong at calibration and in use alike.
 
     It moves the constants along the curves. The device reads the same thermometer, so that the
@@ -166,7 +168,7 @@ def thermometer(p: Propagation) -> Source:
     )
 
 
-def thermometer_drift(p: Propagation) -> Source:
+def thermometer_drift(p: Curves) -> Source:
     """What the thermometer shows otherwise in use than it did at calibration."""
     stated = p.unit.stated.thermometer_drift_degc
     sd, dof, origin = stated_or(stated, DRIFT_DEGC, "thermometer_drift_degc")

@@ -29,7 +29,10 @@ class ImageSegment:
 
 @dataclass(frozen=True)
 class Image:
-    """What an image says; shifts of the inverse form are left out."""
+    """What an image says; shifts of the inverse form are left out.
+
+    `rate` is rate_min, rate_max, rate_gain and the three words.
+    """
 
     inverse_form: bool
     order: int
@@ -38,6 +41,9 @@ class Image:
     raw_max: int
     raw_shift: int
     segments: tuple[ImageSegment, ...]
+    quadratic: tuple[tuple[int, ...], ...] = ()
+    rate: tuple[int, ...] = ()
+    sensitivity: tuple[tuple[int, ...], ...] = ()
 
 
 def read_image(image: bytes) -> Image:
@@ -57,13 +63,26 @@ def read_image(image: bytes) -> Image:
         raise RefusedError("image", "size or CRC is wrong", remedy="write it again")
     form, segments, order, _, output_shift, raw_min, raw_max, raw_shift = words[3:11]
     step = 3 + FUNCTIONS * (order + 1)
-    starts = [HEADER_WORDS + 2 + s * step for s in range(segments)]
-    lasts = [words[start] - 1 for start in starts[1:]] + [words[HEADER_WORDS + 1]]
+    # Version 2 has a word more: which terms there are.
+    header = HEADER_WORDS + words[1] - 1
+    terms = words[HEADER_WORDS] if words[1] == 2 else 0
+    starts = [header + 2 + s * step for s in range(segments)]
+    lasts = [words[start] - 1 for start in starts[1:]] + [words[header + 1]]
+    at_terms = header + 2 + segments * step
+    quadratic = _table(words[at_terms:], 6) if terms & 1 else ()
+    at_rate = at_terms + (18 if terms & 1 else 0)
+    rate = words[at_rate : at_rate + 6] if terms & 2 else ()
+    sensitivity = _table(words[at_terms:], 3) if terms & 4 else ()
     return Image(
         bool(form), order, output_shift, raw_min, raw_max, raw_shift,
         tuple(_segment(words[at : at + step], last, order)
               for at, last in zip(starts, lasts, strict=True)),
+        quadratic, rate, sensitivity,
     )  # fmt: skip
+
+
+def _table(words: tuple[int, ...], columns: int) -> tuple[tuple[int, ...], ...]:
+    return tuple(words[columns * i : columns * (i + 1)] for i in range(3))
 
 
 def _segment(words: tuple[int, ...], last_code: int, order: int) -> ImageSegment:

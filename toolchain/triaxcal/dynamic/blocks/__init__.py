@@ -1,0 +1,1 @@
+"""State blocks: each file is one effect, switched on by its name."""

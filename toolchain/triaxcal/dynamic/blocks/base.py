@@ -1,0 +1,66 @@
+"""Biases, scale factors and misalignments of both triads, P2 (1), (2), (10).
+
+f' - f = df0 + Gamma f with Gamma lower triangular (the instrument's first axis is that of
+accelerometer 1, the second lies in the plane of accelerometers 1 and 2); w' - w = nu0 + Theta w.
+With beta these are the 24 states of the base model. The priors only say that the unit works:
+P2 asks for a unit whose errors are ten times smaller than what it measures.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from triaxcal.dynamic.block import Signals, State, StateBlock, same, spread
+from triaxcal.model.types import FloatArray
+
+MM_PER_S2 = 1e-3
+PPM = 1e-6
+ARCSEC = np.pi / 180 / 3600
+DEG_PER_H = np.pi / 180 / 3600
+LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
+"""Elements of Gamma that are states, row by row."""
+
+
+def _element(name: str, i: int, j: int) -> State:
+    if i == j:
+        return State(f"{name}{i + 1}{j + 1}", "ppm", PPM, 1e5)
+    return State(f"{name}{i + 1}{j + 1}", "arcsec", ARCSEC, 2e4)
+
+
+def _bias_rows(signals: Signals) -> FloatArray:
+    return same(len(signals.force))
+
+
+def _gamma_rows(signals: Signals) -> FloatArray:
+    return spread(signals.force)[:, :, [3 * i + j for i, j in LOWER]]
+
+
+def _theta_rows(signals: Signals) -> FloatArray:
+    return spread(signals.rate)
+
+
+ACCELEROMETER_BIAS = StateBlock(
+    "accelerometer-bias",
+    "accelerometer biases",
+    tuple(State(f"df0_{i}", "mm/s^2", MM_PER_S2, 1000.0) for i in (1, 2, 3)),
+    force=_bias_rows,
+)
+ACCELEROMETER_MATRIX = StateBlock(
+    "accelerometer-matrix",
+    "accelerometer scale factors and misalignments",
+    tuple(_element("Gamma", i, j) for i, j in LOWER),
+    force=_gamma_rows,
+)
+GYRO_BIAS = StateBlock(
+    "gyro-bias",
+    "gyro drifts",
+    tuple(State(f"nu0_{i}", "deg/h", DEG_PER_H, 36000.0) for i in (1, 2, 3)),
+    rate=_bias_rows,
+)
+GYRO_MATRIX = StateBlock(
+    "gyro-matrix",
+    "gyro scale factors and misalignments",
+    tuple(_element("Theta", i, j) for i in range(3) for j in range(3)),
+    rate=_theta_rows,
+)
+BASE = (ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX, GYRO_BIAS, GYRO_MATRIX)

@@ -1,0 +1,37 @@
+"""Delay tau of the accelerometers behind the gyros, P2 (14).
+
+A sample stamped t shows the force of t - tau. Gravity turns in the instrument as f' = -w x f, w
+against the Earth, so f(t - tau) = exp(tau [w]) f(t): to first order the error is tau w x f. With
+P2's hat(w) = -[w] the term of y is therefore -L'^T hat(w) f tau; the sign in print is lost.
+At one constant rate tau cannot be told from a turn of the gyros' axes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from triaxcal.dynamic.attitude import rotation_of
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
+from triaxcal.model.types import FloatArray
+
+
+def rows(signals: Signals) -> FloatArray:
+    """First order: w x f."""
+    return np.cross(signals.turn, signals.force)[:, :, None]
+
+
+def curve(signals: Signals, p: FloatArray) -> FloatArray:
+    """Exact for a rate that is constant over tau."""
+    turned = rotation_of(signals.turn * p[0])
+    later: FloatArray = np.einsum("nij,nj->ni", turned, signals.force) - signals.force
+    return later
+
+
+BLOCK = StateBlock(
+    "delay",
+    "delay of the accelerometers behind the gyros",
+    (State("tau", "ms", 1e-3, 20.0),),
+    motion=rows,
+    motion_curve=curve,
+)
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

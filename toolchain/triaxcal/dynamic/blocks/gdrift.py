@@ -1,0 +1,20 @@
+"""Gyro drift that depends on specific force, P2 (13): nu = ... + D f / g."""
+
+from __future__ import annotations
+
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock, spread
+from triaxcal.dynamic.blocks.base import DEG_PER_H
+from triaxcal.model.types import FloatArray
+
+
+def _rows(signals: Signals) -> FloatArray:
+    return spread(signals.load)
+
+
+BLOCK = StateBlock(
+    "g-drift",
+    "g-dependent gyro drift",
+    tuple(State(f"D{i}{j}", "deg/h/g", DEG_PER_H, 3600.0) for i in (1, 2, 3) for j in (1, 2, 3)),
+    rate=_rows,
+)
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

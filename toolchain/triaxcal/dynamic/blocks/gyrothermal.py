@@ -1,0 +1,25 @@
+"""Linear temperature coefficients of the gyros' drifts and scale factors, P2 (24)."""
+
+from __future__ import annotations
+
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
+from triaxcal.dynamic.blocks.base import DEG_PER_H, PPM
+from triaxcal.dynamic.blocks.thermal import rows
+from triaxcal.model.types import FloatArray
+
+
+def _rate(signals: Signals) -> FloatArray:
+    return rows(signals, signals.rate)
+
+
+BLOCK = StateBlock(
+    "gyro-thermal",
+    "temperature coefficients of the gyros",
+    (
+        *(State(f"knu{i}", "deg/h/degC", DEG_PER_H, 1000.0) for i in (1, 2, 3)),
+        *(State(f"KTheta{i}{i}", "ppm/degC", PPM, 2000.0) for i in (1, 2, 3)),
+    ),
+    rate=_rate,
+    needs="temp_degc",
+)
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

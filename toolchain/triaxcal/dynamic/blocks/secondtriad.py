@@ -1,0 +1,49 @@
+"""A second accelerometer triad at M, P2 (21), (22): three biases, a full matrix, its own delay.
+
+The instrument's axes are those of the first triad, so the second has all nine elements. Its delay
+is its own because its electronics are: with it the states of all blocks number 85.
+"""
+
+from __future__ import annotations
+
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock, same, spread
+from triaxcal.dynamic.blocks.base import ARCSEC, MM_PER_S2, PPM
+from triaxcal.dynamic.blocks.delay import curve, rows
+from triaxcal.model.types import FloatArray
+
+
+def _bias(signals: Signals) -> FloatArray:
+    return same(len(signals.force))
+
+
+def _matrix(signals: Signals) -> FloatArray:
+    return spread(signals.force)
+
+
+BIAS = StateBlock(
+    "second-bias",
+    "biases of the second accelerometer triad",
+    tuple(State(f"df0_{i}", "mm/s^2", MM_PER_S2, 1000.0) for i in (4, 5, 6)),
+    force2=_bias,
+    needs="force2",
+)
+MATRIX = StateBlock(
+    "second-matrix",
+    "scale factors and misalignments of the second accelerometer triad",
+    tuple(
+        State(f"Gamma{i + 3}{j}", *(("ppm", PPM, 1e5) if i == j else ("arcsec", ARCSEC, 2e4)))
+        for i in (1, 2, 3)
+        for j in (1, 2, 3)
+    ),
+    force2=_matrix,
+    needs="force2",
+)
+DELAY = StateBlock(
+    "second-delay",
+    "delay of the second accelerometer triad behind the gyros",
+    (State("tau2", "ms", 1e-3, 20.0),),
+    motion2=rows,
+    motion_curve=curve,
+    needs="force2",
+)
+EXTENSION = Extension("second-triad", "second accelerometer triad", (BIAS, MATRIX, DELAY))

@@ -1,0 +1,48 @@
+"""Positions of the proof masses of accelerometers 2 and 3 against that of 1, which is M, P2 (16).
+
+Accelerometer i at rho feels e_i . (w' x rho + w x (w x rho)) more than M, w against inertial space
+and w' its rate of change. Only one component is felt, so this is no change of a velocity as for
+the lever arm; but with C = L^T, dC/dt = C [w_E] (w_E against the Earth) and E_i = e_i e_i^T,
+
+    integral C E_i [w'] rho = ends of (C E_i [w] rho) - integral C [w_E] E_i [w] rho,
+
+so again no angular acceleration is needed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from triaxcal.dynamic.attitude import skew
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
+from triaxcal.model.types import FloatArray
+
+_MASSES = (1, 2)
+
+
+def _felt(matrix: FloatArray) -> FloatArray:
+    """E_i matrix for each mass side by side, shape (n, 3, 6)."""
+    felt = np.zeros((len(matrix), 3, 6))
+    for place, i in enumerate(_MASSES):
+        felt[:, i, 3 * place : 3 * place + 3] = matrix[:, i]
+    return felt
+
+
+def _ends(signals: Signals) -> FloatArray:
+    return _felt(skew(signals.rate))
+
+
+def _rest(signals: Signals) -> FloatArray:
+    rate = skew(signals.rate)
+    rest: FloatArray = _felt(rate @ rate) - skew(signals.turn) @ _felt(rate)
+    return rest
+
+
+BLOCK = StateBlock(
+    "accelerometer-positions",
+    "positions of accelerometers 2 and 3",
+    tuple(State(f"rho{i}_{j}", "mm", 1e-3, 200.0) for i in (2, 3) for j in (1, 2, 3)),
+    motion=_rest,
+    edges=_ends,
+)
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

@@ -1,0 +1,22 @@
+"""Mounting angles theta between instrument and plate, by the table's angle at rest, P2 (18)."""
+
+from __future__ import annotations
+
+from triaxcal.dynamic.block import Extension, Signals, State, StateBlock, same
+from triaxcal.dynamic.blocks.base import ARCSEC
+from triaxcal.model.types import FloatArray
+
+
+def _rows(signals: Signals) -> FloatArray:
+    return same(len(signals.force))
+
+
+BLOCK = StateBlock(
+    "table-angles",
+    "mounting angles on the table",
+    tuple(State(f"theta{i}", "arcsec", ARCSEC, 2e4) for i in (1, 2, 3)),
+    table=_rows,
+    reset=True,
+    needs="table_angle_rad",
+)
+EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

@@ -1,0 +1,161 @@
+"""The whole road from a recording to the constants: survey, passes, result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.dynamic.block import StateBlock
+from triaxcal.dynamic.blocks import north
+from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
+from triaxcal.dynamic.layout import Layout
+from triaxcal.dynamic.noise import DataSheet
+from triaxcal.dynamic.passdata import PassResult, Reference, Task
+from triaxcal.dynamic.preintegrate import NODES
+from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.survey import Survey, survey
+from triaxcal.dynamic.window import Frame
+from triaxcal.errors import RefusedError
+from triaxcal.model.types import FloatArray
+
+BLOCK_TURN_RAD = 0.2
+BLOCK_MAX_S = 0.5
+HEADING_SD_MAX_RAD = 0.3
+"""Where the Earth's horizontal rate is known better than this, its direction is the heading."""
+PASSES_MAX = 8
+SETTLED_SD = 0.05
+"""A pass that moves no constant by more than this part of its standard deviation is the last."""
+
+Progress = Callable[[int, float], None]
+"""Number of the pass and the part of it that is done."""
+
+
+@dataclass(frozen=True)
+class DynamicResult:
+    """Constants of an IMU from one recording.
+
+    Attributes
+    ----------
+    layout : Layout
+    p, sd : arrays, shape (n,)
+        Constants and standard deviations, SI, in the order of `layout.states`.
+    covariance : array, shape (n, n)
+    stage_p : array, shape (stages, r)
+        Values at each mounting of the states that are new there.
+    heading_rad : array or None
+        Of each section's level frame; None where the unit cannot see the north.
+    survey : Survey
+    frame : Frame
+        Of the last pass.
+    passes : tuple of PassResult
+        The last one gave the result.
+    """
+
+    layout: Layout
+    p: FloatArray
+    sd: FloatArray
+    covariance: FloatArray
+    stage_p: FloatArray
+    heading_rad: FloatArray | None
+    survey: Survey
+    frame: Frame
+    passes: tuple[PassResult, ...]
+
+
+def calibrate_dynamic(
+    recording: ImuRecording, noise: DataSheet, blocks: tuple[StateBlock, ...] = (), *,
+    reference_degc: float = 20.0, progress: Progress | None = None,
+) -> DynamicResult:  # fmt: skip
+    """Constants of the base model and of the `blocks` that are switched on besides.
+
+    Raises
+    ------
+    RefusedError
+        As `survey`; when the passes do not settle.
+    """
+    found = survey(recording)
+    wanted = Layout((*BASE, *blocks))
+    searching = Layout((*wanted.blocks, north.BLOCK))
+    size = _block_size(recording, found)
+    start = _first_reference(searching, recording, found)
+    passes: list[PassResult] = []
+    for number in range(PASSES_MAX):
+        layout = searching if start.heading_rad is None else wanted
+        frame = Frame(
+            layout,
+            recording.rate_convention,
+            recording.force_convention,
+            recording.gravity_m_per_s2,
+            size,
+            1 / recording.rate_hz,
+            reference_degc,
+        )
+
+        def report(part: float, number: int = number) -> None:
+            if progress is not None:
+                progress(number, part)
+
+        task = Task(recording, found, frame, noise)
+        done = run_pass(task, start, first=number == 0, progress=report)
+        passes.append(done)
+        n = len(wanted)
+        sd = np.sqrt((done.root**2).sum(axis=1))
+        moved = float(np.max(np.abs(done.p - start.p)[:n] / sd[:n]))
+        before = start.heading_rad
+        start = _next_reference(start, done, n, recording)
+        same_kind = (before is None) == (start.heading_rad is None)
+        if number >= 2 and moved < SETTLED_SD and same_kind:
+            return DynamicResult(
+                layout,
+                done.p,
+                sd,
+                done.root @ done.root.T,
+                done.stage_p,
+                start.heading_rad,
+                found,
+                frame,
+                tuple(passes),
+            )
+    raise RefusedError(
+        recording.name,
+        f"after {PASSES_MAX} passes the constants still move by {moved:.1f} standard deviations",
+        expected="a recording that the model describes",
+        remedy="look at units, axes, conventions and the noise that unit.toml states",
+    )
+
+
+def _block_size(recording: ImuRecording, found: Survey) -> int:
+    """Samples of a block: a turn of about `BLOCK_TURN_RAD` at the fastest, in whole nodes."""
+    unit = 2 * NODES
+    longest = BLOCK_MAX_S * recording.rate_hz
+    turn = BLOCK_TURN_RAD / max(found.rate_max, 1e-9) * recording.rate_hz
+    return max(1, int(min(longest, turn) // unit)) * unit
+
+
+def _first_reference(layout: Layout, recording: ImuRecording, found: Survey) -> Reference:
+    """Everything zero, but the gyros' biases as seen at rest, less the Earth's vertical rate."""
+    p = np.zeros(len(layout))
+    section = found.sections[0]
+    up = section.force / np.linalg.norm(section.force)
+    vertical = EARTH_RATE_RAD_PER_S * math.sin(math.radians(recording.latitude_deg))
+    p[layout.place("gyro-bias")] = section.rate - up * vertical
+    resets = len(layout.reset_columns())
+    return Reference(p, np.zeros((max(1, len(found.stages)), resets)), None)
+
+
+def _next_reference(
+    start: Reference, done: PassResult, n: int, recording: ImuRecording
+) -> Reference:
+    horizontal = EARTH_RATE_RAD_PER_S * math.cos(math.radians(recording.latitude_deg))
+    if start.heading_rad is not None:
+        heading = start.heading_rad + done.heading_change_rad
+        return Reference(done.p, done.stage_p, heading)
+    rate, sd = done.north[:, 0], done.north[:, 1]
+    if float(sd.max()) > HEADING_SD_MAX_RAD * horizontal:
+        return Reference(done.p, done.stage_p, None)
+    heading = math.pi / 2 - np.arctan2(rate[:, 1], rate[:, 0])
+    return Reference(done.p[:n], done.stage_p, heading)

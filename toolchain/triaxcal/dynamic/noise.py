@@ -1,0 +1,67 @@
+"""Noise of the sensors as their data sheets state it, and as the filter needs it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from triaxcal.dynamic.recording import INCREMENT
+
+ARCSEC = math.pi / 180 / 3600
+DEG_PER_H = math.pi / 180 / 3600
+MICRO_G = 9.80665e-6
+"""Of standard gravity, as data sheets mean it; m/s^2."""
+
+
+@dataclass(frozen=True)
+class DataSheet:
+    """White noise of both triads: a mean over t seconds has the standard deviation N / sqrt(t).
+
+    Attributes
+    ----------
+    gyro_arw_deg_per_sqrt_h : float
+        Angle random walk N of the gyros.
+    accel_vrw_ug_per_sqrt_hz : float
+        Velocity random walk N of the accelerometers, micro-g sqrt(s), which data sheets write
+        micro-g/sqrt(Hz). (A one-sided spectral density is sqrt(2) times N.)
+    second_vrw_ug_per_sqrt_hz : float or None
+        Of the second accelerometer triad; as the first where None.
+    accel_lsb : float
+        One count of the accelerometers: micro-g for instants, mm/s for increments.
+    table_sd_arcsec : float or None
+        One reading of the plate's attitude, about each axis, at rest.
+    axis_wobble_arcsec : float or None
+        How far the table's axis leans while it turns.
+    """
+
+    gyro_arw_deg_per_sqrt_h: float
+    accel_vrw_ug_per_sqrt_hz: float
+    second_vrw_ug_per_sqrt_hz: float | None = None
+    accel_lsb: float = 0.0
+    table_sd_arcsec: float | None = None
+    axis_wobble_arcsec: float | None = None
+
+    @property
+    def rate_density(self) -> float:
+        """Rad per sqrt(s)."""
+        return math.radians(self.gyro_arw_deg_per_sqrt_h) / 60
+
+    def force_density(self, second: bool = False) -> float:
+        """m/s^2 sqrt(s)."""
+        stated = self.second_vrw_ug_per_sqrt_hz
+        density = stated if second and stated is not None else self.accel_vrw_ug_per_sqrt_hz
+        return density * MICRO_G
+
+    def mean_force_variance(
+        self, duration_s: float, samples: int, convention: str, second: bool = False
+    ) -> float:
+        """Variance of the mean of a block of samples, (m/s^2)^2, with the counting of `accel_lsb`.
+
+        Counts of instants are rounded each for itself; those of increments only shift what is
+        left of a count from one interval to the next, so that only the two ends are rounded.
+        """
+        if convention == INCREMENT:
+            counting = 2 * (self.accel_lsb * 1e-3 / duration_s) ** 2 / 12
+        else:
+            counting = (self.accel_lsb * MICRO_G) ** 2 / 12 / samples
+        return self.force_density(second) ** 2 / duration_s + counting

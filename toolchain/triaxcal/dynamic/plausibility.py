@@ -1,0 +1,116 @@
+"""Mistakes of units and axes, seen before anything is fitted.
+
+At rest on the Earth gravity turns in the instrument as f' = -w x f. Over the whole recording this
+gives, by least squares, the matrix M that best makes the turning of the forces out of the measured
+rates. For a sound recording M is near the identity; a factor in it is a wrong unit, and a signed
+permutation is exchanged axes or a left-handed triad.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import permutations, product
+
+import numpy as np
+
+from triaxcal.dynamic.attitude import skew
+from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.windows import Windows
+from triaxcal.errors import RefusedError
+from triaxcal.model.types import FloatArray
+
+GRAVITY_TOLERANCE = 0.25
+"""The force at rest is within a quarter of gravity: coarser units are not meant, wrong ones are."""
+FACTOR_LIMITS = (0.6, 1.6)
+"""M of a unit with errors below ten per cent, and of handling in between, stays well within."""
+START_S = 2.0
+
+
+def refuse_wrong_units(recording: ImuRecording, windows: Windows) -> None:
+    """Refuse what the filter could not tell from a bad unit.
+
+    Raises
+    ------
+    RefusedError
+        For wrong units of force or rate, and for exchanged or left-handed axes.
+    """
+    start = windows.start_s < windows.start_s[0] + START_S
+    _refuse_force(recording, windows.force[start].mean(axis=0))
+    _refuse_rate(recording.name, windows, np.median(windows.rate[start], axis=0))
+
+
+def _refuse_force(recording: ImuRecording, force: FloatArray) -> None:
+    g = recording.gravity_m_per_s2
+    size = float(np.linalg.norm(force))
+    if abs(size / g - 1) > GRAVITY_TOLERANCE:
+        hints = {9.80665: " (g taken for m/s^2?)", 1 / 9.80665: " (m/s^2 taken for g?)"}
+        hint = next((h for k, h in hints.items() if abs(size * k / g - 1) < 0.2), "")
+        raise RefusedError(
+            recording.name,
+            f"the force at the start is {size:.4g} m/s^2{hint}",
+            expected=f"local gravity, {g:.4f} m/s^2, within {100 * GRAVITY_TOLERANCE:.0f} %",
+            remedy="look at force_unit and force_samples in [dynamic]",
+        )
+
+
+def rate_matrix(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """M (3, 3), true rate = M measured rate, and the turn of each gyro, shape (3,), rad.
+
+    Columns of axes that hardly turned are those of the identity.
+    """
+    follows = (np.diff(windows.first) > 0) & (np.diff(windows.section) == 0)
+    force = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
+    step = np.diff(windows.start_s)[:, None]
+    rate = (windows.rate - bias)[:-1] * 0.5 + (windows.rate - bias)[1:] * 0.5
+    middle = (force[1:] + force[:-1]) / 2
+    # f1 - f0 = -(M w) x f dt = [f] M w dt, a linear equation in the nine elements of M.
+    turn = rate * step
+    rows = np.einsum("nij,nk->nijk", skew(middle), turn).reshape(-1, 3, 9)[follows]
+    change = (force[1:] - force[:-1])[follows]
+    turned = np.abs(turn[follows]).sum(axis=0)
+    seen = turned > 0.05 * turned.max() if turned.max() > 0 else np.zeros(3, dtype=bool)
+    columns = np.tile(seen, 3)
+    matrix = np.eye(3)
+    if seen.any():
+        solved = np.linalg.lstsq(rows.reshape(-1, 9)[:, columns], change.ravel(), rcond=None)[0]
+        matrix[:, seen] = solved.reshape(3, -1)
+    return matrix, turned
+
+
+def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
+    matrix, turned = rate_matrix(windows, bias)
+    if turned.max() < 0.01:
+        return
+    best = 0.0
+    order: tuple[int, ...] = (0, 1, 2)
+    signs: tuple[float, ...] = (1.0, 1.0, 1.0)
+    for tried, flips in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        likeness = sum(flips[i] * matrix[i, tried[i]] for i in range(3))
+        if likeness > best + 1e-9:
+            best, order, signs = likeness, tried, flips
+    size = float(np.median([abs(matrix[i, order[i]]) for i in range(3)]))
+    if order != (0, 1, 2) or min(signs) < 0:
+        words = ", ".join(f"{'-' if signs[i] < 0 else ''}{'xyz'[order[i]]}" for i in range(3))
+        handed = np.linalg.det(np.diag(signs)[:, list(order)])
+        kind = "a left-handed triad of gyros"
+        if handed > 0:
+            # Turned axes and a mirrored accelerometer triad look the same in M.
+            kind = "exchanged axes, or a left-handed triad of accelerometers"
+        raise RefusedError(
+            name,
+            f"the forces turn about x, y, z as the gyros' {words} say: {kind}",
+            expected="gyros and accelerometers on the same right-handed axes",
+            remedy="look at the order and signs of rate_columns and force_columns",
+        )
+    if not FACTOR_LIMITS[0] < size < FACTOR_LIMITS[1]:
+        hints = {
+            math.pi / 180: " (degrees taken for radians?)",
+            180 / math.pi: " (radians taken for degrees?)",
+        }
+        hint = next((h for k, h in hints.items() if abs(math.log(size / k)) < 0.5), "")
+        raise RefusedError(
+            name,
+            f"gravity turns in the unit {size:.3g} times as fast as the gyros say{hint}",
+            expected="once",
+            remedy="look at rate_unit and rate_samples in [dynamic]",
+        )

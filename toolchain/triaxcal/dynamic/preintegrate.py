@@ -1,0 +1,252 @@
+"""Samples to the equations of blocks: attitude at the full rate, states at a few points a block.
+
+A block is m consecutive samples, in which the unit turns by no more than about 0.2 rad. In it the
+attitude C = L'^T is carried by every sample, P2 (3), and the mean of
+
+    y = C A^-1 (f' - df0 - ...) - (0, 0, g),       A = 1 + Gamma,
+
+is taken over every sample, P2 (8). What multiplies the states changes by a few degrees between
+points and multiplies small numbers only, so it is taken at `NODES` points of the block. The
+attitude error obeys P2 (6), beta' = hat(u) beta - C nu, and its values between the ends of a block
+follow from both ends (the mean of a Brownian bridge), so that
+
+    beta_1 = Phi beta_0 - G p + w
+    mean y = H ((1 - l) beta_0 + l beta_1) + (F + H (G/2 - Gm)) p + v
+
+    variance of w: N^2 T;    variance of v: a^2/T + g^2 N^2 T/12
+
+with G the integral of C B^-1 (rate rows), Gm its mean over the block, F the mean of the force
+rows, N and a the random walks of angle and velocity, and l the mean place of the samples in the
+block. Taking means loses what the turn within a block averages out: less than 1.5 % of the
+information of terms at twice the turning rate. It biases nothing: the rows are means as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.dynamic.attitude import (
+    matrix_of,
+    quaternion_of,
+    quaternion_product,
+    rotation_of,
+    running_product,
+    skew,
+)
+from triaxcal.dynamic.block import Signals
+from triaxcal.dynamic.window import Window, inverse_of_one_plus
+from triaxcal.model.types import FloatArray
+
+NODES = 5
+
+
+@dataclass(frozen=True)
+class BlockEquations:
+    """Equations of consecutive blocks, not yet whitened.
+
+    Attributes
+    ----------
+    duration_s : array, shape (b,)
+    Phi, G : arrays, shapes (b, 3, 3), (b, 3, n)
+        beta_1 = Phi beta_0 - G p + w.
+    G_lag : array, shape (b, 3, n)
+        G/2 - Gm: what the constants add to beta in between.
+    y, F : arrays, shapes (b, 3), (b, 3, n)
+        Mean of (8) and its rows besides those of beta.
+    y2, F2 : arrays or None
+        The same for the second triad.
+    C : array, shape (b + 1, 3, 3)
+        L'^T at the ends of the blocks.
+    """
+
+    duration_s: FloatArray
+    Phi: FloatArray
+    G: FloatArray
+    G_lag: FloatArray
+    y: FloatArray
+    F: FloatArray
+    y2: FloatArray | None
+    F2: FloatArray | None
+    C: FloatArray
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Signals, and C at the same points."""
+
+    signals: Signals
+    C: FloatArray
+
+
+@dataclass(frozen=True)
+class _Triad:
+    """An accelerometer triad: its samples, its reference constants, the kinds of its rows."""
+
+    samples: FloatArray
+    A_inverse: FloatArray
+    bias: FloatArray
+    force: str
+    motion: str
+    edges: str
+
+
+@dataclass(frozen=True)
+class _Trajectory:
+    """Attitude through the blocks.
+
+    Attributes
+    ----------
+    inner : array, shape (samples, 4)
+        Turn since the window's start at the moment, or middle of the interval, of each force.
+    nodes, force_nodes, edges : _Points
+        At the nodes; the same where the forces stand for; at the ends of what the blocks' forces
+        stand for. Instants stand for half an interval on each side.
+    """
+
+    inner: FloatArray
+    nodes: _Points
+    force_nodes: _Points
+    edges: _Points
+
+
+_EXACT = {"accelerometer-bias", "accelerometer-matrix", "second-bias", "second-matrix"}
+"""Blocks whose reference values are taken off sample by sample, not at the nodes."""
+
+
+def equations(window: Window) -> BlockEquations:
+    """Equations of the blocks of a window."""
+    frame = window.frame
+    turns = window.turns[window.inside]
+    q = running_product(quaternion_of(turns))
+    ends = window.time[window.lead :: frame.block][: window.blocks + 1]
+    duration = np.diff(ends)
+    inner = np.concatenate([np.eye(3)[None], matrix_of(q[frame.block - 1 :: frame.block])])
+    C_ends = window.outward(ends) @ inner
+    path = _trajectory(window, q, turns, C_ends)
+    G, G_lag = _drift_rows(window, path.nodes, duration)
+    y, F = _force_rows(window, _first_triad(window), path, duration)
+    y2, F2 = None, None
+    if "second-matrix" in frame.layout:
+        y2, F2 = _force_rows(window, _second_triad(window), path, duration)
+    Phi = np.eye(3) - skew(window.about.earth) * duration[:, None, None]
+    return BlockEquations(duration, Phi, G, G_lag, y, F, y2, F2, C_ends)
+
+
+def _trajectory(
+    window: Window, q: FloatArray, turns: FloatArray, C_ends: FloatArray
+) -> _Trajectory:
+    frame = window.frame
+    part = frame.block // NODES
+    middle = slice(part // 2 - 1, None, part)
+    C = window.outward(window.time[window.inside][middle]) @ matrix_of(q[middle])
+    mean_rate = window.angles[window.inside] / window.step_s[window.inside, None]
+    mean_rate = mean_rate.reshape(-1, part, 3).mean(axis=1)
+    degc = window.delta_degc[window.inside].reshape(-1, part).mean(axis=1)
+    nodes = _points(window, mean_rate, C, degc)
+    at = window.lead + frame.block * np.arange(window.blocks + 1)
+    after = np.minimum(at + 1, len(window.rate) - 1)
+    between = (window.rate[at] + window.rate[after]) / 2
+    if frame.force_is_increment:
+        q = quaternion_product(q, quaternion_of(-0.5 * turns))
+        edge_rate = between if frame.rate_is_increment else window.rate[at]
+        edges = _points(window, edge_rate, C_ends, window.delta_degc[at])
+        return _Trajectory(q, nodes, nodes, edges)
+    half_s = frame.interval_s / 2
+    edge_rate = window.rate[after] if frame.rate_is_increment else between
+    later = C_ends @ rotation_of(edge_rate * half_s)
+    edges = _points(window, edge_rate, later, window.delta_degc[at])
+    force_nodes = _points(window, mean_rate, C @ rotation_of(mean_rate * half_s), degc)
+    return _Trajectory(q, nodes, force_nodes, edges)
+
+
+def _points(window: Window, rate: FloatArray, C: FloatArray, degc: FloatArray) -> _Points:
+    """Signals whose force is gravity by the attitude: free of the accelerometers' noise."""
+    g = window.frame.gravity
+    turn = rate - np.einsum("nji,j->ni", C, window.about.earth)
+    return _Points(Signals(rate, turn, C[:, 2, :] * g, degc, g), C)
+
+
+def _drift_rows(
+    window: Window, nodes: _Points, duration: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """G and G/2 - Gm, shapes (b, 3, n)."""
+    layout = window.frame.layout
+    G, G_lag = np.zeros((2, window.blocks, 3, len(layout)))
+    turned = nodes.C @ window.inverse_b
+    part_s = np.repeat(duration / NODES, NODES)[:, None, None]
+    # Node i is seen in beta for the NODES - i - 1/2 parts that follow it.
+    lag = 0.5 - (np.arange(NODES)[::-1] + 0.5) / NODES
+    for block, place in layout.columns("rate"):
+        assert block.rate is not None
+        pieces = turned @ block.rate(nodes.signals) * part_s
+        pieces = pieces.reshape(window.blocks, NODES, 3, -1)
+        G[:, :, place] = pieces.sum(axis=1)
+        G_lag[:, :, place] = np.einsum("bkij,k->bij", pieces, lag)
+    if "north" in layout:
+        G[:, [0, 1], layout.place("north")] = np.eye(2) * duration[:, None, None]
+    return G, G_lag
+
+
+def _first_triad(window: Window) -> _Triad:
+    bias = window.part("accelerometer-bias")[:3]
+    return _Triad(window.samples.force, window.inverse_a, bias, "force", "motion", "edges")
+
+
+def _second_triad(window: Window) -> _Triad:
+    assert window.samples.force2 is not None
+    A_inverse = inverse_of_one_plus(window.part("second-matrix").reshape(3, 3))
+    bias = window.part("second-bias")[:3]
+    return _Triad(window.samples.force2, A_inverse, bias, "force2", "motion2", "edges2")
+
+
+def _force_rows(
+    window: Window, triad: _Triad, path: _Trajectory, duration: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Mean y (b, 3) and its rows (b, 3, n)."""
+    layout, p = window.frame.layout, window.about.p
+    y = _mean_force(window, triad, path.inner)
+    y[:, 2] -= window.frame.gravity
+    F = np.zeros((window.blocks, 3, len(layout)))
+    signals, C = path.force_nodes.signals, path.force_nodes.C
+
+    def mean(values: FloatArray) -> FloatArray:
+        found: FloatArray = values.reshape(window.blocks, NODES, 3, -1).mean(axis=1)
+        return found
+
+    for block, place in layout.columns(triad.force):
+        F[:, :, place] = mean(C @ triad.A_inverse @ getattr(block, triad.force)(signals))
+        if block.name not in _EXACT:
+            y -= F[:, :, place] @ p[place]
+    for block, place in layout.columns(triad.motion):
+        F[:, :, place] = mean(C @ getattr(block, triad.motion)(signals))
+        if getattr(block, triad.edges) is not None:
+            velocity = path.edges.C @ getattr(block, triad.edges)(path.edges.signals)
+            F[:, :, place] += np.diff(velocity, axis=0) / duration[:, None, None]
+        if block.motion_curve is None:
+            y -= F[:, :, place] @ p[place]
+        else:
+            error = block.motion_curve(signals, p[place])
+            y -= mean(np.einsum("nij,nj->ni", C, error))[:, :, 0]
+    return y, F
+
+
+def _mean_force(window: Window, triad: _Triad, inner: FloatArray) -> FloatArray:
+    """Mean of C A^-1 (f' - df0) over each block, every sample, shape (b, 3)."""
+    frame, inside = window.frame, window.inside
+    force = window.measured(triad.samples, frame.force_is_increment)[inside]
+    force = (force - triad.bias) @ triad.A_inverse.T
+    time = window.time[inside]
+    if frame.force_is_increment:
+        # Mean over an interval against the value at half of its turn, to second order: the arc's
+        # bend, and, while the rate changes, half of the turn is not in the mean attitude.
+        step = window.step_s[inside]
+        turn, change = window.turns[inside], window.turn_change[inside]
+        force = force - (np.cross(turn, np.cross(turn, force)) + np.cross(change, force)) / 24
+        time = time - step / 2
+    turned = np.einsum("nij,nj->ni", matrix_of(inner), force)
+    means = turned.reshape(window.blocks, frame.block, 3).mean(axis=1)
+    middle = time.reshape(window.blocks, frame.block).mean(axis=1)
+    result: FloatArray = np.einsum("bij,bj->bi", window.outward(middle), means)
+    return result

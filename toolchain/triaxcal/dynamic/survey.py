@@ -1,0 +1,197 @@
+"""What the recording holds: sections without a gap, stand-stills, and axes put on the table.
+
+The survey reads the recording once and keeps means over short windows; nothing is fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.dynamic.plausibility import refuse_wrong_units
+from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.windows import WINDOW_S, Windows, read_windows
+from triaxcal.errors import RefusedError
+from triaxcal.model.types import BoolArray, FloatArray, IntArray
+
+STILL_MIN_S = 10.0
+"""Shortest stand-still that an alignment may start from."""
+STILL_RAD_PER_S = np.radians(0.25)
+"""Change of the rate, against the stand-still before, that is no noise any more."""
+AXIS_COSINE = np.cos(np.radians(25.0))
+"""A turn counts as one about an instrument axis within 25 deg."""
+AXIS_TURN_MIN_RAD = 2 * np.pi
+"""An axis that turned less in all was never put on the table."""
+STAGE_TURN_RAD = np.pi
+"""Less than half a turn about an axis is handling, not a stage."""
+GUARD_S = 2.0
+"""Around handling nothing is believed: what lifts the unit starts and ends slowly."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One axis on the table.
+
+    Attributes
+    ----------
+    axis : int
+        Instrument axis 0, 1, 2 that the unit turned about.
+    start_s, end_s : float
+        From the stand-still before its first turn to the end of its last.
+    turned_rad : float
+        Sum of the turns, both senses.
+    """
+
+    axis: int
+    start_s: float
+    end_s: float
+    turned_rad: float
+
+
+@dataclass(frozen=True)
+class Section:
+    """Samples without a gap between them, which begin with a stand-still.
+
+    Attributes
+    ----------
+    first, last : int
+        Numbers of the samples.
+    start_s, still_s : float
+        Time of the first sample; length of the stand-still.
+    rate, force : arrays, shape (3,)
+        Means over the stand-still, as measured.
+    """
+
+    first: int
+    last: int
+    start_s: float
+    still_s: float
+    rate: FloatArray
+    force: FloatArray
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Everything the filter must know of a recording before it starts.
+
+    Attributes
+    ----------
+    windows : Windows
+    sections : tuple of Section
+    stages : tuple of Stage
+    use : array, shape (w,), bool
+        Windows in which the unit stands or turns on the table; the others are handling.
+    still : array, shape (w,), bool
+    rate_max : float
+        Largest mean rate in a stage, rad/s.
+    temp_mean_degc : float
+        nan where there is no temperature.
+    """
+
+    windows: Windows
+    sections: tuple[Section, ...]
+    stages: tuple[Stage, ...]
+    use: BoolArray
+    still: BoolArray
+    rate_max: float
+    temp_mean_degc: float
+
+
+def survey(recording: ImuRecording) -> Survey:
+    """Read a recording once.
+
+    Raises
+    ------
+    RefusedError
+        As `read_windows` and `refuse_wrong_units`; when a section does not begin with a stand-still
+        of `STILL_MIN_S`; when an axis was never rotated.
+    """
+    windows, edges, temp_mean = read_windows(recording)
+    refuse_wrong_units(recording, windows)
+    sections, still = [], np.zeros(len(windows.first), dtype=bool)
+    for number, (first, last) in enumerate(edges):
+        inside = np.flatnonzero(windows.section == number)
+        section, standing = _section(recording.name, windows, inside, first, last)
+        sections.append(section)
+        still[inside] = standing
+    stages, use = _stages(windows, sections, still)
+    _refuse_missing_axis(recording.name, stages)
+    speed = np.linalg.norm(windows.rate, axis=1)
+    rate_max = float(speed[use].max())
+    return Survey(windows, tuple(sections), stages, use, still, rate_max, temp_mean)
+
+
+def _section(
+    name: str, windows: Windows, inside: IntArray, first: int, last: int
+) -> tuple[Section, BoolArray]:
+    """Stand-still at the start of a section, and which of its windows stand."""
+    rate, start = windows.rate[inside], windows.start_s[inside]
+    few = max(2, round(2.0 / WINDOW_S))
+    reference = np.median(rate[:few], axis=0)
+    standing: BoolArray = np.abs(rate - reference).max(axis=1) < STILL_RAD_PER_S
+    run = len(standing) if standing.all() else int(np.argmin(standing))
+    length_s = float(windows.duration_s[inside][:run].sum())
+    if length_s < STILL_MIN_S:
+        speed = np.degrees(np.linalg.norm(rate[run] - reference)) if run < len(rate) else 0.0
+        raise RefusedError(
+            f"{name}, {start[0]:.1f} s",
+            f"stands still for {length_s:.1f} s, then turns at {speed:.1f} deg/s",
+            expected=f"at least {STILL_MIN_S:.0f} s at rest at the start and after each gap",
+            remedy="let the unit stand before the first turn",
+        )
+    kept = slice(0, max(1, run - 1))
+    mean_rate, mean_force = rate[kept].mean(axis=0), windows.force[inside][kept].mean(axis=0)
+    return Section(first, last, float(start[0]), length_s, mean_rate, mean_force), standing
+
+
+def _stages(
+    windows: Windows, sections: list[Section], still: BoolArray
+) -> tuple[tuple[Stage, ...], BoolArray]:
+    """Stages, and the windows that belong to one or stand still."""
+    bias = np.array([section.rate for section in sections])[windows.section]
+    rate = windows.rate - bias
+    speed = np.linalg.norm(rate, axis=1)
+    axis = np.argmax(np.abs(rate), axis=1)
+    along = np.abs(rate[np.arange(len(rate)), axis]) >= AXIS_COSINE * speed
+    label = np.where(still, -1, np.where(along, axis, -2))
+    turning = np.flatnonzero(label != -1)
+    use = still.copy()
+    stages: list[Stage] = []
+    if len(turning) == 0:
+        return (), use
+    # Runs of turning windows about the same axis of the same section, stand-stills disregarded.
+    key = label[turning] + 4 * windows.section[turning]
+    breaks = np.flatnonzero(np.diff(key)) + 1
+    end_before = windows.start_s[0]
+    for run in np.split(turning, breaks):
+        turned = float((speed[run] * windows.duration_s[run]).sum())
+        kind = int(label[run[0]])
+        end = float(windows.start_s[run[-1]] + windows.duration_s[run[-1]])
+        if kind >= 0 and turned >= STAGE_TURN_RAD:
+            use[run] = True
+            last = stages[-1] if stages else None
+            if last is not None and last.axis == kind:
+                stages[-1] = Stage(kind, last.start_s, end, last.turned_rad + turned)
+            else:
+                stages.append(Stage(kind, float(end_before), end, turned))
+        end_before = end
+    return tuple(stages), use & ~_widened(~use, round(GUARD_S / WINDOW_S))
+
+
+def _widened(marked: BoolArray, by: int) -> BoolArray:
+    """Marks, and `by` windows more on each side of them."""
+    near: BoolArray = np.convolve(marked.astype(np.float64), np.ones(2 * by + 1), mode="same") > 0.5
+    return near
+
+
+def _refuse_missing_axis(name: str, stages: tuple[Stage, ...]) -> None:
+    for axis in range(3):
+        turn = sum(stage.turned_rad for stage in stages if stage.axis == axis)
+        if turn < AXIS_TURN_MIN_RAD:
+            raise RefusedError(
+                name,
+                f"turns about axis {'xyz'[axis]} by {turn / (2 * np.pi):.2f} revolutions in all",
+                expected="some revolutions about each axis x, y, z in turn",
+                remedy="put that axis along the table's and rotate",
+            )

@@ -1,0 +1,126 @@
+"""Means of a recording over short windows, from one reading of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from triaxcal.dynamic.recording import INCREMENT, ImuRecording
+from triaxcal.errors import RefusedError
+from triaxcal.model.types import FloatArray, IntArray
+
+WINDOW_S = 0.1
+GAP_INTERVALS = 1.5
+"""A step of time longer than so many intervals is a gap."""
+SATURATED_S = 0.25
+"""A gyro that stays exactly at its largest value for so long has met its full scale."""
+SATURATED_RAD_PER_S = np.radians(5.0)
+CHUNK = 1 << 16
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Means over windows of `WINDOW_S`.
+
+    Attributes
+    ----------
+    start_s, duration_s : arrays, shape (w,)
+    first : array, shape (w,)
+        Number of the first sample.
+    rate, force : arrays, shape (w, 3)
+        rad/s, m/s^2, as measured.
+    section : array, shape (w,)
+        Number of the section without a gap.
+    """
+
+    start_s: FloatArray
+    duration_s: FloatArray
+    first: IntArray
+    rate: FloatArray
+    force: FloatArray
+    section: IntArray
+
+
+def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]], float]:
+    """Read a recording once.
+
+    Returns
+    -------
+    windows : Windows
+    sections : list of (first, last)
+        Numbers of the samples of each section.
+    temp_mean_degc : float
+        nan where there is no temperature.
+
+    Raises
+    ------
+    RefusedError
+        When a gyro stands at its largest value as if it could read no more.
+    """
+    length = max(1, round(WINDOW_S * recording.rate_hz))
+    interval = 1 / recording.rate_hz
+    rows: list[tuple[Any, ...]] = []
+    edges: list[tuple[int, int]] = [(0, -1)]
+    previous_s, count = None, 0
+    temps = []
+    for chunk in recording.chunks(CHUNK // length * length):
+        step = np.diff(chunk.time_s, prepend=chunk.time_s[0] - interval)
+        if previous_s is not None:
+            step[0] = chunk.time_s[0] - previous_s
+        cuts = [0, *np.flatnonzero(step > GAP_INTERVALS * interval), len(chunk)]
+        rate = chunk.rate / step[:, None] if recording.rate_convention == INCREMENT else chunk.rate
+        _refuse_saturation(recording, chunk.time_s, chunk.rate, rate)
+        force = chunk.force
+        if recording.force_convention == INCREMENT:
+            force = force / step[:, None]
+        for number, (a, b) in enumerate(pairwise(cuts)):
+            if number > 0:
+                edges[-1] = (edges[-1][0], count + int(a) - 1)
+                edges.append((count + int(a), -1))
+            begin = int(a) + (1 if number > 0 else 0)  # an increment over a gap is none
+            starts = np.arange(begin, int(b), length)
+            if len(starts) == 0:
+                continue
+            sizes = np.diff(starts, append=int(b))
+            rows.append(
+                (
+                    chunk.time_s[starts],
+                    sizes * interval,
+                    count + starts,
+                    np.add.reduceat(rate[: int(b)], starts) / sizes[:, None],
+                    np.add.reduceat(force[: int(b)], starts) / sizes[:, None],
+                    np.full(len(starts), len(edges) - 1),
+                )
+            )
+        if chunk.temp_degc is not None:
+            temps.append(float(chunk.temp_degc.mean()))
+        count += len(chunk)
+        previous_s = float(chunk.time_s[-1])
+    edges[-1] = (edges[-1][0], count - 1)
+    columns = [np.concatenate(column) for column in zip(*rows, strict=True)]
+    return Windows(*columns), edges, float(np.mean(temps)) if temps else float("nan")
+
+
+def _refuse_saturation(
+    recording: ImuRecording, time_s: FloatArray, raw: FloatArray, rate: FloatArray
+) -> None:
+    length = max(5, round(SATURATED_S * recording.rate_hz))
+    for axis in range(3):
+        size = np.abs(raw[:, axis])
+        largest = float(size.max())
+        flat = np.flatnonzero(size == largest)
+        if len(flat) < length or abs(rate[flat[0], axis]) < SATURATED_RAD_PER_S:
+            continue
+        runs = np.split(flat, np.flatnonzero(np.diff(flat) != 1) + 1)
+        run = max(runs, key=len)
+        if len(run) >= length:
+            raise RefusedError(
+                f"{recording.name}, {time_s[run[0]]:.1f} s",
+                f"gyro {'xyz'[axis]} reads exactly {np.degrees(rate[run[0], axis]):.4g} deg/s "
+                f"{len(run)} times on end: it is saturated",
+                expected="rates within the gyros' range",
+                remedy="turn more slowly",
+            )

@@ -1,0 +1,232 @@
+"""Results of a dynamic calibration: calibration.json, the report page, the text on the screen."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from triaxcal import __version__
+from triaxcal.codegen.render import environment
+from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.unit import DynamicUnit
+
+FORMAT = 1
+FILES = ("calibration.json", "dynamic.html")
+PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
+BAND = 10.0
+"""Panels show so many final standard deviations on each side."""
+
+
+def dynamic_files(done: DynamicUnit) -> dict[str, bytes]:
+    """Name and content of everything that build/<UNIT>/ receives."""
+    return {"calibration.json": _calibration_json(done), "dynamic.html": _page(done)}
+
+
+def _calibration_json(done: DynamicUnit) -> bytes:
+    unit, result, seen = done.unit, done.result, done.seen
+    layout, last = result.layout, result.passes[-1]
+    document: dict[str, Any] = {
+        "format": FORMAT,
+        "kind": "dynamic",
+        "triaxcal": __version__,
+        "unit": unit.name,
+        "serial": unit.serial,
+        "recording": unit.recording.name,
+        "reference_degc": unit.reference_degc,
+        "local_gravity_m_per_s2": unit.gravity_m_per_s2,
+        "latitude_deg": unit.latitude_deg,
+        "blocks": list(unit.blocks),
+        "states": [
+            {
+                "name": state.name,
+                "unit": state.unit,
+                "si_per_unit": state.per_unit,
+                "value": float(result.p[i]),
+                "sd": float(result.sd[i]),
+                "prior_sd": state.prior_sd * state.per_unit,
+            }
+            for i, state in enumerate(layout.states)
+        ],
+        "covariance": result.covariance.tolist(),
+        "each_mounting": {
+            "states": [layout.states[int(i)].name for i in layout.reset_columns()],
+            "values": result.stage_p.tolist(),
+        },
+        "heading_rad": None if result.heading_rad is None else result.heading_rad.tolist(),
+        "stages": [
+            {
+                "axis": "xyz"[stage.axis],
+                "start_s": stage.start_s,
+                "end_s": stage.end_s,
+                "turned_rad": stage.turned_rad,
+            }
+            for stage in result.survey.stages
+        ],
+        "passes": len(result.passes),
+        "innovations": {
+            "chi_square": last.chi_square,
+            "freedom": last.freedom,
+            "verdict": verdict(result),
+        },
+        "switched_off": [
+            {"name": e.name, "chi_square": e.chi_square, "states": e.states, "shown": e.shown}
+            for e in done.off
+        ],
+        "not_seen": [list(names) for names in seen.unseen],
+        "known_only_together": [list(pair) for pair in seen.together],
+    }
+    return (json.dumps(document, indent=1) + "\n").encode()
+
+
+def verdict(result: DynamicResult) -> str:
+    """Whether the innovations are what the stated noise gives; one sentence."""
+    last = result.passes[-1]
+    ratio = last.chi_square / last.freedom
+    if ratio > 1.1:
+        return (
+            f"innovations {math.sqrt(ratio):.2f} times the stated noise: an effect that is not "
+            "switched on, or more noise than stated"
+        )
+    if ratio < 0.5:
+        return f"innovations {math.sqrt(ratio):.2f} times the stated noise: less noise than stated"
+    return f"innovations {math.sqrt(ratio):.2f} times the stated noise: consistent"
+
+
+def _digits(value: float, sd: float) -> str:
+    """Value to the second digit of its standard deviation."""
+    places = max(0, 1 - math.floor(math.log10(sd))) if sd > 0 else 3
+    return f"{value:.{min(places, 9)}f}"
+
+
+def dynamic_summary(done: DynamicUnit, target: str) -> str:
+    """Text for the screen."""
+    unit, result, seen = done.unit, done.result, done.seen
+    layout = result.layout
+    found = result.survey
+    last = result.passes[-1]
+    lines = [
+        f"unit            {unit.name}  (serial {unit.serial})",
+        f"recording       {unit.recording.name}: {found.sections[-1].last + 1:_} samples, "
+        f"{len(found.sections)} section{'s' * (len(found.sections) > 1)}, first "
+        f"{found.sections[0].still_s:.0f} s at rest".replace("_", " "),
+    ]
+    for stage in found.stages:
+        lines.append(
+            f"  axis {'xyz'[stage.axis]}        {stage.start_s:7.0f} to {stage.end_s:6.0f} s, "
+            f"{stage.turned_rad / 2 / math.pi:.1f} revolutions"
+        )
+    lines += [
+        f"filter          {3 + len(layout)} states, {len(result.passes)} passes, "
+        f"{last.freedom:_} measurements".replace("_", " "),
+        f"                {verdict(result)}",
+        "",
+    ]
+    for block in layout.blocks:
+        lines.append(block.title)
+        place = layout.place(block.name)
+        for i, state in enumerate(block.states, start=place.start):
+            value, sd = result.p[i] / state.per_unit, result.sd[i] / state.per_unit
+            found_sd = f"{_digits(sd, sd):<10s} {state.unit}"
+            lines.append(f"  {state.name:9s} {_digits(value, sd):>14s} +- {found_sd}")
+    if done.off:
+        lines += ["", "effects switched off, chi-square of their states in this recording:"]
+        for effect in done.off:
+            call = "  SHOWN: switch it on" if effect.shown else ""
+            size = f"{effect.chi_square:.1f} of {effect.states}"
+            lines.append(f"  {effect.name:24s} {size:>14s}{call}")
+    if seen.unseen:
+        lines += ["", "not seen by this motion (the values above are the prior's guess):"]
+        lines += ["  " + " with ".join(names) for names in seen.unseen]
+    if seen.together:
+        lines += ["", "known only together:"]
+        lines += [f"  {a} and {b}, correlation {c:+.4f}" for a, b, c in seen.together]
+    lines += ["", f"files           {target}/", "                " + " ".join(FILES)]
+    return "\n".join(lines)
+
+
+def _page(done: DynamicUnit) -> bytes:
+    unit, result, seen = done.unit, done.result, done.seen
+    layout = result.layout
+    context = {
+        "unit": unit,
+        "result": result,
+        "verdict": verdict(result),
+        "samples": f"{result.survey.sections[-1].last + 1:_}".replace("_", " "),
+        "stages": [
+            {
+                "axis": "xyz"[s.axis],
+                "start": f"{s.start_s:.0f}",
+                "end": f"{s.end_s:.0f}",
+                "turns": f"{s.turned_rad / 2 / math.pi:.1f}",
+            }
+            for s in result.survey.stages
+        ],
+        "blocks": [
+            {
+                "title": block.title,
+                "panels": [_panel(result, i) for i in _range(layout.place(block.name))],
+            }
+            for block in layout.blocks
+        ],
+        "innovations": _innovations(result),
+        "off": [(e.title, f"{e.chi_square:.1f}", e.states, e.name, e.shown) for e in done.off],
+        "unseen": seen.unseen,
+        "together": [(a, b, f"{c:+.4f}") for a, b, c in seen.together],
+        "width": PANEL_WIDTH,
+        "height": PANEL_HEIGHT,
+        "version": __version__,
+    }
+    return environment().get_template("dynamic.html.j2").render(context).encode()
+
+
+def _range(place: slice) -> range:
+    return range(place.start, place.stop)
+
+
+def _panel(result: DynamicResult, i: int) -> dict[str, str]:
+    """Estimate and its three standard deviations over time, about the final estimate."""
+    state, history = result.layout.states[i], result.passes[-1].history
+    time = np.array(history.time_s)
+    p = np.array([row[i] for row in history.p])
+    sd = np.array([row[i] for row in history.sd])
+    final, unit_sd = result.p[i] / state.per_unit, result.sd[i] / state.per_unit
+    span = BAND * result.sd[i]
+    x = PANEL_WIDTH * (time - time[0]) / max(time[-1] - time[0], 1e-9)
+
+    def y(values: Any) -> Any:
+        return PANEL_HEIGHT / 2 * (1 - np.clip((values - result.p[i]) / span, -1, 1))
+
+    upper = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p + 3 * sd), strict=True)]
+    lower = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p - 3 * sd), strict=True)]
+    return {
+        "name": state.name,
+        "value": f"{_digits(final, unit_sd)} ± {_digits(unit_sd, unit_sd)} {state.unit}",
+        "scale": f"± {_digits(BAND * unit_sd, BAND * unit_sd)}",
+        "band": " ".join(upper + lower[::-1]),
+        "line": " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p), strict=True)),
+    }
+
+
+def _innovations(result: DynamicResult) -> dict[str, Any]:
+    """Chi-square per degree of freedom between checkpoints, with the band that noise fills."""
+    history = result.passes[-1].history
+    chi, freedom = np.array(history.chi_square), np.array(history.freedom, dtype=float)
+    time = np.array(history.time_s)
+    step = np.diff(freedom)
+    keep = step > 0
+    ratio = np.diff(chi)[keep] / step[keep]
+    width, height, top = 4 * PANEL_WIDTH, PANEL_HEIGHT, max(2.0, float(ratio.max(initial=0)) * 1.05)
+    x = width * (time[1:][keep] - time[0]) / max(time[-1] - time[0], 1e-9)
+    band = 3 * np.sqrt(2 / step[keep])
+    return {
+        "width": width,
+        "points": [
+            {"x": f"{a:.1f}", "y": f"{height * (1 - r / top):.1f}", "out": bool(abs(r - 1) > b)}
+            for a, r, b in zip(x, ratio, band, strict=True)
+        ],
+        "one": f"{height * (1 - 1 / top):.1f}",
+        "top": f"{top:.1f}",
+    }

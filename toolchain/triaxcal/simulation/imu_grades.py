@@ -1,0 +1,173 @@
+"""Grades of simulated IMUs, and units drawn from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from triaxcal.dynamic.recording import INCREMENT, INSTANT
+from triaxcal.model.types import FloatArray
+from triaxcal.simulation.imu_truth import ImuNoise, ImuTruth, SecondTriad
+
+
+@dataclass(frozen=True)
+class Grade:
+    """A class of units: how far its constants lie from nominal (one sigma), and its noise.
+
+    Attributes
+    ----------
+    name : str
+    noise : ImuNoise
+    rate_convention, force_convention : str
+    gyro_bias_deg_per_h ... second_bias_mm_per_s2 : float
+        Standard deviations, as the attributes of `ImuTruth` and `SecondTriad`.
+    """
+
+    name: str
+    noise: ImuNoise
+    rate_convention: str
+    force_convention: str
+    gyro_bias_deg_per_h: float
+    gyro_scale_ppm: float
+    gyro_misalignment_arcsec: float
+    accel_bias_mm_per_s2: float
+    accel_scale_ppm: float
+    accel_misalignment_arcsec: float
+    gyro_g_deg_per_h_per_g: float
+    accel_delay_ms: float
+    accel_position_mm: float
+    mount_elasticity_arcsec_per_g: float
+    gyro_elasticity_arcsec_per_g: float
+    accel_bias_mm_per_s2_per_k: float
+    accel_scale_ppm_per_k: float
+    gyro_bias_deg_per_h_per_k: float
+    gyro_scale_ppm_per_k: float
+    second_bias_mm_per_s2: float
+    second_scale_ppm: float
+
+
+AVIATION = Grade(
+    # Ring laser gyros that count fringes, quartz accelerometers behind a charge-balance counter.
+    name="aviation",
+    noise=ImuNoise(
+        gyro_arw_deg_per_sqrt_h=0.002,
+        accel_vrw_ug_per_sqrt_hz=10.0,
+        gyro_lsb=0.1,
+        accel_lsb=0.01,
+        temp_sd_degc=0.01,
+        table_sd_arcsec=1.0,
+    ),
+    rate_convention=INCREMENT,
+    force_convention=INCREMENT,
+    gyro_bias_deg_per_h=0.1,
+    gyro_scale_ppm=50.0,
+    gyro_misalignment_arcsec=60.0,
+    accel_bias_mm_per_s2=5.0,
+    accel_scale_ppm=200.0,
+    accel_misalignment_arcsec=60.0,
+    gyro_g_deg_per_h_per_g=0.05,
+    accel_delay_ms=1.0,
+    accel_position_mm=20.0,
+    mount_elasticity_arcsec_per_g=15.0,
+    gyro_elasticity_arcsec_per_g=1.5,
+    accel_bias_mm_per_s2_per_k=0.1,
+    accel_scale_ppm_per_k=10.0,
+    gyro_bias_deg_per_h_per_k=0.005,
+    gyro_scale_ppm_per_k=1.0,
+    second_bias_mm_per_s2=10.0,
+    second_scale_ppm=500.0,
+)
+MEMS = Grade(
+    # A tactical-to-industrial part with instantaneous readings over a digital bus.
+    name="mems",
+    noise=ImuNoise(
+        gyro_arw_deg_per_sqrt_h=0.3,
+        accel_vrw_ug_per_sqrt_hz=100.0,
+        gyro_lsb=3.6,
+        accel_lsb=10.0,
+        temp_sd_degc=0.05,
+        table_sd_arcsec=60.0,
+    ),
+    rate_convention=INSTANT,
+    force_convention=INSTANT,
+    gyro_bias_deg_per_h=500.0,
+    gyro_scale_ppm=3000.0,
+    gyro_misalignment_arcsec=600.0,
+    accel_bias_mm_per_s2=30.0,
+    accel_scale_ppm=3000.0,
+    accel_misalignment_arcsec=600.0,
+    gyro_g_deg_per_h_per_g=50.0,
+    accel_delay_ms=5.0,
+    accel_position_mm=10.0,
+    mount_elasticity_arcsec_per_g=120.0,
+    gyro_elasticity_arcsec_per_g=30.0,
+    accel_bias_mm_per_s2_per_k=1.0,
+    accel_scale_ppm_per_k=50.0,
+    gyro_bias_deg_per_h_per_k=10.0,
+    gyro_scale_ppm_per_k=50.0,
+    second_bias_mm_per_s2=50.0,
+    second_scale_ppm=5000.0,
+)
+GRADES = {grade.name: grade for grade in (AVIATION, MEMS)}
+
+EFFECTS: dict[str, tuple[str, ...]] = {
+    "g-drift": ("gyro_g_deg_per_h_per_g",),
+    "delay": ("accel_delay_ms",),
+    "accel-positions": ("accel_position_mm",),
+    "mount-elasticity": ("mount_elasticity_arcsec_per_g",),
+    "gyro-elasticity": ("gyro_elasticity_arcsec_per_g",),
+    "second-triad": ("second",),
+    "accel-temperature": ("accel_bias_mm_per_s2_per_k", "accel_scale_ppm_per_k"),
+    "gyro-temperature": ("gyro_bias_deg_per_h_per_k", "gyro_scale_ppm_per_k"),
+}
+"""Effects of the unit beyond the base model, and the attributes of `ImuTruth` that hold them."""
+
+_BASE = (
+    "gyro_bias_deg_per_h",
+    "gyro_scale_ppm",
+    "gyro_misalignment_arcsec",
+    "accel_bias_mm_per_s2",
+    "accel_scale_ppm",
+    "accel_misalignment_arcsec",
+)
+
+
+def draw_truth(grade: Grade, seed: int, effects: tuple[str, ...] = ()) -> ImuTruth:
+    """A unit of a grade: every constant drawn from its normal distribution.
+
+    `effects` are keys of `EFFECTS`; what is left out is absent. Each attribute has a generator of
+    its own, so that an effect switched on changes no other constant.
+    """
+    wanted = [*_BASE, *(name for effect in effects for name in EFFECTS[effect])]
+    drawn = {name: _drawn(grade, name, seed) for name in wanted}
+    return ImuTruth(
+        **drawn,
+        noise=grade.noise,
+        rate_convention=grade.rate_convention,
+        force_convention=grade.force_convention,
+    )
+
+
+def _drawn(grade: Grade, name: str, seed: int) -> Any:
+    names = list(ImuTruth.__dataclass_fields__)
+    rng = np.random.Generator(np.random.PCG64([seed, names.index(name)]))
+    if name == "second":
+        return SecondTriad(
+            bias_mm_per_s2=_tuple(grade.second_bias_mm_per_s2 * rng.standard_normal(3)),
+            scale_ppm=_tuple(grade.second_scale_ppm * rng.standard_normal(3)),
+            misalignment_arcsec=_tuple(grade.gyro_misalignment_arcsec * rng.standard_normal(6)),
+            delay_ms=grade.accel_delay_ms * float(rng.standard_normal()),
+        )
+    shape = np.shape(getattr(ImuTruth(), name))
+    values = getattr(grade, name) * rng.standard_normal(shape)
+    if name == "accel_position_mm":
+        values[0] = 0.0
+    return _tuple(values)
+
+
+def _tuple(values: FloatArray) -> Any:  # nested tuples of floats, or one float; shape known above
+    if np.ndim(values) == 0:
+        return float(values)
+    return tuple(_tuple(value) for value in values)
