@@ -112,10 +112,10 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder, build = options.folder, options.build or Path(scratch) / "build"
-        if folder is None:
+        if folder is None and options.units:
             folder = Path(scratch) / "units"
             list(write_series(ROOT / "units" / "AT-SIM", folder, options.units))
-        if options.units:
+        if folder is not None:
             measure(folder, build)
         if options.scaling:
             small = Path(scratch) / "small"
