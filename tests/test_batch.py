@@ -320,7 +320,9 @@ def test_an_interrupt_is_told_and_the_next_run_goes_on(
     folder, build = units(tmp_path / "units", 4), tmp_path / "build"
     arguments = [*(str(p) for p in sorted(folder.iterdir())), "--build", str(build)]
     with monkeypatch.context() as patch:
-        patch.setattr("triaxcal.cli.batch._local", lambda jobs: lambda m, o: interrupted(o, 2))
+        patch.setattr(
+            "triaxcal.cli.batch._local", lambda _: lambda _, orders: interrupted(orders, 2)
+        )
         with pytest.raises(RefusedError) as stopped:
             batch.main(arguments, standalone_mode=False)
     assert str(stopped.value) == (
