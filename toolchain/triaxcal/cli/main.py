@@ -63,9 +63,12 @@ def calib(unit: Path, build: Path) -> None:
 
 @main.command()
 @click.argument("unit", type=click.Path(path_type=Path))
-@click.option("--seed", type=int, help="Replaces the seed of truth.toml.")
+@click.option("--seed", type=int, help="Replaces the seed of truth.toml or imu_truth.toml.")
 def simulate(unit: Path, seed: int | None) -> None:
-    """Write measurements.csv of UNIT, a folder with unit.toml and truth.toml (or tables.toml)."""
+    """Write measurements.csv of UNIT, a folder with unit.toml and truth.toml (or tables.toml).
+
+    An IMU, with imu_truth.toml, receives recording.csv.
+    """
     from triaxcal.simulation.unit import write_simulated_unit  # noqa: PLC0415
 
     click.echo(f"{write_simulated_unit(unit, seed)} written")
