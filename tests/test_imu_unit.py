@@ -80,8 +80,8 @@ def test_a_wrong_effect_is_refused(unit: Path) -> None:
     change(unit, "imu_truth.toml", '"g-drift"', '"drift"')
     assert refusal(unit) == (
         "IMU-SIM/imu_truth.toml, [unit] effects: found ['delay', 'drift']; expected a list of "
-        "names out of g-drift, delay, accel-positions, mount-elasticity, gyro-elasticity, second-triad, "
-        "accel-temperature, gyro-temperature"
+        "names out of g-drift, delay, accel-positions, mount-elasticity, gyro-elasticity, "
+        "second-triad, accel-temperature, gyro-temperature"
     )
 
 
