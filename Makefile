@@ -17,7 +17,7 @@ NAMED = case "$$UNIT" in \
     */*) echo "make: UNIT=$$UNIT is a path; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; esac
 
 .DEFAULT_GOAL := help
-.PHONY: help test-verify rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
+.PHONY: help series test-verify rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -27,6 +27,9 @@ help:  ## List the targets
 calib-header: $(INSTALLED)  ## UNIT=<name>: fit, generate, prove and cross-check the C of a unit
 	@$(NAMED)
 	@$(BIN)/triaxcal calib "units/$$UNIT"
+
+series: $(INSTALLED)  ## Every unit of units/ that is not done yet, and a page about them all
+	@$(BIN)/triaxcal batch units/*
 
 verify: $(INSTALLED)  ## UNIT=<name>: Gappa, Frama-C, cppcheck, gcc and clang on the C of a unit
 	@$(NAMED)
@@ -65,9 +68,11 @@ golden: $(DEVELOPER)  ## Write the golden files anew; look at the difference bef
 
 bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 	@$(BIN)/python bench/calib_header.py
+	@$(BIN)/python bench/series.py
 	@$(BIN)/python bench/rig_decode.py
 	@$(BIN)/python bench/rig_receive.py
 	@$(BIN)/python bench/rig_stillness.py
+	@$(BIN)/python bench/rig_kill.py
 
 test-can: $(DEVELOPER)  ## The bench on real SocketCAN: this machine's vcan, or QEMU (2 minutes)
 	@rig/test-can.sh
@@ -95,5 +100,5 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 $(DEVELOPER): $(INSTALLED)
 	@echo "adding the developers' tools to $(VENV) (once) ..."
-	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[dev,rig]'
+	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[dev,rig,series]'
 	@touch $@

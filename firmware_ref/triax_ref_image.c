@@ -58,17 +58,32 @@ static int shape_is_legal(const triax_ref_t *ref)
             (within(ref->reciprocal_log2, 31, 62) && within(ref->gain_shift, 1, 62)));
 }
 
+/* "TRXC" is an accelerometer, with quadratic terms or dT/dt in version 2; "TRXG" is a gyro. */
+static int terms_are_legal(uint32_t magic, uint32_t version, int terms)
+{
+    if (magic == 0x43585254u) {
+        return version == 1u || within(terms, 1, TRIAX_REF_QUADRATIC | TRIAX_REF_RATE);
+    }
+    return magic == 0x47585254u && version == 2u && (terms % 256) == TRIAX_REF_SENSITIVITY &&
+           within(terms / 256, 8, 30);
+}
+
 uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
 {
     reader_t reader = {image, size, 0};
     int s;
     int f;
     int k;
+    size_t words;
+    uint32_t magic;
+    uint32_t version;
 
     if (size < 4 * (TRIAX_REF_HEADER_WORDS + 3) || size % 4 != 0) {
         return TRIAX_REF_BAD_IMAGE;
     }
-    if (next_word(&reader) != 0x43585254u || next_word(&reader) != 1u || next_word(&reader) != size) {
+    magic = next_word(&reader);
+    version = next_word(&reader);
+    if ((version != 1u && version != 2u) || next_word(&reader) != size) {
         return TRIAX_REF_BAD_IMAGE;
     }
     ref->inverse_form = next_int(&reader);
@@ -83,10 +98,24 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
     ref->determinant_shift = next_int(&reader);
     ref->reciprocal_log2 = next_int(&reader);
     ref->gain_shift = next_int(&reader);
-    if (!shape_is_legal(ref)) {
+    ref->terms = (version == 2u) ? next_int(&reader) : 0;
+    if (!shape_is_legal(ref) || !terms_are_legal(magic, version, ref->terms)) {
         return TRIAX_REF_BAD_IMAGE;
     }
-    if (size != 4u * (size_t)(TRIAX_REF_HEADER_WORDS + 3 + ref->segments * (3 + 12 * (ref->order + 1)))) {
+    words = (size_t)(TRIAX_REF_HEADER_WORDS + 3 + ref->segments * (3 + 12 * (ref->order + 1)));
+    if (version == 2u) {
+        words += 1;
+    }
+    if (ref->terms & TRIAX_REF_QUADRATIC) {
+        words += 18;
+    }
+    if (ref->terms & TRIAX_REF_SENSITIVITY) {
+        words += 9;
+    }
+    if (ref->terms & TRIAX_REF_RATE) {
+        words += 6;
+    }
+    if (size != 4u * words) {
         return TRIAX_REF_BAD_IMAGE;
     }
     ref->temp_min_code = next_int(&reader);
@@ -101,11 +130,26 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
             }
         }
     }
+    for (k = 0; k < 18; k++) {
+        ref->quadratic[k / 6][k % 6] = (ref->terms & TRIAX_REF_QUADRATIC) ? next_int(&reader) : 0;
+    }
+    if (ref->terms & TRIAX_REF_RATE) {
+        ref->rate_min_code = next_int(&reader);
+        ref->rate_max_code = next_int(&reader);
+        ref->rate_gain = next_int(&reader);
+        for (k = 0; k < 3; k++) {
+            ref->rate_offset[k] = next_int(&reader);
+        }
+    }
+    for (k = 0; k < 9; k++) {
+        ref->sensitivity[k / 3][k % 3] = (ref->terms & TRIAX_REF_SENSITIVITY) ? next_int(&reader) : 0;
+    }
     return (next_word(&reader) == crc32(image, size - 4)) ? TRIAX_REF_OK : TRIAX_REF_BAD_IMAGE;
 }
 
-uint32_t triax_ref_batch(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
-                         const int32_t *raw_code, int32_t *accel, uint32_t *status)
+/* Vectors of either triad; force and rate_code are null pointers where they do not belong. */
+static uint32_t batch(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
+                      const int32_t *rate_code, const int32_t *raw_code, const int32_t *force, int32_t *result, uint32_t *status)
 {
     triax_ref_t ref;
     triax_ref_state_t state = {{{0}}, {0}};
@@ -115,10 +159,36 @@ uint32_t triax_ref_batch(const uint8_t *image, size_t size, size_t count, const 
         return TRIAX_REF_BAD_IMAGE;
     }
     for (i = 0; i < count; i++) {
-        if (i == 0 || temp_code[i] != temp_code[i - 1]) {
+        if (rate_code != NULL) {
+            temp_status = triax_ref_set_temperature_rate(&state, &ref, temp_code[i], rate_code[i]);
+        } else if (i == 0 || temp_code[i] != temp_code[i - 1]) {
             temp_status = triax_ref_set_temperature(&state, &ref, temp_code[i]);
         }
-        status[i] = temp_status | triax_ref_apply(&state, &ref, &raw_code[3 * i], &accel[3 * i]);
+        status[i] = temp_status;
+        status[i] |= (force == NULL)
+                         ? triax_ref_apply(&state, &ref, &raw_code[3 * i], &result[3 * i])
+                         : triax_ref_apply_gyro(&state, &ref, &raw_code[3 * i], &force[3 * i],
+                                                &result[3 * i]);
     }
     return TRIAX_REF_OK;
+}
+
+uint32_t triax_ref_batch(const uint8_t *image, size_t size, size_t count, const int32_t *temp_code,
+                         const int32_t *raw_code, int32_t *accel, uint32_t *status)
+{
+    return batch(image, size, count, temp_code, NULL, raw_code, NULL, accel, status);
+}
+
+uint32_t triax_ref_batch_rate(const uint8_t *image, size_t size, size_t count,
+                              const int32_t *temp_code, const int32_t *rate_code,
+                              const int32_t *raw_code, int32_t *accel, uint32_t *status)
+{
+    return batch(image, size, count, temp_code, rate_code, raw_code, NULL, accel, status);
+}
+
+uint32_t triax_ref_batch_gyro(const uint8_t *image, size_t size, size_t count,
+                              const int32_t *temp_code, const int32_t *raw_code,
+                              const int32_t *force, int32_t *rate, uint32_t *status)
+{
+    return batch(image, size, count, temp_code, NULL, raw_code, force, rate, status);
 }

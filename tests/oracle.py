@@ -10,9 +10,11 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
+import numpy as np
+
 from triaxcal.fixedpoint.plan import Plan
 
-TEMP_LOW, TEMP_HIGH, RAW_RANGE, SATURATED, BAD_IMAGE = 1, 2, 4, 8, 16
+TEMP_LOW, TEMP_HIGH, RAW_RANGE, SATURATED, BAD_IMAGE, RATE_RANGE = 1, 2, 4, 8, 16, 32
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 
 Rows = list[list[int]]
@@ -55,8 +57,8 @@ def functions(plan: Plan, code: int) -> list[int]:
     return values
 
 
-def set_temperature(plan: Plan, temp_code: int) -> tuple[Rows, int]:
-    """Steps C, H, I: the state's rows and the status."""
+def set_temperature(plan: Plan, temp_code: int, rate_code: int = 0) -> tuple[Rows, int]:
+    """Steps C, H, I, D: the state's rows and the status."""
     status = 0
     code = temp_code
     if code < plan.temp_min_code:
@@ -67,9 +69,23 @@ def set_temperature(plan: Plan, temp_code: int) -> tuple[Rows, int]:
     rows = [values[4 * i : 4 * i + 4] for i in range(3)]
     if plan.shape.form == "inverse":
         rows = inverted(plan, rows)
-        if any(sum(map(abs, r[:3])) + 2 * abs(r[3]) >= 2**32 - 8 for r in rows):
-            return [[0] * 4 for _ in range(3)], status | BAD_IMAGE
+    if plan.rate is not None:
+        rate = min(max(rate_code, plan.rate.min_code), plan.rate.max_code)
+        status |= RATE_RANGE if rate != rate_code else 0
+        w = int32(rate * plan.rate.gain)
+        for row, r in zip(rows, plan.rate.words.tolist(), strict=True):
+            more = int32(floor_of(int64(r * w + 2**31), 32))
+            row[3] = sat32(row[3] + more)
+    full = any(sum(map(abs, r[:3])) + 2 * abs(r[3]) >= row_limit(plan) for r in rows)
+    if plan.shape.form == "inverse" and full:
+        return [[0] * 4 for _ in range(3)], status | BAD_IMAGE
     return rows, status
+
+
+def row_limit(plan: Plan) -> int:
+    """Step R, point 3, 5 or 6."""
+    terms = plan.quadratic is not None or plan.sensitivity is not None
+    return 3 * 2**30 if terms else 2**32 - 8
 
 
 def inverted(plan: Plan, rows: Rows) -> Rows:
@@ -87,7 +103,7 @@ def inverted(plan: Plan, rows: Rows) -> Rows:
     magnitude = max(abs(det), 2 ** (shifts.reciprocal_log2 - 31) + 1)
     r = int32(trunc_of(2**shifts.reciprocal_log2, -magnitude if det < 0 else magnitude))
     spare = plan.shape.output_shift - 32
-    preload = 2 ** (spare - 1) if spare >= 1 else 0
+    preload = 2 ** (spare - 1) if spare >= 1 and plan.quadratic is None else 0
     result = []
     for i in range(3):
         n = [
@@ -105,16 +121,32 @@ def cofactor(k: Rows, i: int, j: int) -> int:
     return (-1) ** (i + j) * (a * d - b * c)
 
 
-def apply(plan: Plan, rows: Rows, raw: list[int]) -> tuple[list[int], int]:
-    """Step A, with the one formula that the page gives for both ways."""
+def apply(
+    plan: Plan, rows: Rows, raw: list[int], force: list[int] | None = None
+) -> tuple[list[int], int]:
+    """Steps A, Q and G, with the one formula that the page gives for both ways."""
     shape = plan.shape
     u = [min(max(code, shape.raw_min), shape.raw_max) for code in raw]
     status = 0 if u == raw else RAW_RANGE
     u = [int32(code * 2**shape.raw_shift) for code in u]
     accel = []
-    for n0, n1, n2, b in rows:
-        total = int64(int64(n0 * u[0] + n1 * u[1] + n2 * u[2]) + b * 2**32)
-        if shape.output_shift <= 32:
+    sums = [int64(n0 * u[0] + n1 * u[1] + n2 * u[2]) for n0, n1, n2, _ in rows]
+    if plan.quadratic is not None:
+        x, y, z = (int32(floor_of(s, 32) + row[3]) for s, row in zip(sums, rows, strict=True))
+        pairs = [(x, x), (y, y), (z, z), (x, y), (x, z), (y, z)]
+        p = [int32(floor_of(int64(v * w), 32)) for v, w in pairs]
+        sums = [
+            int64(s + int64(sum(q * v for q, v in zip(row, p, strict=True))))
+            for s, row in zip(sums, plan.quadratic.tolist(), strict=True)
+        ]
+    if plan.sensitivity is not None and force is not None:
+        sums = [
+            int64(s + int64(sum(k * f for k, f in zip(row, force, strict=True))))
+            for s, row in zip(sums, plan.sensitivity.tolist(), strict=True)
+        ]
+    for s, (*_, b) in zip(sums, rows, strict=True):
+        total = int64(s + b * 2**32)
+        if shape.output_shift <= 32 or plan.quadratic is not None:
             total = int64(total + 2 ** (shape.output_shift - 1))
         wide = floor_of(total, shape.output_shift)
         if shape.output_shift > 32:
@@ -138,9 +170,10 @@ def run(plan: Plan, temp_code: int, raw: list[int]) -> tuple[list[int], int]:
 def keeps_step_r(
     plan: Plan,
 ) -> bool:
-    """Points 1 to 3 of step R, and segments that divide the range in rising order."""
+    """Points 1 to 3 and 5 of step R, and segments that divide the range in rising order."""
     firsts = [s.first_code for s in plan.segments]
-    if firsts[0] != plan.temp_min_code or sorted(set(firsts)) != firsts:
+    quadratic = plan.quadratic is not None and max(np.abs(plan.quadratic).sum(axis=1)) > 2**31 - 1
+    if quadratic or firsts[0] != plan.temp_min_code or sorted(set(firsts)) != firsts:
         return False
     lasts = [f - 1 for f in firsts[1:]] + [plan.temp_max_code]
     for segment, first, last in zip(plan.segments, firsts, lasts, strict=True):
@@ -160,7 +193,7 @@ def keeps_step_r(
                 return False
             bounds.append(bound)
         for n0, n1, n2, b in (bounds[i : i + 4] for i in (0, 4, 8)):
-            if plan.shape.form == "direct" and n0 + n1 + n2 + 2 * b >= 2**32 - 8:
+            if plan.shape.form == "direct" and n0 + n1 + n2 + 2 * b >= row_limit(plan):
                 return False
     return True
 
@@ -199,18 +232,22 @@ def real_gain_and_offset(plan: Plan, code: int) -> list[list[Fraction]]:
 def real_accel(plan: Plan, rows: list[list[Fraction]], raw: list[int]) -> list[Fraction]:
     """Exact acceleration in output LSB of raw codes within the declared range."""
     u = [code * 2**plan.shape.raw_shift for code in raw]
-    return [
-        (sum((row[j] * u[j] for j in range(3)), Fraction(0)) / 2**32 + row[3])
-        / Fraction(2) ** (plan.shape.output_shift - 32)
-        for row in rows
-    ]
+    force = [sum((row[j] * u[j] for j in range(3)), Fraction(0)) / 2**32 + row[3] for row in rows]
+    if plan.real_quadratic is not None:
+        x, y, z = force
+        p = [x * x, y * y, z * z, x * y, x * z, y * z]
+        force = [
+            v + sum(Fraction(q) * w for q, w in zip(row, p, strict=True)) / 2**64
+            for v, row in zip(force, plan.real_quadratic.tolist(), strict=True)
+        ]
+    return [v / Fraction(2) ** (plan.shape.output_shift - 32) for v in force]
 
 
 def error_bound(plan: Plan, code: int) -> list[Fraction]:
-    """Step E's bound of each axis at one code, in output LSB."""
+    """Step E's bound of each axis at one code, in output LSB, but for what quadratic terms add."""
     found, _ = set_temperature(plan, code)
     spare = plan.shape.output_shift - 32
-    preload = 2 ** (spare - 1) if spare >= 1 else 0
+    preload = 2 ** (spare - 1) if spare >= 1 and plan.quadratic is None else 0
     u_max = max(abs(plan.shape.raw_min), abs(plan.shape.raw_max)) * 2**plan.shape.raw_shift
     bounds = []
     for n, exact in zip(found, real_gain_and_offset(plan, code), strict=True):
@@ -218,3 +255,29 @@ def error_bound(plan: Plan, code: int) -> list[Fraction]:
         offset = abs(n[3] - preload - exact[3])
         bounds.append((gain * u_max / 2**32 + offset) / Fraction(2) ** spare + Fraction(1, 2))
     return bounds
+
+
+def quadratic_extra(plan: Plan) -> list[Fraction]:
+    """What quadratic terms add to step E's bound of each axis, in output LSB."""
+    assert plan.quadratic is not None
+    assert plan.real_quadratic is not None
+    spare = Fraction(2) ** (plan.shape.output_shift - 32)
+    u_max = max(abs(plan.shape.raw_min), abs(plan.shape.raw_max)) * 2**plan.shape.raw_shift
+    e, h = [Fraction(0)] * 3, [Fraction(0)] * 3
+    for code in plan.temp_codes.tolist():
+        rows, _ = set_temperature(plan, code)
+        bounds = error_bound(plan, code)
+        for j, row in enumerate(rows):
+            e[j] = max(e[j], (bounds[j] - Fraction(1, 2)) * spare + 1)
+            n = sum(map(abs, row[:3])) * u_max
+            h[j] = max(h[j], Fraction(n // 2**32 + 1 + abs(row[3])))
+    extras = []
+    for i in range(3):
+        total = Fraction(0)
+        for k, (j, m) in enumerate([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]):
+            q, exact = int(plan.quadratic[i, k]), Fraction(float(plan.real_quadratic[i, k]))
+            l_j, l_m = h[j] + e[j], h[m] + e[m]
+            d = (e[j] * h[m] + l_j * e[m]) / 2**32 + 1
+            total += (abs(q - exact) * l_j * l_m / 2**32 + abs(q) * d) / 2**32
+        extras.append(total / spare)
+    return extras

@@ -21,7 +21,8 @@ from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.unitfile import Adc, Limits, TemperatureSensor, ThermalChoice, UnitDescription
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
-ROW_LIMIT = 2**32 - 8
+ROW_LIMIT, ROW_LIMIT_QUADRATIC = 2**32 - 8, 3 * 2**30
+QUADRATIC_LIMIT = 2**31 - 1
 SENSOR = TemperatureSensor(degc_per_code=0.0078125, degc_at_zero=0.0)
 
 Coefficients = list[list[int]]
@@ -49,6 +50,7 @@ def integer_shape(
     output_q: int = 24,
     raw: tuple[int, int] = (-(2**23), 2**23 - 1),
     shifts: tuple[int, int, int, int] = (30, 29, 58, 30),
+    quadratic: bool = False,
 ) -> Shape:
     """A shape; `shifts` are those of the inverse form, ignored by the direct one."""
     return Shape(
@@ -61,6 +63,7 @@ def integer_shape(
         raw_max=raw[1],
         raw_shift=raw_shift_of(raw),
         inverse=InverseShifts(*shifts) if form == INVERSE else None,
+        quadratic=quadratic,
     )
 
 
@@ -87,7 +90,14 @@ def integer_plan(
             gain *= 2
         segments.append(Segment(first, origin, gain, np.array(rows, dtype=np.int64)))
     real = np.array([real_of(shape, rows, rounded_by) for rows in coefficients])
-    return Plan(shape, low, high, tuple(segments), real, 2.5 / 2**31)
+    plan = Plan(shape, low, high, tuple(segments), real, 2.5 / 2**31)
+    return with_quadratic(plan, [[0] * 6] * 3) if shape.quadratic else plan
+
+
+def with_quadratic(plan: Plan, rows: Sequence[Sequence[int]], rounded_by: float = 0.0) -> Plan:
+    """The plan with these words for quadratic terms, each rounded up by `rounded_by`."""
+    words = np.array(rows, dtype=np.int64)
+    return replace(plan, quadratic=words, real_quadratic=words - rounded_by)
 
 
 def real_of(shape: Shape, rows: Coefficients, rounded_by: float = 0.0) -> list[list[float]]:
@@ -122,11 +132,11 @@ def _signed(rng: Random, largest: int, *, full: bool) -> int:
     return rng.choice([-1, 1]) * (largest if full else int(largest * rng.random()))
 
 
-def random_rows(rng: Random, order: int, *, full: bool) -> Coefficients:
+def random_rows(rng: Random, order: int, *, full: bool, limit: int = ROW_LIMIT) -> Coefficients:
     """Twelve functions of the direct form; every row of `full` ones spends its limit."""
     rows: Coefficients = []
     for _ in range(3):
-        left = ROW_LIMIT - 1
+        left = limit - 1
         unspent = 5  # each function's bound is 1 at least, the offset's counts twice
         row = {}
         for place in rng.sample(range(4), 4):
@@ -165,11 +175,29 @@ def random_plan(rng: Random, shape: Shape, *, full: bool = False) -> Plan:
     if shape.form == INVERSE:
         rows = [random_matrix_rows(rng, shape.order) for _ in range(shape.segments)]
     else:
-        rows = [random_rows(rng, shape.order, full=full) for _ in range(shape.segments)]
+        limit = ROW_LIMIT_QUADRATIC if shape.quadratic else ROW_LIMIT
+        rows = [
+            random_rows(rng, shape.order, full=full, limit=limit) for _ in range(shape.segments)
+        ]
     low = rng.choice([-5120, rng.randint(-(2**29), 2**29)])
     high = low + rng.choice([shape.segments, 14080, rng.randint(shape.segments, 2**29)])
     firsts = sorted(rng.sample(range(low + 1, high + 1), shape.segments - 1))
-    return integer_plan(shape, rows, (low, high), firsts)
+    plan = integer_plan(shape, rows, (low, high), firsts)
+    return with_quadratic(plan, random_quadratic(rng, full=full)) if shape.quadratic else plan
+
+
+def random_quadratic(rng: Random, *, full: bool) -> list[list[int]]:
+    """Three rows of quadratic terms; every row of `full` ones spends its limit."""
+    rows = []
+    for _ in range(3):
+        left = QUADRATIC_LIMIT
+        row = [0] * 6
+        for k in rng.sample(range(6), 6):
+            row[k] = _signed(rng, int(left * rng.choice([0.0, 0.5, rng.random()])), full=full)
+            left -= abs(row[k])
+        row[rng.randrange(6)] += left if full else 0
+        rows.append(row)
+    return rows
 
 
 def vectors(plan: Plan, rng: Random, count: int) -> tuple[list[int], list[list[int]]]:
@@ -249,10 +277,21 @@ COVERING: dict[str, Shape] = {
     "inverse-saturating-order-3": integer_shape(
         segments=2, order=3, output_shift=32, raw=(INT32_MIN, 2**30), **_SATURATING
     ),
+    "quadratic-cubic": integer_shape(order=3, quadratic=True),
+    "quadratic-order-0-32-bit": integer_shape(
+        order=0, output_shift=33, raw=_FULL32, quadratic=True
+    ),
+    "quadratic-saturating-two-segments": integer_shape(
+        segments=2, order=1, output_shift=32, raw=(-70_000, 70_000), quadratic=True
+    ),
+    "quadratic-inverse": integer_shape(order=2, output_shift=34, quadratic=True, **_INVERSE),
+    "quadratic-inverse-saturating": integer_shape(
+        order=1, output_shift=31, raw=_FULL32, quadratic=True, **_SATURATING
+    ),
 }
 """Every branch: both forms; saturating or not; one segment or more; order 0 and above; no range
 test, one test for three codes, three tests; with and without a left shift; ranges that end at
-INT32_MIN or INT32_MAX."""
+INT32_MIN or INT32_MAX; quadratic terms in both forms, saturating or not."""
 
 
 # ---- plans from physical constants, through make_plan ----
@@ -389,9 +428,22 @@ _INVERSE_ROWS = [
     ]
 ]
 
+_QUADRATIC = [
+    [31_415_926, -5_358_979, 3_238_462, -643_383, 2_795_028, -841_971],
+    [-693_993, 7_510_582, 974_944, 5_923_078, -1_640_628, 6_208_998],
+    [6_280_348, -253_421, -17_067_982, 148_086, 5_132_823, 664_709],
+]
+
 GOLDEN: dict[str, Plan] = {
     "direct-checked": integer_plan(
         integer_shape(order=2, output_shift=35), _CHECKED, rounded_by=0.25
+    ),
+    "direct-quadratic": with_quadratic(
+        integer_plan(
+            integer_shape(order=2, output_shift=35, quadratic=True), _CHECKED, rounded_by=0.25
+        ),
+        _QUADRATIC,
+        rounded_by=0.25,
     ),
     "direct-left-justified-piecewise": integer_plan(
         integer_shape(segments=3, order=1, output_shift=35, raw=_FULL32),
@@ -412,5 +464,6 @@ GOLDEN: dict[str, Plan] = {
         rounded_by=0.25,
     ),
 }
-"""Of the size of P1's tables: 24-bit codes with a range test; codes that fill 32 bits, three
-segments; K inverted on the device, 24-bit codes of a narrower range, results that saturate."""
+"""Of the size of P1's tables: 24-bit codes with a range test, and the same with quadratic terms;
+codes that fill 32 bits, three segments; K inverted on the device, 24-bit codes of a narrower range,
+results that saturate."""

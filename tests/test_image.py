@@ -73,7 +73,8 @@ def test_image_is_the_page(built: dict[str, Built], reference: Reference, name: 
     assert crc32_by_the_bit(image[:-4]).to_bytes(4, "little") == image[-4:]
     words = words_of(image)
     shape = plan.shape
-    assert words[1:3] == [1, len(image)]
+    terms = [] if plan.quadratic is None else [1]
+    assert words[1:3] == [1 + len(terms), len(image)]
     i = shape.inverse
     assert words[3:15] == [
         {"direct": 0, "inverse": 1}[shape.form],
@@ -89,14 +90,19 @@ def test_image_is_the_page(built: dict[str, Built], reference: Reference, name: 
         i.reciprocal_log2 if i else 0,
         i.gain_shift if i else 0,
     ]
-    assert words[15:17] == [plan.temp_min_code, plan.temp_max_code]
-    at = 17
+    at = 15 + len(terms)
+    assert words[15:at] == terms
+    assert words[at : at + 2] == [plan.temp_min_code, plan.temp_max_code]
+    at += 2
     for segment in plan.segments:
         assert words[at : at + 3] == [segment.first_code, segment.origin_code, segment.gain]
         at += 3
         for row in segment.coefficients.tolist():
             assert words[at : at + len(row)] == row
             at += len(row)
+    if plan.quadratic is not None:
+        assert words[at : at + 18] == plan.quadratic.ravel().tolist()
+        at += 18
     assert at == len(words) - 1
     assert load(built[name], image) == OK
     assert opens(reference, image)

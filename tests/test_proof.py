@@ -23,8 +23,10 @@ from plans import (
     integer_shape,
     polynomial_model,
     random_plan,
+    random_quadratic,
     random_rows,
     unit_of,
+    with_quadratic,
 )
 from triaxcal.delivery import Delivery
 from triaxcal.errors import RefusedError
@@ -129,9 +131,15 @@ def test_no_sample_exceeds_the_bound(name: str) -> None:
 def test_bound_holds_for_any_constants(name: str, seed: int, rounded_by: float) -> None:
     rng = Random(seed)
     shape = COVERING[name]
-    rows = [random_rows(rng, shape.order, full=rng.random() < 0.3) for _ in range(shape.segments)]
+    rows = [
+        random_rows(rng, shape.order, full=rng.random() < 0.3, limit=shape.row_limit)
+        for _ in range(shape.segments)
+    ]
     low = rng.randint(-(2**29), 2**29)
     plan = integer_plan(shape, rows, (low, low + 40), rounded_by=rounded_by)
+    if shape.quadratic:
+        words = random_quadratic(rng, full=rng.random() < 0.3)
+        plan = with_quadratic(plan, words, rounded_by)
     bound = [Fraction(lsb) for lsb in prove(plan).per_axis_lsb]
     for _ in range(30):
         code = rng.randint(plan.temp_min_code, plan.temp_max_code)

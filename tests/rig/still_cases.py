@@ -40,7 +40,7 @@ def reference(seed=99):
 
 START = SETTINGS.clean_blocks + SETTINGS.settle_s
 TOTAL = START + SETTINGS.average_s + SETTINGS.guard_s
-WINDOW = slice(SETTINGS.guard_s, SETTINGS.guard_s + SETTINGS.average_s)
+WINDOW = slice(START, START + SETTINGS.average_s)
 
 
 def verdict(rng, ref, added=None, sd=SD_MICRO_G):
@@ -52,7 +52,7 @@ def verdict(rng, ref, added=None, sd=SD_MICRO_G):
         if moved:
             return [moved]
         previous = block
-    return refusals(blocks[START - SETTINGS.guard_s :], WINDOW, ref, SETTINGS, MICRO_G_PER_CODE)
+    return refusals(blocks, WINDOW, ref, SETTINGS, MICRO_G_PER_CODE)
 
 
 def seconds():

@@ -9,6 +9,7 @@ from rig_cases import rig_of, short_setup
 
 from triaxcal.rig.candump import format_frames, parse, read_log
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG, Frames, concatenate, widened
+from triaxcal.rig.samples import SampleDecoder
 from triaxcal.rig.sources import frames_of, messages_of
 
 
@@ -91,6 +92,40 @@ def test_what_is_no_frame_is_counted(line):
     good = "(1700000000.000001) can0 101#0102\n"
     parsed = parse(f"{good}{line}\n{good}".encode())
     assert (parsed.lines, parsed.bad_lines, len(parsed.frames)) == (3, 1, 2)
+
+
+@pytest.mark.parametrize("count", [200, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("layout", ["classic", "fd"])
+def test_a_flipped_bit_of_a_log_costs_samples_and_changes_none(tmp_path, layout, count):
+    """Without a journal beside it: the frames' own CRC, the lines' form and the lengths."""
+    setup = short_setup(tmp_path, layout=layout)
+    frames = rig_of(setup).advance()
+    text = format_frames(frames, "can0")
+    right = {tuple(row) for row in decoded(setup, text)}
+    rng = np.random.default_rng(31)
+    for bit in rng.integers(0, 8 * len(text), count).tolist():
+        spoiled = bytearray(text)
+        spoiled[bit // 8] ^= 1 << bit % 8
+        found = [tuple(row) for row in decoded(setup, bytes(spoiled))]
+        # A lost newline joins two lines, which may be of two samples.
+        assert set(found) <= right
+        assert len(found) == len(set(found)) >= len(right) - 2
+
+
+@pytest.mark.parametrize("step", [97, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_log_cut_anywhere_gives_the_samples_before_the_cut(tmp_path, step):
+    setup = short_setup(tmp_path)
+    text = format_frames(rig_of(setup).advance(), "can0")
+    right = decoded(setup, text).tolist()
+    for size in range(0, len(text), step):
+        found = decoded(setup, text[:size]).tolist()
+        assert found == right[: len(found)]
+
+
+def decoded(setup, text):
+    """Codes of the samples of a log."""
+    decoder = SampleDecoder(setup.dbc, setup.plan.layout, setup.plan.rate_hz)
+    return decoder.feed(parse(text).frames).codes
 
 
 def test_a_log_is_read_alike_in_any_chunks(tmp_path, monkeypatch):

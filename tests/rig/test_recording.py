@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import resource
 import subprocess
 import sys
@@ -15,6 +17,7 @@ from triaxcal.errors import RefusedError
 from triaxcal.records import read_measurements
 from triaxcal.rig.events import Redo
 from triaxcal.rig.journal import Journal, read_journal
+from triaxcal.rig.rawlog import RawLog
 from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, Recording, durable_events, replay
 from triaxcal.rig.runner import Robot
 from triaxcal.rig.store import write_records
@@ -99,20 +102,63 @@ def test_a_damaged_journal_is_not_gone_on_with(recorded, tmp_path):
     assert path.read_bytes() == spoiled
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.slow)])
-def test_no_bit_flip_in_the_log_is_believed(recorded, tmp_path, count):
+@pytest.mark.parametrize("count", [20, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_no_bit_flip_and_no_cut_of_the_log_is_believed(recorded, tmp_path, count):
     """Beside its journal a changed log is refused; what was accepted stands in the journal."""
     setup, folder, _ = recorded
     text = (folder / LOG_FILE).read_bytes()
     rng = np.random.default_rng(12)
     path = tmp_path / LOG_FILE
+    path.write_bytes(text)
     known = int(read_journal(folder / JOURNAL_FILE).records[-1]["log"]["bytes"])
-    for bit in rng.integers(0, 8 * known, count).tolist():
-        spoiled = bytearray(text)
-        spoiled[bit // 8] ^= 1 << bit % 8
-        path.write_bytes(spoiled)
+    with path.open("r+b") as file:
+        for bit in rng.integers(0, 8 * known, count).tolist():
+            for byte in (text[bit // 8] ^ 1 << bit % 8, text[bit // 8]):
+                file.seek(bit // 8)
+                file.write(bytes([byte]))
+                file.flush()
+                if byte != text[bit // 8]:
+                    with pytest.raises(RefusedError, match="as the journal recorded"):
+                        replay(setup, path, folder / JOURNAL_FILE)
+    for size in sorted(rng.integers(0, known, count // 20).tolist(), reverse=True):
+        os.truncate(path, size)
         with pytest.raises(RefusedError, match="as the journal recorded"):
             replay(setup, path, folder / JOURNAL_FILE)
+
+
+def test_a_resumed_session_notices_a_log_that_was_cut_or_changed(recorded, tmp_path):
+    setup, folder, _ = recorded
+    for name in (LOG_FILE, JOURNAL_FILE):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    text = (folder / LOG_FILE).read_bytes()
+    spoiled = bytearray(text)
+    spoiled[1000] ^= 1
+    (tmp_path / LOG_FILE).write_bytes(spoiled)
+    with pytest.raises(RefusedError, match=r"its first .* bytes have SHA-256 .*as the journal"):
+        Recording(setup, tmp_path, "test").log.flush()
+    os.truncate(tmp_path / LOG_FILE, 1000)
+    with pytest.raises(RefusedError, match=r"frames\.log: it has 1000 bytes; expected \d+ or more"):
+        Recording(setup, tmp_path, "test")
+
+
+@pytest.mark.parametrize("size", [1, 1000, 1 << 20])
+def test_the_hash_of_a_log_is_that_of_its_bytes(tmp_path, monkeypatch, size):
+    """Also when it is made little by little, and from a known beginning."""
+    monkeypatch.setattr("triaxcal.rig.rawlog._HASH_BYTES", size)
+    rig = rig_of(short_setup(tmp_path))
+    path, known = tmp_path / LOG_FILE, None
+    for _ in range(3):
+        log = RawLog(path, "test", known)
+        for _ in range(3):
+            log.append(rig.advance())
+            log.flush()
+        known = log.state
+        log.close()
+        text = path.read_bytes()
+        sha256 = hashlib.sha256(text).hexdigest()
+        assert known == {"lines": text.count(b"\n"), "bytes": len(text), "sha256": sha256}
+        with path.open("ab") as file:
+            file.write(b"(17000")
 
 
 @pytest.mark.parametrize("count", [3, pytest.param(60, marks=pytest.mark.slow)])

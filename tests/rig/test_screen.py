@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 from rig_cases import rig_of, short_setup
 
+from triaxcal.rig.bigtext import big
 from triaxcal.rig.engine import Engine
 from triaxcal.rig.runner import Robot
 from triaxcal.rig.screen import BusView, plain_status, screen
@@ -58,6 +59,29 @@ def test_it_fits_and_tells(states, phase, width, height):
         assert "dropped by the kernel 3" in text
         assert not alarms or "slip of 38 micro-g" in text
     assert seen.headline in plain_status(seen)
+
+
+@pytest.mark.parametrize(("width", "height", "scale"), [(80, 24, 1), (120, 40, 2)])
+@pytest.mark.parametrize("phase", sorted(PHASES))
+def test_the_order_stands_in_big_letters(states, phase, width, height, scale):
+    """Every letter whole and in its place: the ink of the screen is the ink of the text."""
+    lines = drawn(states[phase], (), width, height)
+    letters = [line.rstrip() for line in big(states[phase].order, width - 4, scale)]
+    at = next(i for i, line in enumerate(lines) if set(line) & set("█▀▄"))
+    margin = len(lines[at]) - len(letters[0])
+    assert lines[at : at + len(letters)] == [(" " * margin + text).rstrip() for text in letters]
+    assert len(letters) == (5 if scale == 2 else 3)
+
+
+def test_big_letters_are_their_ink():
+    assert big("T.", 80, 1) == ["▀█▀  ", " █   ", " ▀  ▀"]
+    assert [len(line) for line in big("DONE", 200, 3)] == [3 * 16] * 8
+    # Every position's order fits into the smallest screen; too wide a text keeps the smallest size.
+    for up in ("+X UP", "-Z UP TILTED"):
+        for order in ("TURN TO", "RESEAT"):
+            assert len(big(f"{order} {up}", 76, 2)[0]) <= 76
+    assert len(big("HANDS OFF 3600", 76, 2)[0]) <= 76
+    assert len(big("WAIT FOR -12.5", 76, 2)[0]) <= 76
 
 
 def test_the_numbers_are_those_of_the_position(states):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from rig_cases import bench_unit, play, rig_of, short_setup
 
 from triaxcal.errors import RefusedError, UsageError
-from triaxcal.rig.engine import Engine
+from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.events import Agree, Redo
 from triaxcal.rig.orientation import recognised
 from triaxcal.rig.plan import read_plan
@@ -61,6 +62,9 @@ def test_a_session_without_faults(tmp_path, layout):
         ("twonodes@82:1:4", "trouble", r"another node sends under the rig's IDs"),
         ("clipped@82:1:2", "trouble", r"clipped: 100 samples at the end of the ADC's range"),
         ("stuck@82:1:2", "trouble", r"stuck: y gives one and the same code"),
+        ("status@82:2:2", "trouble", r"the rig reports status 0x02"),
+        ("notemp@82:1:3", "trouble", r"no temperature from the rig"),
+        ("creep@66:900:10", "refused", r"TP1: creep of \d+ micro-g with about 10 s on x, retake"),
     ],
 )
 def test_a_fault_in_the_averaging_is_found_named_and_outlived(
@@ -81,9 +85,26 @@ def test_a_fault_in_the_averaging_is_found_named_and_outlived(
 def test_what_costs_no_more_than_a_few_samples_is_counted(tmp_path, order, lost, bad_crc):
     engine, events = run(short_setup(tmp_path, temps="[20]"), order, accepted=1)
     assert texts(events, "refused") == []
+    told = ["5 error frames: protocol violation"] if order.startswith("error") else []
+    assert texts(events, "trouble") == told
     dwell = engine.session.accepted[0, "TP1"]
     assert dwell.lost in lost
     assert dwell.bad_crc == bad_crc
+
+
+def test_a_chamber_that_cycles_is_waited_for_when_its_period_is_stated(tmp_path):
+    """+-0.5 K in the chamber each 40 s, which the unit follows with 5 s; 0.3 K/min is rest."""
+    setup = short_setup(tmp_path, temps="[20]")
+    text = Path(setup.plan.source).read_text()
+    stated = tmp_path / "stated.toml"
+    stated.write_text(text + "cycle_s = 40\nspan_max_k = 1.5\n")
+    cycle = {"cycle_k": 0.5, "cycle_s": 40.0}
+    engine = Engine(setup, "test")
+    events = advance(engine, rig_of(setup, **cycle), 150)
+    assert texts(events, "equilibrium") == []
+    again = Setup(setup.folder, setup.unit, read_plan(stated, setup.unit), setup.dbc)
+    events = advance(Engine(again, "test"), rig_of(again, **cycle), 150)
+    assert len(texts(events, "equilibrium")) == 1
 
 
 def test_another_serial_number_is_refused(tmp_path):
@@ -141,6 +162,37 @@ def test_after_a_slip_the_position_has_to_be_taken_up_anew(tmp_path):
     advance(engine, rig, 6)
     rig.turn_to("TP1")
     assert len(texts(advance(engine, rig, 50), "accepted")) == 1
+
+
+def test_what_lay_through_a_change_of_temperature_is_taken_up_anew(tmp_path):
+    """A slip on the way has nothing before it to be seen against."""
+    setup = short_setup(tmp_path, temps="[25]")
+    engine, rig = Engine(setup, "test"), rig_of(setup)
+    rig.target_degc = 25.0
+    events = advance(engine, rig, LEARNED + 150)
+    (text,) = texts(events, "equilibrium")
+    assert text.endswith("degC; TP1 (+Z up) is to be left and taken up anew")
+    assert texts(events, "accepted") == []
+    now = view(engine.session)
+    assert now.headline == "TURN AWAY FROM TP1 (+Z up) AND BACK - it went through 5 K"
+    assert (now.phase, now.order) == ("turn", "RESEAT +Z UP")
+    rig.turn_to("TP2")
+    advance(engine, rig, 6)
+    rig.turn_to("TP1")
+    assert len(texts(advance(engine, rig, 50), "accepted")) == 1
+
+
+def test_what_was_taken_up_at_temperature_is_not_taken_up_twice(tmp_path):
+    setup = short_setup(tmp_path, temps="[25]")
+    engine, rig = Engine(setup, "test"), rig_of(setup)
+    rig.target_degc = 25.0
+    advance(engine, rig, 30)
+    rig.turn_to("TP2")
+    advance(engine, rig, 8)
+    rig.turn_to("TP1")
+    events = advance(engine, rig, LEARNED + 100)
+    assert "anew" not in texts(events, "equilibrium")[0]
+    assert len(texts(events, "accepted")) == 1
 
 
 def test_a_redo_supersedes(tmp_path):

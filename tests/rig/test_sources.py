@@ -80,6 +80,26 @@ def test_our_receiver_reads_the_kernels_frames(tmp_path, device, layout):
     source.close()
 
 
+def test_frames_of_both_kinds_in_one_burst(tmp_path, device):
+    """What is no frame is left out; no byte of a long frame shows behind a short one."""
+    source = opened(device)
+    classic = rig_of(short_setup(tmp_path)).advance().take(slice(0, 40))
+    fd = rig_of(short_setup(tmp_path, layout="fd")).advance().take(slice(0, 40))
+    both = concatenate([fd, classic]).take(np.random.default_rng(1).permutation(80))
+    for part in (fd, both, classic):
+        for i, frame in enumerate(packed(part)):
+            device.ends[0].send(frame)
+            if i % 7 == 0:
+                device.ends[0].send(b"\xff" * 17)
+        before = time.time_ns()
+        found = read_until(source, len(part))
+        same(found, part)
+        assert not found.data[:, part.data.shape[1] :].any()
+        assert (np.diff(found.t_ns) >= 0).all()
+        assert abs(int(found.t_ns[0]) - before) < 60e9
+    source.close()
+
+
 def test_silence_is_told_and_so_is_its_end(tmp_path, device):
     source = opened(device)
     frames = rig_of(short_setup(tmp_path)).advance()

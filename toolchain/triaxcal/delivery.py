@@ -21,6 +21,7 @@ from triaxcal.codegen.routines import (
     Generated,
     Reference,
     Routine,
+    routines_of,
     start_generated,
     start_reference,
 )
@@ -28,6 +29,7 @@ from triaxcal.codegen.tryout import MethodResult, model_error_g, run_on_dwells
 from triaxcal.errors import RefusedError
 from triaxcal.fit.acceptance import dwells_in_range, refuse_unacceptable
 from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.fit.family.route import calibrate_recording
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.compensation import Compensation, compensate
@@ -75,8 +77,11 @@ class Delivery:
     files: dict[str, bytes]
 
 
-def deliver(folder: Path) -> Delivery:
+def deliver(folder: Path, reference: Reference | None = None) -> Delivery:
     """Calibrate the unit in `folder`, generate its C and check it.
+
+    `reference` is the handwritten C, which does not depend on the unit, where it has been compiled
+    already.
 
     Raises
     ------
@@ -86,17 +91,16 @@ def deliver(folder: Path) -> Delivery:
     with tempfile.TemporaryDirectory(prefix="triaxcal-") as name, _compilations() as started:
         work = Path(name)
         unit = read_unit(folder)
-        inputs = inputs_sha256(folder)
-        started.append(start_reference(work))
-        measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
-        calibration = calibrate(unit, measurements)
-        refuse_unacceptable(unit, calibration, measurements)
+        inputs = inputs_sha256(folder, unit)
+        if reference is None:
+            started.append(start_reference(work))
+        unit, measurements, calibration = _calibrated(unit, folder)
         dwells = dwells_in_range(unit, calibration.range_degc, measurements)
         compensation = compensation_of(unit, calibration, unit.method)
         plan = make_plan(compensation, unit)
         model_error = model_error_g(unit, calibration.thermal, plan)
         _refuse_model_error(unit, plan, model_error)
-        if inputs_sha256(folder) != inputs:
+        if inputs_sha256(folder, unit) != inputs:
             raise RefusedError(str(folder), "changed while it was read", remedy="run it again")
         files = _firmware_files(unit, calibration, compensation, plan, inputs)
         for file, content in files.items():
@@ -104,10 +108,12 @@ def deliver(folder: Path) -> Delivery:
         started.append(start_generated(work, work))
         bound = prove(plan)
         sets = vector_sets(plan)
-        reference, generated = Reference(started[0].load()), Generated(started[1].load())
+        reference = reference or Reference(started[0].load())
+        generated = Generated(started[-1].load())
         image = files[IMAGE_FILE]
-        check = cross_check(plan, sets, generated, reference.routine(image), image)
-        check = replace(check, images=check_images(plan, image, generated, reference))
+        tried = routines_of(plan.rate, generated.library, reference.library)
+        check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
+        check = replace(check, images=check_images(plan, image, *tried))
         _refuse_wrong_bound(unit, bound, check)
         routines = {unit.method: generated.run, **_other_routines(unit, calibration, reference)}
         thermal = calibration.thermal
@@ -131,14 +137,37 @@ def compensation_of(unit: UnitDescription, calibration: Calibration, method: str
         calibration.range_degc,
         voltage_max_v,
         unit.model_error_max_micro_g * 1e-6,
+        terms=calibration.terms,
     )
 
 
-def inputs_sha256(folder: Path) -> str:
+def _calibrated(
+    unit: UnitDescription, folder: Path
+) -> tuple[UnitDescription, MeasurementSet, Calibration]:
+    """Unit, readings and calibration, by the route that unit.toml states."""
+    if unit.recording is not None:
+        return calibrate_recording(unit, unit.recording, folder)
+    measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
+    calibration = calibrate(unit, measurements)
+    refuse_unacceptable(unit, calibration, measurements)
+    return unit, measurements, calibration
+
+
+def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:
     """Hash of the unit's two files, the same wherever the folder lies."""
+    recorded = MEASUREMENTS_FILE
+    if unit is not None and unit.recording is not None:
+        recorded = unit.recording.file
     digest = hashlib.sha256()
-    for name in (UNIT_FILE, MEASUREMENTS_FILE):
-        digest.update(hashlib.sha256((folder / name).read_bytes()).digest())
+    for path in (folder / UNIT_FILE, folder / recorded):
+        try:
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+        except OSError as error:
+            raise RefusedError(
+                str(path),
+                f"cannot be read: {(error.strerror or str(error)).lower()}",
+                remedy="put it there, or correct [recording] file",
+            ) from error
     return digest.hexdigest()
 
 
@@ -161,12 +190,14 @@ def _firmware_files(
     inputs: str,
 ) -> dict[str, bytes]:
     low, high = calibration.range_degc
+    reading = calibration.reading_unit
     summary = (
         f"method {compensation.method}: {plan.shape.form} form, {low:g} to {high:g} degC",
         f"functions of order {plan.shape.order} on {plan.shape.segments} segment(s)",
         f"thermal model: {calibration.shape.label}, bias estimator {calibration.estimator}",
-        f"raw code: {unit.adc.bits} bits for {unit.adc.full_scale_v:g} V full scale",
+        f"raw code: {unit.adc.bits} bits for {unit.adc.full_scale_v:g} {reading} full scale",
         "code32 is a raw code left-justified to 32 bits",
+        *_reading_note(unit, calibration),
     )
     provenance = Provenance(unit.serial, inputs, (*summary, *_constants_at_t0(calibration)))
     texts = render_routine(plan)
@@ -176,10 +207,20 @@ def _firmware_files(
     return files
 
 
+def _reading_note(unit: UnitDescription, calibration: Calibration) -> tuple[str, ...]:
+    """What a raw code is where the readings are a recording's, and no volts."""
+    reading = calibration.reading_unit
+    if reading == "V":
+        return ()
+    code = f"{unit.adc.volts_per_code:.9g} {reading}"
+    return (f"raw code = reading / {code}; V below stands for {reading}",)
+
+
 def _constants_at_t0(calibration: Calibration) -> list[str]:
     t0_degc = calibration.thermal.t0_degc
     K, U0 = unpack_constants(calibration.thermal.constants_at(t0_degc))
-    return [f"at {t0_degc:g} degC, K x, y, z in V/g and U0 in V:"] + [
+    units = f"K x, y, z in {calibration.gain_unit} and U0 in {calibration.reading_unit}"
+    return [f"at {t0_degc:g} degC, {units}:"] + [
         f"  {axis}  {K[i, 0]:+.9f} {K[i, 1]:+.9f} {K[i, 2]:+.9f}   {U0[i]:+.9f}"
         for i, axis in enumerate(AXES)
     ]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
 from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certificate_details
 from triaxcal.errors import RefusedError
+from triaxcal.measured import MEASURED_KEYS, Measured, measured_details
+from triaxcal.recordinglayout import DEFAULT_LSB, KEYS, RecordingLayout, recording_layout
 from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
@@ -46,13 +48,27 @@ _LAYOUT: Layout = {
         "order": False,
         "knots_degc": False,
     },
-    "fit": {"estimator": False},
+    "fit": {"estimator": False, "terms": False, "loss": False},
     "sensor": {"polarity": False},
     "compensation": {"method": False, "output_q": False, "model_error_max_micro_g": False},
     "limits": {"at_t0_g": False, "over_range_g": False},
     "uncertainty": dict.fromkeys(UNCERTAINTY_MAX, False),
     "certificate": dict.fromkeys(CERTIFICATE_KEYS, False),
+    "recording": dict.fromkeys(KEYS, False),
+    "measured": dict.fromkeys(MEASURED_KEYS, False),
 }
+_OF_RECORDING: Layout = {
+    **_LAYOUT,
+    "adc": {**dict.fromkeys(_LAYOUT["adc"], False), "lsb": False},
+    "temperature_sensor": dict.fromkeys(_LAYOUT["temperature_sensor"], False),
+    "thermal": dict.fromkeys(_LAYOUT["thermal"], False),
+}
+"""Of a unit with [recording]: what a tilter's must say has a default there."""
+TERMS = ("auto", "linear", "quadratic")
+LOSSES = ("linear", "huber", "cauchy")
+RECORDING_LIMIT_G = 0.02
+"""Limit of P1 (13) by itself for a recording: P1's own are a navigation accelerometer's."""
+RECORDING_DEGC_PER_CODE = 2.0**-7
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
 _NAME_RULE = "1 to 64 of A-Z a-z 0-9 - _, the first a letter or digit"
 
@@ -155,6 +171,12 @@ class UnitDescription:
         Working temperature range; None is the calibrated range.
     polarity : tuple of three signs, or None
         Signs of Kxx, Kyy, Kzz; None means that all three are alike.
+    recording : RecordingLayout or None
+        Where the readings are, when they are no measurements.csv of a tilter.
+    terms, loss : str
+        One of `TERMS`, `LOSSES`: of a recording's fit.
+    adc_open : bool
+        Whether a recording may widen [adc], which says nothing of its bits.
     """
 
     name: str
@@ -173,6 +195,11 @@ class UnitDescription:
     limits: Limits
     stated: StatedUncertainty = StatedUncertainty()
     certificate: CertificateDetails | None = None
+    recording: RecordingLayout | None = None
+    terms: str = "auto"
+    loss: str = "linear"
+    adc_open: bool = False
+    measured: Measured = field(default_factory=Measured)
 
 
 def read_unit(folder: Path) -> UnitDescription:
@@ -185,7 +212,8 @@ def read_unit(folder: Path) -> UnitDescription:
         unit beside it has the same serial number.
     """
     path = find_unit(folder)
-    tables = read_tables(path, _LAYOUT, FORMAT)
+    recorded = "recording" in read_toml(path)
+    tables = read_tables(path, _OF_RECORDING if recorded else _LAYOUT, FORMAT)
     unit = _unit_from_tables(folder.absolute().name, tables)
     _refuse_duplicate_serial(folder, unit.serial)
     return unit
@@ -256,13 +284,15 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
         else None
     )
     gravity_m_per_s2 = site.number("local_gravity_m_per_s2", 9.7, 9.9)
+    recording = recording_layout(tables["recording"])
+    limits_g = (3e-4, 10e-4) if recording is None else (RECORDING_LIMIT_G, RECORDING_LIMIT_G)
     return UnitDescription(
         name=name,
         serial=top.text("serial"),
-        adc=_adc(tables["adc"]),
+        adc=_adc(tables["adc"]) if recording is None else _adc_of(recording, tables["adc"]),
         temperature_sensor=_temperature_sensor(tables["temperature_sensor"]),
         gravity_g=gravity_m_per_s2 / STANDARD_GRAVITY_M_PER_S2,
-        t0_degc=thermal.number("t0_degc", *PLAUSIBLE_DEGC),
+        t0_degc=_number(thermal, "t0_degc", *PLAUSIBLE_DEGC, default=20.0),
         range_degc=(range_degc[0], range_degc[1]) if range_degc else None,
         polarity=_polarity(tables["sensor"]),
         estimator=_choice(tables["fit"], "estimator", ("auto", *ESTIMATORS)),
@@ -275,11 +305,16 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
             compensation, "model_error_max_micro_g", 1e-3, 1e6, default=1.0
         ),
         limits=Limits(
-            at_t0_g=_number(limits, "at_t0_g", 1e-9, 1.0, default=3e-4),
-            over_range_g=_number(limits, "over_range_g", 1e-9, 1.0, default=10e-4),
+            at_t0_g=_number(limits, "at_t0_g", 1e-9, 1.0, default=limits_g[0]),
+            over_range_g=_number(limits, "over_range_g", 1e-9, 1.0, default=limits_g[1]),
         ),
         stated=_stated(tables["uncertainty"]),
         certificate=certificate_details(tables["certificate"]),
+        recording=recording,
+        terms=_choice(tables["fit"], "terms", TERMS),
+        loss=_choice(tables["fit"], "loss", LOSSES),
+        adc_open=recording is not None and not tables["adc"].values,
+        measured=measured_details(tables["measured"]),
     )
 
 
@@ -303,9 +338,33 @@ def _adc(table: Table) -> Adc:
     return Adc(bits, table.number("full_scale_v", 1e-3, 100.0), low, high)
 
 
+def _adc_of(recording: RecordingLayout, table: Table) -> Adc:
+    """How a raw code stands for a reading of a recording: "V" is the reading's unit."""
+    unit = recording.acceleration_unit
+    if "full_scale_v" in table:
+        if unit != "V" or "lsb" in table or "bits" not in table:
+            raise RefusedError(
+                table.where("full_scale_v"),
+                f'given for a recording in "{unit}"',
+                expected=f"lsb, the reading in {unit} of one raw code, and bits",
+            )
+        return _adc(table)
+    lsb = _number(table, "lsb", 1e-12, 1e6, default=DEFAULT_LSB[unit])
+    bits = table.integer("bits", 8, 32) if "bits" in table else _bits_of(unit)
+    values = {"bits": bits, "full_scale_v": 1} | {
+        key: table.values[key] for key in ("code_min", "code_max") if key in table
+    }
+    adc = _adc(Table(table.file, table.name, values))
+    return Adc(bits, lsb * 2.0 ** (bits - 1), adc.code_min, adc.code_max)
+
+
+def _bits_of(unit: str) -> int:
+    return 16 if unit == "count" else 24
+
+
 def _temperature_sensor(table: Table) -> TemperatureSensor:
     return TemperatureSensor(
-        degc_per_code=table.number("degc_per_code", 1e-6, 10.0),
+        degc_per_code=_number(table, "degc_per_code", 1e-6, 10.0, default=RECORDING_DEGC_PER_CODE),
         degc_at_zero=_number(table, "degc_at_zero", -1e4, 1e4, default=0.0),
     )
 

@@ -17,7 +17,10 @@ from triaxcal.errors import RefusedError
 class _Commands(click.Group):
     """Commands of their own files are imported when they are asked for: `calib` waits for none."""
 
-    OTHERS = ("dynamic", "rig", "target", "verify")
+    OTHERS = (
+        "batch", "crosscoupling", "design", "drift", "dynamic", "history", "poses", "rig", "target",
+        "verify",
+    )  # fmt: skip
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted([*super().list_commands(ctx), *self.OTHERS])
@@ -59,19 +62,34 @@ def calib(unit: Path, build: Path) -> None:
     target = build / delivery.unit.name
     publish(files, target, SOMETIMES)
     click.echo(summary(made, files, str(target)))
+    if (unit / "history").is_dir():
+        from triaxcal.cli.history import warn_of_contradiction  # noqa: PLC0415
+
+        warn_of_contradiction(unit, delivery)
 
 
 @main.command()
 @click.argument("unit", type=click.Path(path_type=Path))
 @click.option("--seed", type=int, help="Replaces the seed of truth.toml or imu_truth.toml.")
-def simulate(unit: Path, seed: int | None) -> None:
+@click.option("--series", type=int, help="Write so many units that differ from UNIT instead.")
+@click.option("--into", type=click.Path(path_type=Path), help="Folder of the series' units.")
+def simulate(unit: Path, seed: int | None, series: int | None, into: Path | None) -> None:
     """Write measurements.csv of UNIT, a folder with unit.toml and truth.toml (or tables.toml).
 
     An IMU, with imu_truth.toml, receives recording.csv.
     """
+    from triaxcal.simulation.series import write_series  # noqa: PLC0415
     from triaxcal.simulation.unit import write_simulated_unit  # noqa: PLC0415
 
-    click.echo(f"{write_simulated_unit(unit, seed)} written")
+    if (series is None) != (into is None):
+        raise click.UsageError("--series and --into belong together")
+    if series is None or into is None:
+        click.echo(f"{write_simulated_unit(unit, seed)} written")
+        return
+    folders = write_series(unit, into, series, 1 if seed is None else seed)
+    with click.progressbar(folders, length=series, label="simulating", file=sys.stderr) as bar:
+        written = list(bar)
+    click.echo(f"{len(written)} units written: {written[0]} to {written[-1].name}")
 
 
 def run() -> None:

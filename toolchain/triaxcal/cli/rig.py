@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -330,10 +331,21 @@ def simulate(
 @click.argument("log", type=click.Path(path_type=Path))
 @click.argument("target", type=click.Path(path_type=Path))
 def export(log: Path, target: Path) -> None:
-    """Write LOG for other tools: TARGET ends in .blf, .asc or .csv."""
+    """Write LOG for other tools: TARGET ends in .asc, .blf, .csv, .mf4 or .parquet."""
     from triaxcal.rig.export import export_log  # noqa: PLC0415
 
-    click.echo(f"{target}: {export_log(log, target)} frames")
+    shows = sys.stderr.isatty()
+
+    def told(count: int) -> None:
+        if shows:
+            click.echo(f"\r{count} frames ...", err=True, nl=False)
+
+    try:
+        count = export_log(log, target, told)
+    finally:
+        if shows:
+            click.echo("\r\x1b[K", err=True, nl=False)
+    click.echo(f"{target}: {count} frames")
 
 
 @rig.command()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import re
 import select
 import sys
 import termios
@@ -31,6 +33,8 @@ from triaxcal.rig.view import view
 _REFRESH_S = 0.25
 _ALARM_S = 10.0
 _BITRATE = 1_000_000
+_KEY_CODE = re.compile(rb"\x1b(\[[0-9;]*[A-Za-z~]|O.)?")
+"""An arrow or function key; there are digits in it."""
 
 
 class _Stop(Exception):  # noqa: N818  not an error
@@ -59,22 +63,32 @@ class _Keys:
     def words(self) -> list[Command]:
         words: list[Command] = []
         while self._on and select.select([sys.stdin], [], [], 0)[0]:
-            key = sys.stdin.read(1)
-            if key == "q":
-                raise _Stop
-            if key == "y":
-                words.append(Agree())
-            elif f"TP{key}" in TEST_POSITIONS:
-                words.append(Redo(f"TP{key}"))
+            typed = os.read(sys.stdin.fileno(), 64)
+            self._on = bool(typed)
+            for key in _KEY_CODE.sub(b"", typed).decode("ascii", "ignore"):
+                if key == "q":
+                    raise _Stop
+                if key == "y":
+                    words.append(Agree())
+                elif f"TP{key}" in TEST_POSITIONS:
+                    words.append(Redo(f"TP{key}"))
         return words
 
 
 def guide(setup: Setup, source: Source, folder: Path, plain: bool) -> None:
     """Guide a session to its end and write the records."""
+    start = time.monotonic()
     robot = None
     if isinstance(source, SimulatedSource):
         robot = runner.Robot(source.rig)
     taken = recording.Recording(setup, folder, source.name)
+    if taken.resumed:
+        session = taken.engine.session
+        session.last_event = (
+            f"resumed in {time.monotonic() - start:.2f} s, {len(session.accepted)} accepted "
+            "dwells kept"
+        )
+        click.echo(session.last_event)
     keys = _Keys(plain)
     try:
         with keys.listening():

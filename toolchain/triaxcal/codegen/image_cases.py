@@ -10,13 +10,13 @@ from __future__ import annotations
 import itertools
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from random import Random
 
 import numpy as np
 
-from triaxcal.codegen.image import HEADER_NAMES
+from triaxcal.codegen.image import QUADRATIC, RATE, SENSITIVITY, header_names, terms_word
 from triaxcal.codegen.inverse_edges import inverse_edges
 from triaxcal.codegen.routines import Generated, Reference
 from triaxcal.errors import RefusedError
@@ -25,10 +25,13 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.compensation import INVERSE
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
-ROW_LIMIT = 2**32 - 8
+ROW_LIMIT, ROW_LIMIT_WITH_TERMS = 2**32 - 8, 3 * 2**30
+QUADRATIC_LIMIT, SENSITIVITY_LIMIT = 2**31 - 1, 2**29
+_TABLES = {0: (0, 0), QUADRATIC: (6, QUADRATIC_LIMIT), SENSITIVITY: (3, SENSITIVITY_LIMIT)}
+_RATE_MIN, _RATE_MAX, _RATE_GAIN, _RATE_WORDS = range(4)
+"""Columns and limit of a row of the table of terms."""
 SEED = 20130527
 WILD_IMAGES = 48
-_TEMP_MIN, _TEMP_MAX = len(HEADER_NAMES), len(HEADER_NAMES) + 1
 _FIRST, _ORIGIN, _GAIN, _COEFFICIENTS = range(4)
 
 
@@ -45,13 +48,36 @@ class ImageCase:
 class Layout:
     """Where the words of an image of one shape stand, and step R for them."""
 
+    header: int
     segments: int
     order: int
     inverse: bool
+    columns: int = 0
+    limit: int = 0
+    rate: bool = False
+
+    @property
+    def temp_min(self) -> int:
+        """Index of temp_min_code."""
+        return self.header
+
+    @property
+    def temp_max(self) -> int:
+        """Index of temp_max_code."""
+        return self.header + 1
+
+    @property
+    def row_limit(self) -> int:
+        """Limit of a row."""
+        return ROW_LIMIT_WITH_TERMS if self.columns else ROW_LIMIT
 
     def segment(self, s: int) -> int:
         """Index of the first word of a segment."""
-        return _TEMP_MAX + 1 + s * (_COEFFICIENTS + 12 * (self.order + 1))
+        return self.header + 2 + s * (_COEFFICIENTS + 12 * (self.order + 1))
+
+    def term(self, row: int, k: int) -> int:
+        """Index of a word of the table of terms."""
+        return self.segment(self.segments) + self.columns * row + k
 
     def coefficient(self, s: int, f: int, k: int) -> int:
         """Index of c_k of a function."""
@@ -59,12 +85,25 @@ class Layout:
 
     def is_safe(self, words: list[int]) -> bool:
         """Step R: whether no arithmetic can overflow with these constants."""
-        low, high = words[_TEMP_MIN], words[_TEMP_MAX]
+        low, high = words[self.temp_min], words[self.temp_max]
         firsts = [words[self.segment(s)] for s in range(self.segments)]
         if firsts[0] != low or any(not low < f <= high for f in firsts[1:]):
             return False
         lasts = [f - 1 for f in firsts[1:]] + [high]
+        if self.rate and not self._rate_is_safe(words):
+            return False
+        for row in range(3):
+            if sum(abs(words[self.term(row, k)]) for k in range(self.columns)) > self.limit:
+                return False
         return all(self._segment_is_safe(words, s, lasts[s]) for s in range(self.segments))
+
+    def rate_word(self, k: int) -> int:
+        """Index of a word of the term in dT/dt."""
+        return self.segment(self.segments) + 3 * self.columns + k
+
+    def _rate_is_safe(self, words: list[int]) -> bool:
+        low, high, gain = (words[self.rate_word(k)] for k in (_RATE_MIN, _RATE_MAX, _RATE_GAIN))
+        return low <= 0 <= high and gain > 0 and max(-low, high) * gain <= INT32_MAX
 
     def _segment_is_safe(self, words: list[int], s: int, last: int) -> bool:
         at = self.segment(s)
@@ -82,8 +121,11 @@ class Layout:
                 if bound > INT32_MAX:
                     return False
             ends.append(bound)
+        if self.rate:
+            for i in range(3):
+                ends[4 * i + 3] += abs(words[self.rate_word(_RATE_WORDS + i)]) // 2 + 1
         rows = [sum(ends[4 * i : 4 * i + 3]) + 2 * ends[4 * i + 3] for i in range(3)]
-        return self.inverse or max(rows) < ROW_LIMIT
+        return self.inverse or max(rows) < self.row_limit
 
 
 def check_images(plan: Plan, image: bytes, generated: Generated, reference: Reference) -> int:
@@ -123,12 +165,19 @@ def check_images(plan: Plan, image: bytes, generated: Generated, reference: Refe
 def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
     """Damaged images, images at the limits of step R, and wild ones."""
     shape = plan.shape
-    layout = Layout(shape.segments, shape.order, shape.form == INVERSE)
+    names = header_names(plan)
+    terms = terms_word(plan)
+    columns, limit = _TABLES[terms & (QUADRATIC | SENSITIVITY)]
+    layout = Layout(
+        len(names), shape.segments, shape.order, shape.form == INVERSE, columns, limit,
+        bool(terms & RATE),
+    )  # fmt: skip
     words = list(struct.unpack(f"<{len(image) // 4}i", image))[:-1]
-    cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image)]
+    cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image, names)]
     changes = itertools.chain(
         _temperature_edges(layout, words), _coefficient_edges(layout, words),
-        _row_edges(layout), _wild(layout), _inverse_edges(layout, plan),
+        _row_edges(layout), _wild(layout), _inverse_edges(layout, plan), _term_edges(layout),
+        _rate_edges(layout, words),
     )  # fmt: skip
     for name, change in changes:
         if not all(INT32_MIN <= value <= INT32_MAX for value in change.values()):
@@ -149,7 +198,7 @@ def _sealed(words: list[int]) -> bytes:
     return payload + struct.pack("<I", zlib.crc32(payload))
 
 
-def _damaged(image: bytes) -> Iterator[tuple[str, bytes]]:
+def _damaged(image: bytes, names: Sequence[str]) -> Iterator[tuple[str, bytes]]:
     for size in (0, 4, len(image) - 4, len(image) - 1):
         yield f"cut to {size} bytes", image[:size]
     for more in (1, 4):
@@ -157,25 +206,25 @@ def _damaged(image: bytes) -> Iterator[tuple[str, bytes]]:
     for at in range(len(image)):
         yield f"bit of byte {at}", image[:at] + bytes([image[at] ^ 1 << at % 8]) + image[at + 1 :]
     words = list(struct.unpack(f"<{len(image) // 4}i", image))[:-1]
-    for at, name in enumerate(HEADER_NAMES):
+    for at, name in enumerate(names):
         for bit in (1, INT32_MIN):
             yield f"{name}, CRC right", _sealed([*words[:at], words[at] ^ bit, *words[at + 1 :]])
 
 
 def _temperature_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
-    low, high = words[_TEMP_MIN], words[_TEMP_MAX]
+    low, high = words[layout.temp_min], words[layout.temp_max]
     starts = [layout.segment(s) for s in range(layout.segments)]
     for value in (low - 1, low + 1):
-        yield "temp_min_code", {_TEMP_MIN: value}
+        yield "temp_min_code", {layout.temp_min: value}
         yield "first_code", {starts[0]: value}
     last_origin, last_gain = words[starts[-1] + _ORIGIN], words[starts[-1] + _GAIN]
     reach = INT32_MAX // last_gain
     for value in (last_origin + reach, last_origin + reach + 1, low, low - 1, INT32_MAX, INT32_MIN):
-        yield f"temp_max_code {value}", {_TEMP_MAX: value}
+        yield f"temp_max_code {value}", {layout.temp_max: value}
     reach = INT32_MAX // words[starts[0] + _GAIN]
     for beyond in (0, 1):
         value = words[starts[0] + _ORIGIN] - reach - beyond
-        yield f"temp_min_code {value}", {_TEMP_MIN: value, starts[0]: value}
+        yield f"temp_min_code {value}", {layout.temp_min: value, starts[0]: value}
     firsts = [words[at] for at in starts]
     lasts = [f - 1 for f in firsts[1:]] + [high]
     for s, at in enumerate(starts):
@@ -227,7 +276,7 @@ def _row_edges(layout: Layout) -> Iterator[Change]:
     floors = sum_of_floors(layout.order)
     for s, row, last in itertools.product(range(layout.segments), range(3), range(4)):
         for excess in (-1, 0):
-            left = ROW_LIMIT + excess
+            left = layout.row_limit + excess
             weights = [1, 1, 1, 2]
             change = {
                 layout.coefficient(s, 4 * row + j, k): 0
@@ -244,7 +293,7 @@ def _row_edges(layout: Layout) -> Iterator[Change]:
             # What the last cannot take (it is too much, or odd) goes to the first gain.
             first = layout.coefficient(s, 4 * row + (0 if last else 1), 0)
             change[first] += left if change[first] > 0 else -left
-            yield f"row {row} at {ROW_LIMIT + excess}, segment {s}", change
+            yield f"row {row} at {layout.row_limit + excess}, segment {s}", change
 
 
 def sum_of_floors(order: int) -> int:
@@ -271,6 +320,12 @@ def _wild(layout: Layout) -> Iterator[Change]:
                 range(layout.segments), range(3), range(layout.order + 1)
             ):
                 change[layout.coefficient(s, 4 + j, k)] = change[layout.coefficient(s, j, k)]
+        for row, k in itertools.product(range(3), range(layout.columns)):
+            # As many of equal shares keep step R; every eighth image may break it.
+            limit = layout.limit // (2 if number % 8 == 0 else layout.columns)
+            change[layout.term(row, k)] = rng.randint(-limit, limit)
+        for k in range(3 if layout.rate else 0):
+            change[layout.rate_word(_RATE_WORDS + k)] = rng.randint(-size // 2, size // 2)
         yield f"wild {number}", change
 
 
@@ -279,7 +334,9 @@ def _inverse_edges(layout: Layout, plan: Plan) -> Iterator[Change]:
     if shape.inverse is None:
         return
     largest = INT32_MAX - sum_of_floors(layout.order)
-    for name, k00, k01, u0, k10 in inverse_edges(shape.inverse, largest, shape.rounding_in_offset):
+    for name, k00, k01, u0, k10 in inverse_edges(
+        shape.inverse, largest, shape.rounding_in_offset, layout.row_limit
+    ):
         constant = {0: k00, 1: k01, 3: u0, 4: k10, 5: largest, 10: largest}
         yield (
             name,
@@ -290,6 +347,51 @@ def _inverse_edges(layout: Layout, plan: Plan) -> Iterator[Change]:
                 )
             },
         )
+
+
+def _term_edges(layout: Layout) -> Iterator[Change]:
+    """Rows of terms at their limit and one beyond, each word in turn deciding."""
+    for row, last in itertools.product(range(3), range(layout.columns)):
+        for excess in (0, 1):
+            share = layout.limit // layout.columns
+            change = {
+                layout.term(row, k): share if k % 2 else -share for k in range(layout.columns)
+            }
+            most = layout.limit + excess - (layout.columns - 1) * share
+            change[layout.term(row, last)] = most if row % 2 else -most
+            yield f"terms of row {row} at {layout.limit + excess}, word {last}", change
+        alone = {layout.term(row, k): 0 for k in range(layout.columns)}
+        for value in (layout.limit, -layout.limit, INT32_MIN, INT32_MAX):
+            yield f"term {row}, {last} = {value}", {**alone, layout.term(row, last): value}
+
+
+def _rate_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
+    """The range of rates about zero, its gain, and words that take a row to its limit."""
+    if not layout.rate:
+        return
+    at = layout.rate_word
+    for low, high in ((0, 0), (1, 1), (-1, -1), (0, INT32_MAX), (-INT32_MAX, 0), (INT32_MIN, 0)):
+        yield f"rates {low} to {high}", {at(_RATE_MIN): low, at(_RATE_MAX): high, at(_RATE_GAIN): 1}
+    fastest = max(-words[at(_RATE_MIN)], words[at(_RATE_MAX)])
+    fullest = INT32_MAX // fastest
+    for gain in (INT32_MIN, -1, 0, 1, fullest, fullest + 1, INT32_MAX):
+        yield f"gain {gain} of the rate", {at(_RATE_GAIN): gain}
+    for row in range(3):
+        here = at(_RATE_WORDS + row)
+        for value in (INT32_MIN, -INT32_MAX, INT32_MAX):
+            yield f"rate word {value} of row {row}", {here: value}
+        nothing = {
+            layout.coefficient(s, 4 * row + j, k): 0
+            for s, j, k in itertools.product(
+                range(layout.segments), range(4), range(layout.order + 1)
+            )
+        }
+        # The row is gains and 2 (b + |r| / 2 + 1): b takes what is left, some less and one more.
+        left = layout.row_limit // 2 - 3 * sum_of_floors(layout.order) - 2**30 - 1
+        for b in (left - 3, left - 2, left - 1, left, left + 1):
+            change = {**nothing, here: 2**31 - 2}
+            change |= {layout.coefficient(s, 4 * row + 3, 0): b for s in range(layout.segments)}
+            yield f"rate word and offset {b} of row {row}", change
 
 
 def case_vectors(plan: Plan) -> tuple[np.ndarray, np.ndarray]:

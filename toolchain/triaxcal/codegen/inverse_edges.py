@@ -17,7 +17,6 @@ import numpy as np
 from triaxcal.fixedpoint.inversion import InverseShifts, invert, quarter_determinant, reciprocal
 from triaxcal.model.types import IntArray
 
-ROW_LIMIT = 2**32 - 8
 _TRIES = 64
 """Elements k_01 that are tried: each unit adds about one to the row's gains, until what is left of
 the row's sum is even and within reach of the offset."""
@@ -32,10 +31,13 @@ Constants = tuple[str, int, int, int, int]
 """A name, k_00, k_01, U0_x and k_10; k_11 = k_22 is the largest that fits."""
 
 
-def inverse_edges(shifts: InverseShifts, largest: int, preload: int) -> Iterator[Constants]:
+def inverse_edges(
+    shifts: InverseShifts, largest: int, preload: int, row_limit: int
+) -> Iterator[Constants]:
     """Constants at the limits; a limit that this shape cannot reach is left out.
 
-    `largest` is the magnitude that a constant may have, `preload` the rounding in the offset.
+    `largest` is the magnitude that a constant may have, `preload` the rounding in the offset,
+    `row_limit` that of step R.
     """
     least = shifts.determinant_min
     for determinant in (least - 2, least - 1, least, least + 1):
@@ -51,7 +53,7 @@ def inverse_edges(shifts: InverseShifts, largest: int, preload: int) -> Iterator
     k = _element(least, largest, shifts)
     if k is None:
         return
-    for target, k00 in itertools.product((ROW_LIMIT - 1, ROW_LIMIT), (k, -k)):
+    for target, k00 in itertools.product((row_limit - 1, row_limit), (k, -k)):
         for k01 in range(_TRIES):
             u0 = _offset_at(target, (k00, k01), largest, shifts, preload)
             if u0 is not None:

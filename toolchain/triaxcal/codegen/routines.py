@@ -11,7 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from triaxcal.codegen.compiler import Compilation, compile_library
+from triaxcal.codegen.forces import forces_of, rates_of
 from triaxcal.errors import RefusedError
+from triaxcal.fixedpoint.rate import RatePlan
 from triaxcal.resources import shipped
 
 Int32Array = npt.NDArray[np.int32]
@@ -37,6 +39,18 @@ def start_generated(folder: Path, target: Path) -> Compilation:
     return compile_library(
         [folder / "triax_comp.c", source / "triax_batch.c"],
         target / "triax_comp.so",
+        include=[folder, source],
+    )
+
+
+def start_generated_imu(folder: Path, target: Path) -> Compilation:
+    """Start compiling the generated files of an IMU in `folder` with the batch entries."""
+    source = shipped("firmware_ref")
+    names = ("triax_comp.c", "triax_gyro_comp.c", "triax_imu.c")
+    batches = ("triax_batch.c", "triax_gyro_batch.c", "triax_imu_batch.c")
+    return compile_library(
+        [*(folder / name for name in names), *(source / name for name in batches)],
+        target / "triax_imu.so",
         include=[folder, source],
     )
 
@@ -93,6 +107,132 @@ class Generated:
             _pointer(temp), _pointer(raw), _pointer(accel), _pointer(status),
         )  # fmt: skip
         return int(loaded), (accel, status)
+
+
+@dataclass(frozen=True)
+class RateReference(Reference):
+    """The handwritten reference with the rates of temperature of `rates_of`."""
+
+    rate: RatePlan
+
+    def routine(self, image: bytes) -> Routine:
+        """Bind an image."""
+
+        def run(temp: Int32Array, raw: Int32Array) -> Answers:
+            accel, status = _outputs(len(temp))
+            rates = rates_of(self.rate, temp).astype(np.int32)
+            refused = self.library.triax_ref_batch_rate(
+                image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
+                _pointer(temp), _pointer(rates), _pointer(raw), _pointer(accel), _pointer(status),
+            )  # fmt: skip
+            if refused:
+                raise RefusedError("reference C", f"the image was refused (status {refused})")
+            return accel, status
+
+        return run
+
+
+@dataclass(frozen=True)
+class RateGenerated(Generated):
+    """A generated routine with a term in dT/dt, with the rates of `rates_of`."""
+
+    rate: RatePlan
+
+    def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
+        """Answers with the compiled-in constants."""
+        return self._run(None, temp, raw)[1]
+
+    def run_image(self, image: bytes, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
+        """Status of triax_calib_load, and the answers with the constants of the image."""
+        return self._run(image, temp, raw)
+
+    def _run(self, image: bytes | None, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
+        accel, status = _outputs(len(temp))
+        rates = rates_of(self.rate, temp).astype(np.int32)
+        loaded = self.library.triax_batch_rate(
+            image, ctypes.c_size_t(len(image or b"")), ctypes.c_size_t(len(temp)),
+            _pointer(temp), _pointer(rates), _pointer(raw), _pointer(accel), _pointer(status),
+        )  # fmt: skip
+        return int(loaded), (accel, status)
+
+
+@dataclass(frozen=True)
+class GyroReference(Reference):
+    """The handwritten reference of a gyro, with the forces of `forces_of`."""
+
+    def routine(self, image: bytes) -> Routine:
+        """Bind an image."""
+
+        def run(temp: Int32Array, raw: Int32Array) -> Answers:
+            rate, status = _outputs(len(temp))
+            force = _forces(temp, raw)
+            refused = self.library.triax_ref_batch_gyro(
+                image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
+                _pointer(temp), _pointer(raw), _pointer(force), _pointer(rate), _pointer(status),
+            )  # fmt: skip
+            if refused:
+                raise RefusedError("reference C", f"the image was refused (status {refused})")
+            return rate, status
+
+        return run
+
+
+@dataclass(frozen=True)
+class GyroGenerated(Generated):
+    """A gyro's generated routine, with the forces of `forces_of`."""
+
+    def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
+        """Answers with the compiled-in constants."""
+        rate, status = _outputs(len(temp))
+        force = _forces(temp, raw)
+        self.library.triax_gyro_batch(
+            ctypes.c_size_t(len(temp)),
+            _pointer(temp), _pointer(raw), _pointer(force), _pointer(rate), _pointer(status),
+        )  # fmt: skip
+        return rate, status
+
+    def run_image(self, image: bytes, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
+        """Status of triax_gyro_calib_load, and the answers with the constants of the image."""
+        rate, status = _outputs(len(temp))
+        force = _forces(temp, raw)
+        loaded = self.library.triax_gyro_batch_image(
+            image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
+            _pointer(temp), _pointer(raw), _pointer(force), _pointer(rate), _pointer(status),
+        )  # fmt: skip
+        return int(loaded), (rate, status)
+
+
+@dataclass(frozen=True)
+class GeneratedImu:
+    """Both triads in one call."""
+
+    library: ctypes.CDLL
+
+    def run(
+        self, image: bytes | None, temp: Int32Array, raw_accel: Int32Array, raw_gyro: Int32Array
+    ) -> tuple[int, tuple[Int32Array, Int32Array, UInt32Array]]:
+        """Status of the loader (0 without an image); accelerations, rates and status."""
+        accel, status = _outputs(len(temp))
+        rate = np.zeros_like(accel)
+        loaded = self.library.triax_imu_batch(
+            image, ctypes.c_size_t(len(image or b"")), ctypes.c_size_t(len(temp)), _pointer(temp),
+            _pointer(raw_accel), _pointer(raw_gyro), _pointer(accel), _pointer(rate),
+            _pointer(status),
+        )  # fmt: skip
+        return int(loaded), (accel, rate, status)
+
+
+def routines_of(
+    rate: RatePlan | None, generated: ctypes.CDLL, reference: ctypes.CDLL
+) -> tuple[Generated, Reference]:
+    """Generated routine and reference as the cross-check of an accelerometer calls them."""
+    if rate is None:
+        return Generated(generated), Reference(reference)
+    return RateGenerated(generated, rate), RateReference(reference, rate)
+
+
+def _forces(temp: Int32Array, raw: Int32Array) -> Int32Array:
+    return np.ascontiguousarray(forces_of(temp, raw).astype(np.int32))
 
 
 def _outputs(count: int) -> Answers:

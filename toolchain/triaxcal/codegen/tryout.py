@@ -11,8 +11,10 @@ from triaxcal.codegen.routines import Routine
 from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.integer_model import STATUS_OK
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.quadratic import quadratic_log2
 from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g
 from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.terms import products
 from triaxcal.model.thermal import ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.records import Dwell
@@ -118,4 +120,11 @@ def model_error_g(unit: UnitDescription, thermal: ThermalModel, plan: Plan) -> f
     temps = plan.temp_codes.astype(np.float64) * sensor.degc_per_code + sensor.degc_at_zero
     exact = exact_gain_and_offset(thermal.constants_at(temps))
     voltage_max_v = shape.raw_box * plan.volts_per_lsb
-    return float(worst_force_error_g((gain, offset), exact, voltage_max_v).max())
+    error = worst_force_error_g((gain, offset), exact, voltage_max_v)
+    if plan.real_quadratic is not None:
+        # The same Q of an l that is e off: |p(l + e) - p(l)| <= p(|l| + |e|) - p(|l|).
+        log2 = quadratic_log2(shape.output_q, shape.output_shift - 32)
+        per_g = np.abs(plan.real_quadratic) * 2.0**-log2
+        reach = np.abs(exact[0]).sum(axis=-1) * voltage_max_v + np.abs(exact[1])
+        error = error + (products(reach + error) - products(reach)) @ per_g.T
+    return float(error.max())

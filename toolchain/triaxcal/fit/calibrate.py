@@ -15,6 +15,7 @@ from triaxcal.fit.curves import (
     parameter_covariance,
     shifted_voltage,
 )
+from triaxcal.fit.family.result import RecordingFit
 from triaxcal.fit.grouping import (
     GroupedReadings,
     TemperatureGroup,
@@ -119,6 +120,11 @@ class Calibration:
         In the order of the file.
     terms : Terms
         Quadratic and dT/dt terms, where the data carried them.
+    recording : RecordingFit or None
+        The poses, where the readings are a recording and no tilter's; `points` then has the
+        constants at T0 alone, and `parameter_covariance` only the blocks of each output.
+    reading_unit : str
+        Unit of U0; K has it per g. That of the recording, where there is one.
     """
 
     serial: str
@@ -133,9 +139,22 @@ class Calibration:
     selection_reason: str
     check_dwells: tuple[CheckResult, ...]
     terms: Terms = NO_TERMS
+    recording: RecordingFit | None = None
+    reading_unit: str = "V"
+
+    @property
+    def gain_unit(self) -> str:
+        """Unit of K."""
+        unit = self.reading_unit
+        return f"({unit})/g" if "/" in unit else f"{unit}/g"
 
     def constants_covariance(self, temp_degc: FloatArray | float) -> FloatArray:
         """Covariance of the curves' constants, (..., 12, 12), at temperatures of shape (...)."""
+        if self.recording is not None:
+            basis = self.shape.basis(temp_degc)
+            full = self.recording.covariance
+            result: FloatArray = np.einsum("...p,apbq,...q->...ab", basis, full, basis)
+            return result
         return curve_covariance(self.shape, self.parameter_covariance, temp_degc)
 
 

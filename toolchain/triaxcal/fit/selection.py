@@ -64,6 +64,8 @@ class Candidate:
     chosen : bool
     label : str
         The thermal function in words.
+    condition : float or None
+        Condition number, where a recording's poses were anyone's choice.
     """
 
     estimator: str
@@ -75,6 +77,7 @@ class Candidate:
     fit_residual_g: float
     chosen: bool
     label: str
+    condition: float | None = None
 
 
 @dataclass(frozen=True)

@@ -15,16 +15,13 @@ from triaxcal.fixedpoint.inversion import (
     quarter_determinant,
     reciprocal,
 )
+from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unitfile import OUTPUT_Q_RANGE
 
 MAX_SPARE_BITS = 16
 MIN_SPARE_BITS = -4
 """Below this the gain's own last place costs more than 16 output LSB: a smaller Q says as much."""
-
-ROW_LIMIT = 2**32 - 8
-"""|n_i0| + |n_i1| + |n_i2| + 2 |b_i| stays below this: the 64-bit sum and its high word plus b
-cannot overflow for any int32 raw codes (docs/fixed-point.md, step R)."""
 
 _NAMES = tuple(
     f"{matrix}{row}{column}" if column else f"{offset}{row}"
@@ -36,10 +33,12 @@ FUNCTION_NAMES = {"direct": _NAMES[:12], "inverse": _NAMES[12:]}
 """Names of the twelve functions in image order."""
 
 
-def choose_spare_bits(real: FloatArray, output_q: int, where: str) -> int:
+def choose_spare_bits(real: FloatArray, room: FloatArray, shape: Shape, where: str) -> int:
     """Largest number of spare bits with which the direct form fits.
 
-    `real`, shape (segments, 12, order + 1), is in units of no spare bits.
+    `real`, shape (segments, 12, order + 1), is in units of no spare bits, and so is `room`, shape
+    (3,), what the offsets need besides. Of the
+    plan's `shape` the output's format counts, but for the spare bits.
 
     Raises
     ------
@@ -47,14 +46,16 @@ def choose_spare_bits(real: FloatArray, output_q: int, where: str) -> int:
         Naming the row or the coefficient that does not fit, and the highest output_q that does.
     """
     stage = _stage_bounds(real)
+    stage[3::4, 0] += room
+
+    def fits(spare: int) -> bool:
+        return _fits(stage * 2.0**spare, real.shape[2], spare, shape.row_limit)
+
     for spare in range(MAX_SPARE_BITS, MIN_SPARE_BITS - 1, -1):
-        if _fits(stage * 2.0**spare, real.shape[2], spare):
+        if fits(spare):
             return spare
-    fitting = next(
-        (s for s in range(MIN_SPARE_BITS - 1, -40, -1) if _fits(stage * 2.0**s, real.shape[2], s)),
-        None,
-    )
-    raise _refusal(stage * 2.0**MIN_SPARE_BITS, output_q, fitting, where)
+    fitting = next((s for s in range(MIN_SPARE_BITS - 1, -40, -1) if fits(s)), None)
+    raise _refusal(stage * 2.0**MIN_SPARE_BITS, shape, fitting, where)
 
 
 def _stage_bounds(real: FloatArray) -> FloatArray:
@@ -64,15 +65,15 @@ def _stage_bounds(real: FloatArray) -> FloatArray:
     return bounds
 
 
-def _fits(stage: FloatArray, terms: int, spare: int) -> bool:
+def _fits(stage: FloatArray, terms: int, spare: int, row_limit: int) -> bool:
     stage = stage + _rounding(terms)
     rows = _row_sums(stage) + 2.0 ** (spare + 1)
-    return bool(stage.max() <= INT32_MAX and rows.max() < ROW_LIMIT)
+    return bool(stage.max() <= INT32_MAX and rows.max() < row_limit)
 
 
 def _rounding(terms: int) -> float:
-    """Most that rounded coefficients and floors add to a stage."""
-    return terms + 2.0
+    """Most that rounded coefficients and floors add to a stage, and a term in dT/dt its own."""
+    return terms + 4.0
 
 
 def _row_sums(stage: FloatArray) -> FloatArray:
@@ -81,16 +82,16 @@ def _row_sums(stage: FloatArray) -> FloatArray:
     return sums
 
 
-def _refusal(stage: FloatArray, output_q: int, fitting: int | None, where: str) -> RefusedError:
+def _refusal(stage: FloatArray, shape: Shape, fitting: int | None, where: str) -> RefusedError:
     f, k = np.unravel_index(int(stage.argmax()), stage.shape)
     name = FUNCTION_NAMES["direct"][f]
-    largest_g = _row_sums(stage).max() / 2.0 ** (MIN_SPARE_BITS + 1 + output_q)
+    largest = _row_sums(stage).max() / 2.0 ** (MIN_SPARE_BITS + 1 + shape.output_q)
     culprit = (
-        f"the declared raw range stands for {largest_g:.4g} g"
+        f"the declared raw range stands for {largest:.4g} {shape.unit}"
         if k == 0
         else f"the temperature coefficient of order {k} of {name} is too steep for the range"
     )
-    return _does_not_fit(culprit, output_q, fitting, where)
+    return _does_not_fit(culprit, shape.output_q, fitting, where)
 
 
 def _does_not_fit(culprit: str, output_q: int, fitting: int | None, where: str) -> RefusedError:
@@ -139,17 +140,20 @@ def choose_matrix_bits(real: FloatArray, where: str) -> int:
 
 
 def choose_inverse(
-    functions: IntArray, k_bits: int, output_q: int, where: str
+    functions: IntArray, room: FloatArray, k_bits: int, shape: Shape, where: str
 ) -> tuple[InverseShifts, int]:
     """Shifts of the inversion and spare bits, from the integers at every temperature code.
 
     `functions`, shape (n, 3, 4), are K (times 2^k_bits raw LSB per g) and U0 (raw LSB).
+    `room`, shape (3,), is what the offsets need besides, at no spare bits. Of the
+    plan's `shape` the output's format counts, but for the spare bits.
 
     Raises
     ------
     RefusedError
         When K is so badly conditioned, or the output so fine, that nothing fits.
     """
+    output_q = shape.output_q
     K = functions[:, :, :3]
     exact = adjugate(K)
     adjugate_shift = max(0, int(np.abs(exact).max()).bit_length() - 31)
@@ -176,14 +180,15 @@ def choose_inverse(
         if gain_shift > 62:
             break
         shifts = replace(shifts, gain_shift=gain_shift)
-        preload = 1 << (spare - 1) if spare > 0 else 0
+        preload = replace(shape, output_shift=32 + spare).rounding_in_offset
         gain, offset = invert(functions, shifts, preload)
-        rows = np.abs(gain).sum(axis=2) + 2 * np.abs(offset)
-        if rows.max() >= ROW_LIMIT or np.abs(offset).max() >= INT32_MAX:
+        offset = np.abs(offset) + np.ceil(room * 2.0**spare + 2.0 * shape.rate).astype(np.int64)
+        rows = np.abs(gain).sum(axis=2) + 2 * offset
+        if rows.max() >= shape.row_limit or offset.max() >= INT32_MAX:
             continue
         if spare >= MIN_SPARE_BITS:
             return shifts, spare
-        largest_g = float(rows.max()) / 2.0 ** (spare + 1 + output_q)
-        culprit = f"the declared raw range stands for {largest_g:.4g} g"
+        largest = float(rows.max()) / 2.0 ** (spare + 1 + output_q)
+        culprit = f"the declared raw range stands for {largest:.4g} {shape.unit}"
         raise _does_not_fit(culprit, output_q, spare, where)
     raise _does_not_fit("the declared raw range", output_q, None, where)

@@ -13,6 +13,7 @@ device inverts. Each Horner step halves, so c_k carries one bit more than c_(k-1
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -20,10 +21,12 @@ from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, round_half_up
 from triaxcal.fixedpoint.formats import choose_inverse, choose_matrix_bits, choose_spare_bits
 from triaxcal.fixedpoint.horner import Segment, horner, segment_of
-from triaxcal.fixedpoint.inversion import InverseShifts
+from triaxcal.fixedpoint.quadratic import quadratic_log2, quantise_quadratic
+from triaxcal.fixedpoint.rate import RatePlan, largest_offset_g, plan_rate
+from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.compensation import INVERSE, Compensation
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.unitfile import TemperatureSensor, UnitDescription
+from triaxcal.unitfile import Adc, TemperatureSensor
 
 MAX_TEMPERATURE_CODES = 2**17
 """Proof and cross-check visit every temperature code: this many take some seconds."""
@@ -36,59 +39,6 @@ MAX_RAW_SHIFT = 30
 ROWS = tuple(3 * i + j if j < 3 else 9 + i for i in range(3) for j in range(4))
 """Where each function of the image's order (row by row: three of the matrix, then the offset)
 stands in the order of `CONSTANT_NAMES`."""
-
-
-@dataclass(frozen=True)
-class Shape:
-    """What the generated routine is specialised to; two images fit the same code if this agrees.
-
-    Attributes
-    ----------
-    form : str
-        "direct" or "inverse".
-    segments, order : int
-        Of the piecewise polynomial.
-    output_q : int
-        Acceleration LSB is 2^-output_q g.
-    output_shift : int
-        Right shift of the 64-bit sum, 32 + spare bits. Above 32 the result cannot leave int32.
-    raw_min, raw_max : int
-        Declared raw range; codes outside are clamped and flagged.
-    raw_shift : int
-        Left shift that makes the declared raw range fill int32.
-    inverse : InverseShifts or None
-        Shifts of the inversion on the device.
-    """
-
-    form: str
-    segments: int
-    order: int
-    output_q: int
-    output_shift: int
-    raw_min: int
-    raw_max: int
-    raw_shift: int
-    inverse: InverseShifts | None
-
-    @property
-    def saturates(self) -> bool:
-        """Whether a result may leave int32, so that the routine has to saturate."""
-        return self.output_shift <= 32
-
-    @property
-    def rounding_in_offset(self) -> int:
-        """Half an output LSB, where the offset's format can hold it: added to b."""
-        return 0 if self.saturates else 1 << (self.output_shift - 33)
-
-    @property
-    def rounding_in_sum(self) -> int:
-        """Half an output LSB, where it has to be added to the 64-bit sum."""
-        return 1 << (self.output_shift - 1) if self.saturates else 0
-
-    @property
-    def raw_box(self) -> int:
-        """Largest magnitude of a left-justified raw code."""
-        return max(abs(self.raw_min), abs(self.raw_max)) << self.raw_shift
 
 
 @dataclass(frozen=True)
@@ -108,6 +58,18 @@ class Plan:
         own last place, without the bits that Horner's halving adds: the reference of the proof.
     volts_per_lsb : float
         Volts of one left-justified raw code.
+    quadratic : array, shape (3, 6), or None
+        Words of the quadratic terms, in the order of `PRODUCT_NAMES`.
+    real_quadratic : array, shape (3, 6), or None
+        What they stand for, in units of their last place.
+    sensitivity : array, shape (3, 3), or None
+        Words of a gyro's g-sensitivity, step G.
+    real_sensitivity : array, shape (3, 3), or None
+        What they stand for, in units of their last place.
+    force_q : int
+        Of a gyro: LSB of the specific force that it takes is 2^-force_q g.
+    rate : RatePlan or None
+        The term in dT/dt.
     """
 
     shape: Shape
@@ -116,6 +78,12 @@ class Plan:
     segments: tuple[Segment, ...]
     real: FloatArray
     volts_per_lsb: float
+    quadratic: IntArray | None = None
+    real_quadratic: FloatArray | None = None
+    sensitivity: IntArray | None = None
+    real_sensitivity: FloatArray | None = None
+    force_q: int = 0
+    rate: RatePlan | None = None
 
     @property
     def temp_codes(self) -> IntArray:
@@ -143,7 +111,27 @@ class Plan:
         return np.concatenate([N, offset[:, :, None]], axis=2)
 
 
-def make_plan(compensation: Compensation, unit: UnitDescription) -> Plan:
+class Triad(Protocol):
+    """What the plan needs to know of a triad; a `UnitDescription` tells it."""
+
+    @property
+    def name(self) -> str:
+        """Name of the unit."""
+
+    @property
+    def adc(self) -> Adc:
+        """Converter of the three outputs."""
+
+    @property
+    def temperature_sensor(self) -> TemperatureSensor:
+        """Thermometer."""
+
+    @property
+    def output_q(self) -> int:
+        """Result's LSB is 2^-output_q."""
+
+
+def make_plan(compensation: Compensation, unit: Triad) -> Plan:
     """Turn a compensation into integers that provably cannot overflow.
 
     Raises
@@ -151,6 +139,11 @@ def make_plan(compensation: Compensation, unit: UnitDescription) -> Plan:
     RefusedError
         When no format holds: names the input range or the coefficient to blame.
     """
+    return triad_plan(compensation, unit, gyro=False)
+
+
+def triad_plan(compensation: Compensation, unit: Triad, *, gyro: bool) -> Plan:
+    """The plan of either triad, without a gyro's g-sensitivity: `make_plan`, `make_gyro_plan`."""
     where = f"unit {unit.name}"
     low, high = _temperature_codes(compensation, unit.temperature_sensor, where)
     bits = max(unit.adc.code_max.bit_length(), (-unit.adc.code_min - 1).bit_length())
@@ -174,9 +167,20 @@ def make_plan(compensation: Compensation, unit: UnitDescription) -> Plan:
         raw_max=unit.adc.code_max,
         raw_shift=raw_shift,
         inverse=None,
+        quadratic=compensation.terms.quadratic_per_g is not None,
+        rate=compensation.terms.rate is not None,
+        gyro=gyro,
     )
     plan = Plan(shape, low, high, tuple(frames), real, volts_per_lsb)
-    return _inverse_plan(plan, where) if compensation.form == INVERSE else _direct_plan(plan, where)
+    terms = compensation.terms
+    room = np.zeros(3) if terms.rate is None else largest_offset_g(terms.rate) * 2.0**unit.output_q
+    planned = _inverse_plan if compensation.form == INVERSE else _direct_plan
+    plan = _with_quadratic(planned(plan, room, where), terms.quadratic_per_g, where)
+    if terms.rate is None:
+        return plan
+    fraction = plan.shape.output_q + plan.shape.output_shift - 32
+    rate = plan_rate(terms.rate, fraction, unit.temperature_sensor.degc_per_code, where)
+    return replace(plan, rate=rate)
 
 
 def _temperature_codes(
@@ -212,7 +216,7 @@ def _temperature_codes(
 
 def _device_polynomials(
     compensation: Compensation,
-    unit: UnitDescription,
+    unit: Triad,
     low: int,
     high: int,
     volts_per_lsb: float,
@@ -258,8 +262,8 @@ def _substitute(coefficients: FloatArray, middle: float, half: float) -> FloatAr
     return result
 
 
-def _direct_plan(plan: Plan, where: str) -> Plan:
-    spare = choose_spare_bits(plan.real, plan.shape.output_q, where)
+def _direct_plan(plan: Plan, room: FloatArray, where: str) -> Plan:
+    spare = choose_spare_bits(plan.real, room, plan.shape, where)
     shape = replace(plan.shape, output_shift=32 + spare)
     real = plan.real * 2.0**spare
     preload = np.zeros(12)
@@ -267,16 +271,24 @@ def _direct_plan(plan: Plan, where: str) -> Plan:
     return replace(plan, shape=shape, real=real, segments=_quantise(plan.segments, real, preload))
 
 
-def _inverse_plan(plan: Plan, where: str) -> Plan:
+def _inverse_plan(plan: Plan, room: FloatArray, where: str) -> Plan:
     bits = choose_matrix_bits(plan.real, where)
     real = plan.real.copy()
     real[:, _MATRIX] *= 2.0**bits
     segments = _quantise(plan.segments, real, np.zeros(12))
     codes = plan.temp_codes
     functions = horner(segments, codes, segment_of(segments, codes)).reshape(-1, 3, 4)
-    inverse, spare = choose_inverse(functions, bits, plan.shape.output_q, where)
+    inverse, spare = choose_inverse(functions, room, bits, plan.shape, where)
     shape = replace(plan.shape, output_shift=32 + spare, inverse=inverse)
     return replace(plan, shape=shape, real=real, segments=segments)
+
+
+def _with_quadratic(plan: Plan, per_g: FloatArray | None, where: str) -> Plan:
+    if per_g is None:
+        return plan
+    spare = plan.shape.output_shift - 32
+    words, real = quantise_quadratic(per_g, quadratic_log2(plan.shape.output_q, spare), where)
+    return replace(plan, quadratic=words, real_quadratic=real)
 
 
 _MATRIX = [f for f in range(12) if f % 4 < 3]

@@ -21,10 +21,17 @@ import numpy as np
 
 from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import INT32_MAX
-from triaxcal.fixedpoint.formats import FUNCTION_NAMES, ROW_LIMIT
+from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.horner import Segment
 from triaxcal.fixedpoint.integer_model import State, set_temperature
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.proof_terms import (
+    check_term_ranges,
+    quadratic_errors,
+    rate_errors,
+    rate_reach,
+    sensitivity_errors,
+)
 from triaxcal.model.types import IntArray
 
 _GUARD_BITS = 20
@@ -62,19 +69,37 @@ def prove(plan: Plan) -> Bound:
         When a range does not hold: a fault of the planner, never of the data.
     """
     check_ranges(plan)
+    check_term_ranges(plan)
     codes = plan.temp_codes
     state, _ = set_temperature(plan, codes)
     _check_rows(plan, state)
     errors = _inverse_errors if plan.shape.inverse is not None else _direct_errors
     axes = [errors(plan, state, axis) for axis in range(3)]
-    worst = int(np.max(axes, axis=0).argmax())
-    per_axis = tuple(math.nextafter(max(axis) + 0.5, math.inf) for axis in axes)
+    by_rate = rate_errors(plan)
+    linear = [_sum_upwards(max(axis), r) for axis, r in zip(axes, by_rate, strict=True)]
+    # An accelerometer has quadratic terms, a gyro a g-sensitivity: one of the two is nil.
+    by_terms = [
+        q + s
+        for q, s in zip(
+            quadratic_errors(plan, state, linear), sensitivity_errors(plan), strict=True
+        )
+    ]
+    extra = np.array(by_rate) + by_terms
+    worst = int((np.array(axes) + extra[:, None]).max(axis=0).argmax())
+    per_axis = tuple(
+        math.nextafter(_sum_upwards(error, more) + 0.5, math.inf)
+        for error, more in zip(linear, by_terms, strict=True)
+    )
     return Bound(
         lsb=max(per_axis),
         per_axis_lsb=(per_axis[0], per_axis[1], per_axis[2]),
         temp_code=int(codes[worst]),
         codes=len(codes),
     )
+
+
+def _sum_upwards(error: float, more: float) -> float:
+    return math.nextafter(error + more, math.inf) if more else error
 
 
 def check_ranges(plan: Plan) -> None:
@@ -92,9 +117,9 @@ def check_ranges(plan: Plan) -> None:
             if bound > INT32_MAX:
                 raise _broken(FUNCTION_NAMES[plan.shape.form][f])
         if plan.shape.inverse is None:
-            for row in range(3):
+            for row, more in enumerate(rate_reach(plan)):
                 n0, n1, n2, b = bounds[4 * row : 4 * row + 4]
-                if n0 + n1 + n2 + 2 * b >= ROW_LIMIT:
+                if n0 + n1 + n2 + 2 * (b + more) >= plan.shape.row_limit:
                     raise _broken(f"row {row} of the sum")
 
 
@@ -112,8 +137,8 @@ def horner_bounds(segment: Segment) -> list[int]:
 
 
 def _check_rows(plan: Plan, state: State) -> None:
-    rows = np.abs(state.gain).sum(axis=2) + 2 * np.abs(state.offset)
-    if int(rows.max()) >= ROW_LIMIT:
+    rows = np.abs(state.gain).sum(axis=2) + 2 * (np.abs(state.offset) + rate_reach(plan))
+    if int(rows.max()) >= plan.shape.row_limit:
         raise _broken(f"the sum at output_q = {plan.shape.output_q}")
 
 

@@ -85,3 +85,14 @@ class Terms:
 
 
 NO_TERMS = Terms()
+
+EXAMPLE_TERMS = Terms(
+    quadratic_per_g=np.array(
+        [
+            [9.1e-4, -2.3e-4, 1.2e-4, 3.0e-4, -1.7e-4, 0.4e-4],
+            [-1.0e-4, 1.4e-3, 0.7e-4, 2.2e-4, 5.0e-5, -6.1e-4],
+            [3.3e-4, 1.0e-5, -7.7e-4, -2.0e-4, 4.4e-4, 1.9e-4],
+        ]
+    )
+)
+"""Of the size that data sheets of capacitive sensors state: what the C with terms is tried on."""

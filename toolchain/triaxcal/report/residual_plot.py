@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from triaxcal.codegen.render import environment
 from triaxcal.codegen.tryout import BEFORE, MethodResult
 from triaxcal.delivery import Delivery
-from triaxcal.report.temperatures import by_temperature, degrees
+from triaxcal.report.temperatures import by_temperature, degrees, position_order
 
 WIDTH = 960.0
 LEFT, RIGHT, TOP, GAP = 64.0, 16.0, 84.0, 8.0
@@ -51,7 +51,11 @@ def residuals_svg(delivery: Delivery) -> bytes:
     largest_mg = max(largest_mg, 1.0, limits.at_t0_g * 1e3, limits.over_range_g * 1e3)
     high = math.ceil(math.log10(largest_mg))
     rows: list[dict[str, object]] = []
-    for prefix, title in (("TP", "test positions, fitted"), ("CP", "check positions, held out")):
+    for prefix, title in (
+        ("TP", "test positions, fitted"),
+        ("CP", "check positions, held out"),
+        ("P", "poses, fitted"),
+    ):
         groups = by_temperature(methods[0], prefix)
         for first in range(0, len(groups), PANELS_PER_ROW):
             scale = _Scale(round(math.log10(FLOOR_MG)), high, TOP + len(rows) * ROW_HEIGHT)
@@ -102,7 +106,7 @@ def _panel(
     x0: float, width: float, indices: list[int], delivery: Delivery, scale: _Scale
 ) -> dict[str, object]:
     methods = [m for m in delivery.methods if m.residuals]
-    indices = sorted(indices, key=lambda i: methods[0].residuals[i].dwell.position)
+    indices = sorted(indices, key=lambda i: position_order(methods[0].residuals[i].dwell.position))
     xs = [_r(x0 + width * (k + 0.5) / len(indices)) for k in range(len(indices))]
     lines = []
     for method in sorted(methods, key=lambda m: m.method == delivery.unit.method):

@@ -26,7 +26,7 @@ def calibration_json(delivery: Delivery) -> bytes:
     document = {
         **_header(delivery),
         "constants": list(CONSTANT_NAMES),
-        "units": ["V/g"] * 9 + ["V"] * 3,
+        "units": [calibration.gain_unit] * 9 + [calibration.reading_unit] * 3,
         "estimator": calibration.estimator,
         "thermal_model": {
             "kind": calibration.thermal.kind,

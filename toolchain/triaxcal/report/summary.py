@@ -9,6 +9,7 @@ from triaxcal.fit.calibrate import Calibration
 from triaxcal.fit.selection import Candidate
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
+from triaxcal.report.measured import measured_words
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.temperatures import by_temperature, degrees
 
@@ -44,7 +45,7 @@ def _wrap(text: str, width: int = 80 - _LABEL) -> list[str]:
     return [line.strip() for line in lines]
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Columns two spaces apart, the first to the left, the others to the right."""
     cells = [list(head), *map(list, rows)]
     widths = [max(len(row[c]) for row in cells) for c in range(len(head))]
@@ -59,12 +60,8 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def _head(delivery: Delivery) -> str:
     calibration, plan = delivery.calibration, delivery.plan
-    temps = ", ".join(degrees(p.temp_degc) for p in calibration.points)
-    checks = len(calibration.check_dwells)
     low, high = calibration.range_degc
-    measured = f"{len(delivery.measurements.dwells)} dwells: six positions at {temps} degC"
-    if checks:
-        measured += f"; {checks} check dwells"
+    measured = measured_words(delivery).removesuffix("; no check dwells")
     outside = len(delivery.measurements.dwells) - len(delivery.methods[0].residuals)
     if outside:
         measured += f"; {outside} of the dwells lie outside the range and are not in the residuals"
@@ -73,6 +70,7 @@ def _head(delivery: Delivery) -> str:
         [
             _entry("unit", f"{delivery.unit.name}  (serial {delivery.unit.serial})"),
             _entry("measured", *_wrap(measured)),
+            *_findings(calibration),
             _entry("thermal model", *_wrap(calibration.selection_reason)),
             _entry("method", *_wrap(method)),
             _entry(
@@ -82,6 +80,17 @@ def _head(delivery: Delivery) -> str:
             ),
         ]
     )
+
+
+def _findings(calibration: Calibration) -> list[str]:
+    """What a recording's poses are worth, and what was found in them."""
+    recording = calibration.recording
+    if recording is None:
+        return []
+    worth = f"condition number {recording.condition:.3g} (1 is the best)"
+    worth += f"; the poses see {recording.weakest} least" if recording.weakest else ""
+    found = [_entry("found", *_wrap(finding)) for finding in recording.findings]
+    return [_entry("observability", *_wrap(worth)), *found]
 
 
 def _thousands(number: int) -> str:
@@ -101,16 +110,19 @@ def _method_words(delivery: Delivery) -> str:
 def _constants(calibration: Calibration) -> str:
     t0 = calibration.thermal.t0_degc
     K, U0 = unpack_constants(calibration.thermal.constants_at(t0))
+    unit = calibration.reading_unit
+    scale, name = (1e3, "mV") if unit == "V" else (1.0, unit)
     rows = [
         [
             f"  {axis}",
             *(f"{K[i, j]:+.8f}" for j in range(3)),
-            f"{U0[i] * 1e3:+.5f}",
+            f"{U0[i] * scale:+.5f}",
         ]
         for i, axis in enumerate(AXES)
     ]
-    head = [f"constants at {t0:g} degC", "K.x V/g", "K.y V/g", "K.z V/g", "U0 mV"]
-    return "\n".join(_table(head, rows))
+    of_gain = [f"K.{axis} {calibration.gain_unit}" for axis in AXES]
+    head = [f"constants at {t0:g} degC", *of_gain, f"U0 {name}"]
+    return "\n".join(table(head, rows))
 
 
 def _candidates(calibration: Calibration) -> str:
@@ -121,11 +133,13 @@ def _candidates(calibration: Calibration) -> str:
             str(c.parameters),
             _micro_g(c.fit_residual_g),
             "-" if c.held_out_g is None else _micro_g(c.held_out_g),
+            *([] if c.condition is None else [f"{c.condition:.3g}"]),
         ]
         for c in calibration.candidates
     ]
     head = ["candidates, rms micro-g", "bias estimator", "parameters", "fitted", "held out"]
-    return "\n".join(_table(head, rows))
+    head += ["condition"] if calibration.recording else []
+    return "\n".join(table(head, rows))
 
 
 def _short_label(candidate: Candidate) -> str:
@@ -141,13 +155,13 @@ def _residuals(delivery: Delivery) -> str:
     """Largest | |a| - g | per temperature and method: figures 5 and 6 of P1 as a table."""
     methods = [m for m in delivery.methods if m.residuals]
     rows = []
-    for kind, prefix in (("test", "TP"), ("check", "CP")):
+    for kind, prefix in (("test", "TP"), ("check", "CP"), ("poses", "P")):
         for temp, indices in by_temperature(methods[0], prefix):
             largest = [max(abs(m.residuals[i].error_g) for i in indices) for m in methods]
             rows.append([f"  {degrees(temp)} degC, {kind}", *(f"{v * 1e3:.4f}" for v in largest)])
     names = [m.method.replace("additive-", "add.-") for m in methods]
     head = ["max | |a| - g |, mg", *names]
-    lines = _table(head, rows)
+    lines = table(head, rows)
     lines += [f"  {m.method}: {m.refusal}" for m in delivery.methods if m.refusal]
     return "\n".join(lines)
 

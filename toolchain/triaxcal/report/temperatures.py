@@ -24,6 +24,12 @@ def by_temperature(result: MethodResult, prefix: str) -> list[tuple[float, list[
     return [(sum(temps[i] for i in group) / len(group), group) for group in groups]
 
 
+def position_order(position: str) -> tuple[str, int]:
+    """Sort key of a position's name: TP2 before TP10."""
+    letters = position.rstrip("0123456789")
+    return letters, int(position[len(letters) :] or 0)
+
+
 def degrees(temp_degc: float) -> str:
     """Temperature in whole degC with its sign; zero has none."""
     whole = round(temp_degc)

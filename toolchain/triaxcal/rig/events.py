@@ -93,6 +93,8 @@ class View:
     ----------
     phase : str
         "reference", "temperature", "turn", "still", "settle", "average", "guard", "done".
+    order : str
+        What to do, in two or three words for big letters.
     headline : str
         The one imperative line.
     wanted, seen, offered : str or None
@@ -110,6 +112,7 @@ class View:
     """
 
     phase: str
+    order: str
     headline: str
     wanted: str | None
     seen: str | None

@@ -2,36 +2,106 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import can
+import numpy as np
 
 from triaxcal.errors import RefusedError
-from triaxcal.rig.candump import read_log
+from triaxcal.rig.candump import NS_PER_US, read_log
+from triaxcal.rig.export_columns import mf4_writer, parquet_writer
+from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, Frames
 from triaxcal.rig.sources import messages_of
 
-SUFFIXES = (".asc", ".blf", ".csv")
+Put = Callable[[Frames], None]
+"""Adds frames to a file that is being written."""
 
 
-def export_log(log: Path, target: Path) -> int:
-    """Write a log as ASC, BLF or CSV, by the target's suffix; returns the number of frames.
+@contextmanager
+def _python_can(target: Path) -> Iterator[Put]:
+    with can.Logger(str(target)) as writer:
+
+        def put(frames: Frames) -> None:
+            for message in messages_of(frames):
+                writer.on_message_received(message)
+
+        yield put
+
+
+@contextmanager
+def _csv(target: Path) -> Iterator[Put]:
+    """Open a table, one row a frame; python-can's has no CAN FD flag and payloads in base64."""
+    with target.open("w", encoding="ascii", newline="\n") as file:
+        file.write("time_s,id,extended,remote,error,fd,length,payload\n")
+
+        def put(frames: Frames) -> None:
+            ids = frames.can_id
+            flags = [(ids & np.uint32(f)) != 0 for f in (EFF_FLAG, RTR_FLAG, ERR_FLAG)]
+            table = np.stack([*flags, frames.fd, frames.length], axis=1).astype(np.int64)
+            rows = zip(
+                (frames.t_ns // NS_PER_US).tolist(),
+                (ids & np.uint32(ID_MASK)).tolist(),
+                table.tolist(),
+                frames.data,
+                strict=True,
+            )
+            for t_us, can_id, (extended, remote, error, fd, length), data in rows:
+                file.write(
+                    f"{t_us // 10**6}.{t_us % 10**6:06d},0x{can_id:X},{extended},{remote},{error},"
+                    f"{fd},{length},{data[:length].tobytes().hex().upper()}\n"
+                )
+
+        yield put
+
+
+WRITERS: dict[str, Callable[[Path], AbstractContextManager[Put]]] = {
+    ".asc": _python_can,
+    ".blf": _python_can,
+    ".csv": _csv,
+    ".mf4": mf4_writer,
+    ".parquet": parquet_writer,
+}
+"""By suffix of the target."""
+
+
+def export_log(log: Path, target: Path, told: Callable[[int], None]) -> int:
+    """Write a log in another format, by the target's suffix; returns the number of frames.
+
+    Parameters
+    ----------
+    told : callable
+        Gets the number of frames done, now and then.
 
     Raises
     ------
     RefusedError
-        When the suffix is another, a file cannot be read or written.
+        When the suffix is another, a package is missing, the log cannot be read or holds no
+        frames, or the target cannot be written. Nothing is left half-written.
     """
-    if target.suffix not in SUFFIXES:
+    if target.suffix not in WRITERS:
         raise RefusedError(
-            str(target), f"suffix {target.suffix!r}", expected="one of " + ", ".join(SUFFIXES)
+            str(target), f"suffix {target.suffix!r}", expected="one of " + ", ".join(WRITERS)
         )
     count = 0
+    # python-can and asammdf choose the format by the suffix: it stays at the end.
+    aside = target.with_name(f".{os.getpid()}-{target.name}")
     try:
-        with can.Logger(str(target)) as writer:
-            for parsed in read_log(log):
-                for message in messages_of(parsed.frames):
-                    writer.on_message_received(message)
-                count += len(parsed.frames)
+        try:
+            aside.touch()  # says in the system's words why it cannot be
+            with WRITERS[target.suffix](aside) as put:
+                for parsed in read_log(log):
+                    put(parsed.frames)
+                    count += len(parsed.frames)
+                    told(count)
+            if not count:
+                raise RefusedError(str(log), "no frames in it", expected="a candump log")
+            aside.replace(target)
+        finally:
+            aside.unlink(missing_ok=True)
     except OSError as error:
-        raise RefusedError(str(target), f"cannot be written: {error.strerror}") from error
+        reason = (error.strerror or str(error)).lower()
+        raise RefusedError(str(target), f"cannot be written: {reason}") from error
     return count

@@ -15,6 +15,14 @@ def fault(block: Block, previous: Block | None, plan: SessionPlan) -> str:
     return next(_faults(block, previous, plan), "")
 
 
+def complaint(block: Block) -> str:
+    """What the bus complains of without a sample's loss by itself, in words; "" for nothing."""
+    count = block.trouble.error_frames
+    if not count:
+        return ""
+    return f"{count} error frames: {error_names(block.trouble.error_bits)}"
+
+
 def _faults(block: Block, previous: Block | None, plan: SessionPlan) -> Iterator[str]:
     settings = plan.stillness
     if block.trouble.error_bits & BUS_OFF:

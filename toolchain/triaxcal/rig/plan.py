@@ -32,10 +32,11 @@ class Stillness:
     moving_step_micro_g : float
         A block moves when its mean is this far from the one before.
     clean_blocks, settle_s, average_s, guard_s : int
-        Seconds at rest before settling; of settling; of averaging; watched before and after the
-        averaging for slips at its ends.
-    noise_sigma, slope_t, slip_t : float
-        Limits of the dwell's variance, slope and largest step, in standard deviations.
+        Seconds at rest before settling; of settling; of averaging; watched behind the averaging
+        for slips at its end.
+    noise_sigma, slope_t, slip_t, creep_t : float
+        Limits of the dwell's variance, slope and largest step, and of the rest's creep, in
+        standard deviations.
     batches : int
         Batch means from which u(A) is made; divides average_s.
     u_max_micro_g, allan_floor_micro_g : float
@@ -54,8 +55,9 @@ class Stillness:
     average_s: int = 60
     guard_s: int = 12
     noise_sigma: float = 3.5
-    slope_t: float = 3.8
-    slip_t: float = 4.2
+    slope_t: float = 3.9
+    slip_t: float = 4.4
+    creep_t: float = 3.7
     batches: int = 20
     u_max_micro_g: float = 3.0
     allan_floor_micro_g: float = 0.5
@@ -137,6 +139,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "noise_sigma": (2.0, 50.0),
     "slope_t": (2.0, 50.0),
     "slip_t": (2.0, 50.0),
+    "creep_t": (2.0, 50.0),
     "batches": (5, 600),
     "u_max_micro_g": (0.01, 1e5),
     "allan_floor_micro_g": (0.0, 1e5),

@@ -6,11 +6,17 @@ import hashlib
 import os
 from pathlib import Path
 
+from triaxcal.errors import RefusedError
 from triaxcal.rig.candump import format_frames
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.journal import disk_refusal, sync_folder, write_all
 
+LogState = dict[str, int | str]
+"""Lines, bytes and SHA-256 of a log."""
+
 _BATCH_BYTES = 1 << 16
+_HASH_BYTES = 8 << 20
+"""Hashed at most with one flush: 20 ms, while the queue holds a second of a full bus."""
 
 
 class RawLog:
@@ -22,20 +28,29 @@ class RawLog:
         Whole lines in it, those not yet flushed included.
     """
 
-    def __init__(self, path: Path, channel: str) -> None:
+    def __init__(self, path: Path, channel: str, known: LogState | None = None) -> None:
         """Open a log, a new one or one to go on with; a torn last line is cut off.
+
+        Parameters
+        ----------
+        known : LogState, optional
+            What the log began with when its journal was last written. Only what follows is read
+            now; the beginning is hashed little by little, with the flushes.
 
         Raises
         ------
         RefusedError
-            When the disk refuses.
+            When the disk refuses, or the log is shorter than what is known of it.
         """
         self.path = path
-        self.lines = 0
+        self._known = known
+        self.lines = int(known["lines"]) if known else 0
         self._channel = channel
         self._hash = hashlib.sha256()
+        self._hashed = 0
         self._waiting: list[bytes] = []
-        self._waiting_bytes = self._size = 0
+        self._waiting_bytes = 0
+        self._size = int(known["bytes"]) if known else 0
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
             self._take_up()
@@ -44,17 +59,19 @@ class RawLog:
             raise disk_refusal(path, error) from error
 
     def _take_up(self) -> None:
-        rest = b""
-        while chunk := os.read(self._file, 1 << 20):
+        found = os.fstat(self._file).st_size
+        if found < self._size:
+            raise changed_log(self.path, f"it has {found} bytes", f"{self._size} or more")
+        at, rest = self._size, b""
+        while chunk := os.pread(self._file, 1 << 20, at):
+            at += len(chunk)
             cut = chunk.rfind(b"\n") + 1
             if not cut:
                 rest += chunk
                 continue
-            whole = rest + chunk[:cut]
+            self._size += len(rest) + cut
+            self.lines += chunk.count(b"\n")
             rest = chunk[cut:]
-            self._hash.update(whole)
-            self.lines += whole.count(b"\n")
-            self._size += len(whole)
         os.ftruncate(self._file, self._size)
         os.lseek(self._file, self._size, os.SEEK_SET)
 
@@ -87,7 +104,6 @@ class RawLog:
             if self._waiting:
                 text = b"".join(self._waiting)
                 write_all(self._file, text)
-                self._hash.update(text)
                 self._size += len(text)
                 self._waiting, self._waiting_bytes = [], 0
             if sync:
@@ -98,10 +114,37 @@ class RawLog:
             self._waiting, self._waiting_bytes = [], 0
             raise disk_refusal(self.path, error) from error
 
+        self._hash_on(_HASH_BYTES)
+
+    def _hash_on(self, most: int) -> None:
+        """Hash some more of the file; refuse it when its beginning is not what is known."""
+        while self._hashed < self._size and most > 0:
+            seam = int(self._known["bytes"]) if self._known else self._size
+            end = seam if self._hashed < seam else self._size
+            chunk = os.pread(self._file, min(1 << 20, end - self._hashed), self._hashed)
+            self._hash.update(chunk)
+            self._hashed += len(chunk)
+            most -= len(chunk)
+            if self._known and self._hashed == seam:
+                found, expected = self._hash.hexdigest(), str(self._known["sha256"])
+                self._known = None
+                if found != expected:
+                    raise changed_log(
+                        self.path,
+                        f"its first {seam} bytes have SHA-256 {found[:16]}...",
+                        f"{expected[:16]}..., as the journal recorded",
+                    )
+
     @property
-    def state(self) -> dict[str, int | str]:
+    def place(self) -> LogState:
+        """Lines and bytes of what has been flushed."""
+        return {"lines": self.lines, "bytes": self._size}
+
+    @property
+    def state(self) -> LogState:
         """Lines, bytes and SHA-256 of what has been flushed."""
-        return {"lines": self.lines, "bytes": self._size, "sha256": self._hash.hexdigest()}
+        self._hash_on(self._size)
+        return {**self.place, "sha256": self._hash.hexdigest()}
 
     def close(self) -> None:
         """Flush and close.
@@ -115,3 +158,14 @@ class RawLog:
             self.flush()
         finally:
             os.close(self._file)
+
+
+def changed_log(path: Path, found: str, expected: str) -> RefusedError:
+    """Error of a log that is not the one its journal was written beside."""
+    return RefusedError(
+        str(path),
+        found,
+        expected=expected,
+        remedy="the log was changed or cut after the session; the journal still holds the "
+        "accepted dwells: `triaxcal rig status`",
+    )

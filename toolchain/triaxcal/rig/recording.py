@@ -17,14 +17,17 @@ from triaxcal.errors import RefusedError
 from triaxcal.rig.candump import NS_PER_US, read_log
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.events import DURABLE, AcceptedDwell, Agree, Command, Event, Redo
-from triaxcal.rig.frames import Frames
+from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.journal import Journal, Record, disk_refusal, read_journal
-from triaxcal.rig.rawlog import RawLog
+from triaxcal.rig.rawlog import LogState, RawLog, changed_log
 from triaxcal.rig.stillness import Reference
 
 FORMAT = 1
 LOG_FILE = "frames.log"
 JOURNAL_FILE = "session.journal"
+_DECIDE_NS = 80_000_000
+"""Frames wait so long for the decoder, which costs the same for ten as for a hundred; they are in
+the log meanwhile. Decisions do not depend on how frames are cut."""
 _NUMBERED = re.compile(r"[0-9]{3,}")
 
 
@@ -50,18 +53,21 @@ class Recording:
         journal = folder / JOURNAL_FILE
         records = read_journal(journal).records if journal.exists() else ()
         self.folder = folder
-        self.log = RawLog(folder / LOG_FILE, channel)
         self.journal = Journal(journal)
+        self.log = RawLog(folder / LOG_FILE, channel, known_log(records))
         history: tuple[Event, ...] = ()
         self.resumed = bool(records)
         if records:
             refuse_other_session(journal, records[0], setup)
             history = durable_events(records)
-            self.journal.append({"kind": "resume", "durable": len(history), **self._place()})
+            self.log.flush(sync=True)
+            log = self.log.place  # its hash would take seconds of a long session's log
+            self.journal.append({"kind": "resume", "durable": len(history), "log": log})
         else:
             self.journal.append({**header(setup), "channel": channel})
         self.engine = Engine(setup, channel, history)
         self._trouble = ""
+        self._waiting: list[Frames] = []
 
     def feed(self, frames: Frames) -> list[Event]:
         """Record frames and decide.
@@ -73,7 +79,11 @@ class Recording:
         """
         frames = whole_microseconds(frames)
         self.log.append(frames)
-        return self._acknowledge(self.engine.feed(frames))
+        if len(frames):
+            self._waiting.append(frames)
+        if not self._waiting or frames_ns(self._waiting) < _DECIDE_NS:
+            return []
+        return self._decide()
 
     def command(self, command: Command, t_ns: int) -> list[Event]:
         """Record a word of the operator and decide.
@@ -83,10 +93,11 @@ class Recording:
         RefusedError
             When the disk refuses.
         """
-        self.log.flush()
+        events = self._decide()
+        self.log.flush(sync=True)
         said = {"name": type(command).__name__, **asdict(command), "t_ns": t_ns}
         self.journal.append({"kind": "command", "command": said, **self._place()})
-        return self._acknowledge(self.engine.command(command, t_ns))
+        return [*events, *self._acknowledge(self.engine.command(command, t_ns))]
 
     def close(self) -> None:
         """Close log and journal.
@@ -101,18 +112,29 @@ class Recording:
         finally:
             self.journal.close()
 
+    def _decide(self) -> list[Event]:
+        frames = concatenate(self._waiting)
+        self._waiting = []
+        return self._acknowledge(self.engine.feed(frames))
+
     def _acknowledge(self, events: list[Event]) -> list[Event]:
         for event in events:
             repeated = event.kind == "trouble" and event.text == self._trouble
             self._trouble = event.text if event.kind == "trouble" else ""
             if repeated:
                 continue  # the same trouble every second would bury the rest
-            self.log.flush(sync=event.kind in DURABLE)
+            # A journal that knows more of the log than the disk has would be no witness.
+            self.log.flush(sync=True)
             self.journal.append({"kind": "event", "event": asdict(event), **self._place()})
         return events
 
     def _place(self) -> dict[str, Any]:
         return {"log": self.log.state}
+
+
+def frames_ns(parts: list[Frames]) -> int:
+    """Time from the first frame of the first part to the last of the last."""
+    return int(parts[-1].t_ns[-1]) - int(parts[0].t_ns[0])
 
 
 def whole_microseconds(frames: Frames) -> Frames:
@@ -186,7 +208,7 @@ class Replayed:
 
     engine: Engine
     events: tuple[Event, ...]
-    log: dict[str, int | str]
+    log: LogState
     bad_lines: int
 
 
@@ -244,25 +266,29 @@ def _chunks(log: Path, cuts: list[int]) -> Iterator[tuple[Frames, tuple[int, int
 
 def _refuse_changed_log(log: Path, records: tuple[Record, ...]) -> None:
     """Refuse a log whose beginning is not what the journal saw."""
-    last = records[-1].get("log")
-    if last is None:
+    known = known_log(records)
+    if known is None:
         return
     try:
         with log.open("rb") as file:
-            found = hashlib.sha256(file.read(int(last["bytes"]))).hexdigest()
+            found = hashlib.sha256(file.read(int(known["bytes"]))).hexdigest()
     except OSError as error:
         raise RefusedError(str(log), f"cannot be read: {error.strerror}") from error
-    if found != last["sha256"]:
-        raise RefusedError(
-            str(log),
-            f"its first {last['bytes']} bytes have SHA-256 {found[:16]}...",
-            expected=f"{last['sha256'][:16]}..., as the journal recorded",
-            remedy="the log was changed or cut after the session; the journal still holds the "
-            "accepted dwells: `triaxcal rig status`",
+    if found != known["sha256"]:
+        raise changed_log(
+            log,
+            f"its first {known['bytes']} bytes have SHA-256 {found[:16]}...",
+            f"{str(known['sha256'])[:16]}..., as the journal recorded",
         )
 
 
-def log_state(log: Path) -> dict[str, int | str]:
+def known_log(records: tuple[Record, ...]) -> LogState | None:
+    """What the log began with when the journal last hashed it."""
+    states = (r["log"] for r in reversed(records) if "sha256" in r.get("log", {}))
+    return next(states, None)
+
+
+def log_state(log: Path) -> LogState:
     """Whole lines of a log, their bytes and SHA-256."""
     content = np.memmap(log, np.uint8, "r") if log.stat().st_size else np.zeros(0, np.uint8)
     ends = np.flatnonzero(content == ord("\n"))

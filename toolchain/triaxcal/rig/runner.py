@@ -16,7 +16,6 @@ from triaxcal.rig.session import Session
 from triaxcal.rig.simulator import SimulatedRig
 from triaxcal.rig.sources import Source
 
-_FLUSH_S = 0.05
 _RATE_WINDOW_S = 2.0
 _CLASSIC_OVERHEAD_BITS = 47 + 12
 """Of an 11-bit frame, and a mean of stuff bits for eight bytes."""
@@ -75,16 +74,13 @@ def live(
     """
     session = recording.engine.session
     meter = _Meter()
-    flushed = time.monotonic()
     while not session.done:
         frames = source.read()
         events = recording.feed(frames)
         now_ns = int(frames.t_ns[-1]) if len(frames) else time.time_ns()
         for word in words():
             events += recording.command(word, now_ns)
-        if time.monotonic() - flushed > _FLUSH_S:
-            recording.log.flush()
-            flushed = time.monotonic()
+        recording.log.flush()
         if robot is not None:
             robot.act(session)
         rate, bits = meter.add(frames)

@@ -4,28 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rich.console import Group
-from rich.panel import Panel
+from rich.console import Console, ConsoleOptions, Group, RenderResult
+from rich.padding import Padding
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
 from triaxcal.model.positions import AXES
+from triaxcal.rig.bigtext import big
 from triaxcal.rig.events import View
 from triaxcal.rig.orientation import described
 
 _COLOURS = {
     "turn": "black on bright_yellow",
     "still": "black on bright_yellow",
-    "settle": "white on blue",
-    "average": "white on blue",
-    "guard": "white on blue",
-    "reference": "white on blue",
+    "settle": "bright_white on blue",
+    "average": "bright_white on blue",
+    "guard": "bright_white on blue",
+    "reference": "bright_white on blue",
     "temperature": "black on cyan",
     "done": "black on bright_green",
 }
 _MARKS = {"done": ("[x]", "green"), "now": ("[>]", "bold"), "redo": ("[r]", "yellow"),
           "open": ("[ ]", "")}  # fmt: skip
+_TALL = 30
+"""Lines of a terminal that has room for big letters of twice the size."""
 _KEYS = " y take what was found    1-6 take TP1-TP6 again    q stop (then: rig resume)"
 
 
@@ -40,12 +43,32 @@ class BusView:
     bitrate: int
 
 
+@dataclass(frozen=True)
+class BigText:
+    """A text in big letters, in bigger ones where the terminal has room for them."""
+
+    text: str
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Lines in the middle; rich would centre each by itself."""
+        tall = console.size.height >= _TALL
+        lines = big(self.text, options.max_width, 2 if tall else 1)
+        margin = " " * ((options.max_width - len(lines[0])) // 2)
+        for line in lines:
+            yield Text(margin + line, no_wrap=True, overflow="crop")
+        if tall:
+            yield Text()
+
+
 def screen(view: View, bus: BusView, alarms: tuple[str, ...]) -> Group:
     """Everything the operator sees, for 80 columns and 24 lines or more."""
     done, whole = view.progress
-    style = "white on red" if alarms else _COLOURS[view.phase]
-    top = Panel(Text(view.headline, style="bold", justify="center"), style=style, padding=(1, 1))
-    bar = ProgressBar(total=max(whole, 1), completed=done)
+    style = "bright_white on red" if alarms else _COLOURS[view.phase]
+    headline = Text(view.headline, style="bold", justify="center")
+    top = Padding(Group(BigText(view.order), headline), (1, 2), style=style)
+    bar = ProgressBar(
+        total=max(whole, 1), completed=done, complete_style="bold", finished_style="bold"
+    )
     message = Text(
         " " + (alarms[-1] if alarms else view.last_event), overflow="ellipsis", no_wrap=False
     )
@@ -62,7 +85,7 @@ def plain_status(view: View) -> str:
 
 
 def _checklist(view: View) -> Text:
-    target = f"{view.target_degc:g} degC" if view.target_degc is not None else "all temperatures"
+    target = f"{view.target_degc:g} degC" if view.target_degc is not None else "done"
     line = Text(f"\n Step {min(view.step + 1, view.steps)}/{view.steps}, {target}:", style="bold")
     for position, state in view.checklist:
         mark, style = _MARKS[state]

@@ -13,7 +13,7 @@ from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.rig.blocks import Block
 from triaxcal.rig.equilibrium import Trend, trend, window_s
 from triaxcal.rig.events import DURABLE, AcceptedDwell, Agree, Command, Event, Redo
-from triaxcal.rig.faults import fault
+from triaxcal.rig.faults import complaint, fault
 from triaxcal.rig.orientation import described, recognised
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.stillness import Reference, average, make_reference, motion, refusals
@@ -73,7 +73,9 @@ class Session:
         self.learning: list[Block] = []
         self.rest: list[Block] = []
         self.taking: str | None = None  # position whose dwell is under way
-        self.reseat: str | None = None  # position that slipped: it must be left and taken up anew
+        self.reseat: str | None = None  # position that must be left and taken up anew
+        self.reseat_why = ""
+        self.seated_degc: float | None = None  # temperature when this position was taken up
         self.temps: deque[tuple[int, float]] = deque()
         self.trends: deque[tuple[int, Trend]] = deque(maxlen=60)
 
@@ -131,10 +133,13 @@ class Session:
             self.plan.stillness,
             self.micro_g_per_code,
         )
-        if wrong:
-            self._say(events, "trouble", block, wrong)
+        if told := wrong or complaint(block):
+            self._say(events, "trouble", block, told)
         self._take_temperature(block)
-        self.seen = recognised(block.mean, self.micro_g_per_code)
+        seen = recognised(block.mean, self.micro_g_per_code)
+        if seen is None or seen != self.seen or self.seated_degc is None:
+            self.seated_degc = self.temp_degc
+        self.seen = seen
         self.previous = block
         self._learn(block, moved, events)
         self._rest(block, moved, events)
@@ -221,6 +226,11 @@ class Session:
         if near and (known or (self.trends and self.trends[-1][1].rests(settings))):
             self.at_temperature, self.balanced_degc = True, temp
             text = f"equilibrium at {temp:.2f} degC"
+            moved_k = abs(temp - (self.seated_degc if self.seated_degc is not None else temp))
+            if self.seen in self.pending and moved_k > settings.span_max_k:
+                # A slip while the unit waited has nothing before it to be seen against.
+                self.reseat, self.reseat_why = self.seen, f"it went through {moved_k:.0f} K"
+                text += f"; {described(self.seen)} is to be left and taken up anew"
             self._say(events, "equilibrium", block, text, temp_degc=temp)
 
     def _positions(self, block: Block, events: list[Event]) -> None:
@@ -266,21 +276,21 @@ class Session:
         settled, averaged, end = self.dwell_s
         settings, position = self.plan.stillness, self.taking
         assert position is not None
-        watched = self.rest[max(0, settled - settings.guard_s) : end]
-        start = min(settings.guard_s, settled)
-        window = slice(start, start + settings.average_s)
-        blocks = watched[window]
+        window = slice(settled, averaged)
+        blocks = self.rest[window]
         assert self.reference is not None
         assert len(blocks) == averaged - settled
         reasons = self._loss(blocks)
         if not reasons:
-            reasons = refusals(watched, window, self.reference, settings, self.micro_g_per_code)
+            rest = self.rest[:end]
+            reasons = refusals(rest, window, self.reference, settings, self.micro_g_per_code)
         self.taking = None
         self.rest = self.rest[-settings.clean_blocks :]
         if reasons:
             self._say(events, "refused", block, f"{position}: {'; '.join(reasons)}, retake")
             # After a slip the unit lies otherwise than it should; resting on would not help.
             self.reseat = position if reasons[0].startswith("slip") else None
+            self.reseat_why = "it slipped"
         else:
             self._accept(block, self._dwell(position, blocks), events)
 

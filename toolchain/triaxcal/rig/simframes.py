@@ -31,7 +31,14 @@ class FrameMaker:
         """Start the counters anew."""
         self._sequence, self._time_us = sequence, time_us
 
-    def frames(self, codes: IntArray, temp_codes: IntArray, second: int, serial_crc: int) -> Frames:
+    def frames(
+        self,
+        codes: IntArray,
+        temp_codes: IntArray,
+        second: int,
+        serial_crc: int,
+        status: int = 0,
+    ) -> Frames:
         """Frames of one second: codes (rate, 3), thermometer's codes spread over the second."""
         n = len(codes)
         index = np.arange(n, dtype=np.int64)
@@ -44,7 +51,8 @@ class FrameMaker:
         zero = np.zeros(n, np.int64)
         if self._fd:
             temps = temp_codes[np.minimum(index // each, len(temp_codes) - 1)]
-            values = {"Sequence": sequence, "Status": zero, "TimeUs": time_us, "TempCode": temps}
+            values = {"Sequence": sequence, "Status": zero + status, "TimeUs": time_us}
+            values["TempCode"] = temps
             values |= {f"Accel{axis}": codes[:, i] for i, axis in enumerate("XYZ")}
             values |= {"SerialCrc": zero + serial_crc, "RateHz": zero + self._rate}
             return _packed(self._messages["RIG_FD"], values, t_ns)
@@ -56,7 +64,12 @@ class FrameMaker:
             ),
             _packed(
                 self._messages["RIG_Z"],
-                {"Sequence": sequence, "AccelZ": codes[:, 2], "TimeUs": time_us, "Status": zero},
+                {
+                    "Sequence": sequence,
+                    "AccelZ": codes[:, 2],
+                    "TimeUs": time_us,
+                    "Status": zero + status,
+                },
                 t_ns,
             ),
             self._temperatures(temp_codes, t_ns[::each][: len(temp_codes)]),

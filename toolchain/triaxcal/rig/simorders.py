@@ -23,6 +23,8 @@ KINDS = {
     "gone": "silence, then the rig's counters start anew",
     "twonodes": "a second rig sends under the same IDs",
     "serial": "another serial number from then on",
+    "status": "value in the status byte",
+    "notemp": "no frames of the thermometer",
 }
 _FORM = re.compile(r"([a-z]+)@([0-9.]+)(?::([0-9.]+))?(?::([0-9.]+))?")
 _DEFAULTS = {

@@ -88,6 +88,7 @@ class SimulatedRig:
         self._maker = FrameMaker(dbc, plan.layout, self._rate, serial_crc(unit.serial), EPOCH_NS)
         self._second = FrameMaker(dbc, plan.layout, self._rate, serial_crc(unit.serial), EPOCH_NS)
         self._second.restart(97, 12345)
+        self._temp_id = dbc.messages["RIG_TEMP"].frame_id
 
     @property
     def temp_degc(self) -> float:
@@ -195,10 +196,12 @@ class SimulatedRig:
                 serial += "-X"
             if fault.kind == "gone" and start <= fault.at_s + fault.length_s < end:
                 self._maker.restart(0, 0)
-        frames = self._maker.frames(codes, temp_codes, self.seconds, serial_crc(serial))
-        if any(
-            f.kind == "twonodes" and f.at_s <= start < f.at_s + f.length_s for f in self._faults
-        ):
+        now = {f.kind: f for f in self._faults if f.at_s <= start < f.at_s + f.length_s}
+        status = int(now["status"].value) if "status" in now else 0
+        frames = self._maker.frames(codes, temp_codes, self.seconds, serial_crc(serial), status)
+        if "notemp" in now:
+            frames = frames.take(frames.can_id != self._temp_id)
+        if "twonodes" in now:
             other = self._second.frames(codes[::-1], temp_codes, self.seconds, serial_crc(serial))
             both = concatenate([frames, other])
             frames = both.take(np.argsort(both.t_ns, kind="stable"))

@@ -7,7 +7,6 @@ had no room for (SO_RXQ_OVFL), and does not outlive a device that goes away.
 from __future__ import annotations
 
 import errno
-import os
 import select
 import socket
 import struct
@@ -17,22 +16,25 @@ from collections.abc import Callable
 import numpy as np
 
 from triaxcal.errors import RefusedError
+from triaxcal.rig.burst import (
+    CLASSIC_BYTES,
+    FD_BYTES,
+    SO_RXQ_OVFL,
+    SO_TIMESTAMPNS,
+    BurstReceiver,
+)
 from triaxcal.rig.frames import Frames, empty
-from triaxcal.rig.sources import WAIT_S, can_devices
+from triaxcal.rig.sources import PACE_S, WAIT_S, can_devices
 
 QUEUE_BYTES = 4 << 20
-_SO_RCVBUFFORCE, _SO_TIMESTAMPNS, _SO_RXQ_OVFL = 33, 35, 40
+_SO_RCVBUFFORCE = 33
 _CAN_RAW_ERR_FILTER = 2
-_CLASSIC_BYTES, _FD_BYTES = 16, 72
 _FRAME_QUEUE_BYTES = 384
 """What the kernel charges a queue for one frame."""
 _ENOUGH_S = 0.5
 _FULL_RATE = 9000
-_BURST = 8192
 _REOPEN_S = 0.2
 _SILENCE_S = 0.9
-_TIME = struct.Struct("@qq")
-_DROPS = struct.Struct("@I")
 _HEAD = struct.Struct("@IB")
 _GONE = {errno.ENODEV, errno.ENXIO, errno.EBADF, errno.ENETUNREACH}
 
@@ -65,6 +67,8 @@ class SocketSource:
         self._notes: list[str] = []
         self._socket: socket.socket | None = None
         self._counted = 0
+        self._burst = BurstReceiver()
+        self._read_at = 0.0
         self._down = self._silent = False
         self._heard = self._tried = time.monotonic()
         try:
@@ -85,7 +89,7 @@ class SocketSource:
                 f"{self.name}: the queue holds {room} frames, {1000 * room // _FULL_RATE} ms of a "
                 "full bus; run as root, or raise net.core.rmem_max to 4194304"
             )
-        for option in (_SO_TIMESTAMPNS, _SO_RXQ_OVFL):
+        for option in (SO_TIMESTAMPNS, SO_RXQ_OVFL):
             opened.setsockopt(socket.SOL_SOCKET, option, 1)
         self._counted = 0
         self._socket = opened
@@ -96,43 +100,32 @@ class SocketSource:
             self._reopen()
             return empty()
         ready, _, _ = select.select([self._socket], [], [], WAIT_S)
-        rows = self._receive() if ready else []
-        self._watch(bool(rows))
-        return frames_of_rows(rows)
+        frames = empty()
+        if ready:
+            time.sleep(max(0.0, self._read_at + PACE_S - time.monotonic()))
+            self._read_at = time.monotonic()
+            frames = self._receive(self._socket)
+        self._watch(bool(len(frames)))
+        return frames
 
-    def _receive(self) -> list[tuple[int, bytes]]:
-        rows: list[tuple[int, bytes]] = []
-        receive = self._socket.recvmsg if self._socket else None
-        assert receive is not None
+    def _receive(self, link: socket.socket) -> Frames:
         try:
-            while len(rows) < _BURST:
-                payload, extra, _, _ = receive(_FD_BYTES, 128)
-                if not payload:
-                    raise OSError(errno.ENODEV, "closed")
-                rows.append((self._meta(extra), payload))
+            burst = self._burst.receive(link)
         except BlockingIOError:
-            pass
+            return empty()
         except OSError as error:
             self._fault(error)
-        return rows
-
-    def _meta(self, extra: list[tuple[int, int, bytes]]) -> int:
-        """Kernel's time of arrival in ns; takes note of the drop count."""
-        t_ns = 0
-        for level, kind, value in extra:
-            if level != socket.SOL_SOCKET:
-                continue
-            if kind == _SO_TIMESTAMPNS:
-                seconds, ns = _TIME.unpack_from(value)
-                t_ns = seconds * 10**9 + ns
-            elif kind == _SO_RXQ_OVFL:
-                (count,) = _DROPS.unpack_from(value)
-                new = (count - self._counted) % 2**32
-                if new:
-                    self._notes.append(f"{self.name}: the kernel dropped {new} frames, queue full")
-                self.dropped += new
-                self._counted = count
-        return t_ns or time.time_ns()
+            return empty()
+        if burst.drops is not None and burst.drops != self._counted:
+            new = (burst.drops - self._counted) % 2**32
+            self._notes.append(f"{self.name}: the kernel dropped {new} frames, queue full")
+            self.dropped += new
+            self._counted = burst.drops
+        if burst.ended:
+            self._fault(OSError(errno.ENODEV, "closed"))
+        t_ns = burst.frames.t_ns
+        t_ns[t_ns == 0] = time.time_ns()
+        return burst.frames
 
     def _fault(self, error: OSError) -> None:
         if error.errno == errno.ENETDOWN:
@@ -219,11 +212,6 @@ def can_socket(device: str, fd: bool) -> socket.socket:
     return opened
 
 
-def inherited(file: int) -> SocketSource:
-    """Receiver of a datagram socket that another process opened, one struct can_frame each."""
-    return SocketSource(f"socket {file}", lambda: socket.socket(fileno=os.dup(file)))
-
-
 def packed(frames: Frames) -> list[bytes]:
     """Frames as struct can_frame or canfd_frame, to be sent."""
     rows = zip(
@@ -239,18 +227,18 @@ def packed(frames: Frames) -> list[bytes]:
 
 def frames_of_rows(rows: list[tuple[int, bytes]]) -> Frames:
     """Frames of times in ns and struct can_frame or canfd_frame; what is neither is left out."""
-    rows = [row for row in rows if len(row[1]) in {_CLASSIC_BYTES, _FD_BYTES}]
+    rows = [row for row in rows if len(row[1]) in {CLASSIC_BYTES, FD_BYTES}]
     if not rows:
         return empty()
-    wide = any(len(payload) == _FD_BYTES for _, payload in rows)
-    size = _FD_BYTES if wide else _CLASSIC_BYTES
+    wide = any(len(payload) == FD_BYTES for _, payload in rows)
+    size = FD_BYTES if wide else CLASSIC_BYTES
     text = b"".join(payload.ljust(size, b"\0") for _, payload in rows)
     table = np.frombuffer(text, np.uint8).reshape(len(rows), size)
     return Frames(
         np.array([t_ns for t_ns, _ in rows], np.int64),
         table[:, :4].copy().view(np.uint32)[:, 0],
         table[:, 4],
-        np.array([len(payload) == _FD_BYTES for _, payload in rows], np.bool_),
+        np.array([len(payload) == FD_BYTES for _, payload in rows], np.bool_),
         table[:, 8:],
     )
 

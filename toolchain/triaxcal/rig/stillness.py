@@ -96,8 +96,12 @@ def motion(
     return ""
 
 
+_CREEP_TAU_S = (10.0, 20.0, 40.0)
+"""Time constants that creep is looked for with; between two of them little is lost."""
+
+
 def refusals(
-    watched: Sequence[Block],
+    rest: Sequence[Block],
     dwell: slice,
     reference: Reference,
     settings: Stillness,
@@ -105,13 +109,21 @@ def refusals(
 ) -> list[str]:
     """Why an average is not to be trusted, each in words; empty when it is.
 
-    `watched[dwell]` is averaged; what lies before and behind it is its guard: a slip near an end
-    of the dwell shows against it.
+    `rest` is the whole rest, `rest[dwell]` is averaged; what lies before and behind it is its
+    guard: a slip near an end of the dwell shows against it.
     """
     scale = np.abs(micro_g_per_code)
-    averaged = watched[dwell]
-    found = _slip(watched, dwell.start, reference, settings, scale)
-    if not found:
+    averaged = rest[dwell]
+    slip_t, slip = _slip(rest, dwell.start, reference, scale)
+    creep_t, creep = _creep(rest, reference, scale)
+    # Large creep looks like a step too, and a step like creep: the better fit gives the name.
+    if creep_t > max(settings.creep_t, slip_t):
+        found = [creep]
+    elif slip_t > settings.slip_t:
+        found = [slip]
+    elif creep_t > settings.creep_t:
+        found = [creep]
+    else:
         found = _slope(averaged, settings, scale)
     found += _noise(averaged, reference, settings)
     u_micro_g = np.array(average(averaged, settings, micro_g_per_code).u_code) * scale
@@ -169,20 +181,14 @@ def _moving_ratio(settings: Stillness, count: int) -> float:
 
 
 def _slip(
-    blocks: Sequence[Block],
-    start: int,
-    reference: Reference,
-    settings: Stillness,
-    scale: FloatArray,
-) -> list[str]:
-    """The largest step between what lies before and after any moment, as a t value."""
+    blocks: Sequence[Block], start: int, reference: Reference, scale: FloatArray
+) -> tuple[float, str]:
+    """The largest step between what lies before and after any moment: t value, and words."""
     means = _means(blocks)
     n = len(means)
     if n < 4:
-        return []
-    own = _neighbour_variance(means)
-    shared = np.array(reference.block_variance)
-    noise = _at_least((own * n + shared * reference.blocks) / (n + reference.blocks))
+        return 0.0, ""
+    noise = _noise_of_means(means, reference)
     sums = np.cumsum(means - means[0], axis=0)
     # Two blocks at least on either side: one alone is the motion detector's business.
     split = np.arange(2, n - 1)
@@ -190,11 +196,32 @@ def _slip(
     right = (sums[-1] - sums[split - 1]) / (n - split)[:, None]
     t = np.abs(right - left) / np.sqrt(noise * (1.0 / split + 1.0 / (n - split))[:, None])
     at, axis = np.unravel_index(int(np.argmax(t)), t.shape)
-    if t[at, axis] <= settings.slip_t:
-        return []
     size = abs(right[at, axis] - left[at, axis]) * scale[axis]
     moment = int(split[at]) - start
-    return [f"slip of {size:.0f} micro-g on {AXES[axis]} at {moment} s"]
+    when = f"at {moment} s" if moment >= 0 else "while settling"
+    return float(t[at, axis]), f"slip of {size:.0f} micro-g on {AXES[axis]} {when}"
+
+
+def _creep(rest: Sequence[Block], reference: Reference, scale: FloatArray) -> tuple[float, str]:
+    """What settles exponentially since the unit was left alone: t value, and words.
+
+    The best test there is for a known form in white noise is its correlation with that form
+    (matched filter); a straight line finds a tenth of it.
+    """
+    means = _means(rest)
+    noise = _noise_of_means(means, reference)
+    t_s = np.array([b.index - rest[0].index for b in rest], np.float64) + 0.5
+    best = (0.0, 0, 0.0, 0.0)
+    for tau_s in _CREEP_TAU_S:
+        form = np.exp(-t_s / tau_s)
+        form -= form.mean()
+        squares = float(form @ form)
+        size = form @ means / squares
+        t = np.abs(size) * np.sqrt(squares / noise)
+        axis = int(np.argmax(t))
+        best = max(best, (float(t[axis]), axis, float(abs(size[axis]) * scale[axis]), tau_s))
+    t_value, axis, micro_g, tau_s = best
+    return t_value, f"creep of {micro_g:.0f} micro-g with about {tau_s:.0f} s on {AXES[axis]}"
 
 
 def _slope(dwell: Sequence[Block], settings: Stillness, scale: FloatArray) -> list[str]:
@@ -213,6 +240,13 @@ def _noise(dwell: Sequence[Block], reference: Reference, settings: Stillness) ->
     if ratio[axis] > limit:
         return [f"noise on {AXES[axis]} {ratio[axis]:.2f} times that at rest"]
     return []
+
+
+def _noise_of_means(means: FloatArray, reference: Reference) -> FloatArray:
+    """Variance of a block's mean, of these and of the reference together, shape (3,)."""
+    n = len(means)
+    shared = np.array(reference.block_variance) * reference.blocks
+    return _at_least((_neighbour_variance(means) * n + shared) / (n + reference.blocks))
 
 
 def _means(blocks: Sequence[Block]) -> FloatArray:

@@ -8,7 +8,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.rig.blocks import Block
 from triaxcal.rig.equilibrium import time_left_s, window_s
 from triaxcal.rig.events import View
-from triaxcal.rig.orientation import described
+from triaxcal.rig.orientation import UP, described
 from triaxcal.rig.session import Session
 from triaxcal.rig.stillness import slope_micro_g_per_min
 
@@ -27,6 +27,7 @@ def view(session: Session) -> View:
     plan = session.plan
     return View(
         phase=phase,
+        order=_order(session, phase),
         headline=_headline(session, phase),
         wanted=session.wanted,
         seen=session.seen,
@@ -83,6 +84,27 @@ def _progress(session: Session, phase: str) -> tuple[int, int]:
     }.get(phase, (0, 0))
 
 
+def _order(session: Session, phase: str) -> str:
+    """What to do, in the letters of `bigtext`."""
+    if phase == "done":
+        return "DONE"
+    if phase == "reference":
+        return f"HANDS OFF {session.plan.stillness.reference_s - len(session.learning)}"
+    if session.taking is not None or phase == "still":
+        return f"HANDS OFF {session.dwell_s[2] - len(session.rest)}"
+    if session.reseat is not None:
+        return f"RESEAT {_up(session.reseat)}"
+    if phase == "temperature" and session.seen == session.wanted:
+        return f"WAIT FOR {session.plan.steps[session.step].temp_degc:g}"
+    assert session.wanted is not None
+    return f"TURN TO {_up(session.wanted)}"
+
+
+def _up(position: str) -> str:
+    tilted = " TILTED" if position.startswith("CP") else ""
+    return f"{UP['T' + position[1:]]} UP{tilted}"
+
+
 def _headline(session: Session, phase: str) -> str:
     if phase == "done":
         return "DONE - every position has been accepted"
@@ -90,7 +112,7 @@ def _headline(session: Session, phase: str) -> str:
     wanted = described(session.wanted) if session.wanted else ""
     target = session.plan.steps[session.step].temp_degc
     if session.reseat is not None:
-        return f"TURN AWAY FROM {described(session.reseat)} AND BACK - it slipped"
+        return f"TURN AWAY FROM {described(session.reseat)} AND BACK - {session.reseat_why}"
     if session.offered is not None:
         return f"TURN TO {wanted} - or press y to take {described(session.offered)} now"
     return {

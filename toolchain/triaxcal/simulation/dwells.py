@@ -80,7 +80,7 @@ def simulate_codes(unit: UnitDescription, truth: Truth, plan: Plan) -> tuple[Cod
     steps = [(temp, position) for temp in plan.temperatures_degc for position in TEST_POSITIONS]
     steps += [(temp, cp) for temp in plan.check_temperatures_degc for cp in CHECK_POSITIONS]
     steps.sort(key=lambda step: step[0])  # stable: positions keep their order
-    rig = Rig(truth.imperfections, unit.gravity_g, plan.seed)
+    rig = Rig(truth.imperfections, unit.gravity_g, plan.seed, plan.rig_seed)
     return tuple(
         _dwell(unit, truth, rig, rng, plan.readings_per_dwell, position=position, nominal_degc=temp)
         for temp, position in steps

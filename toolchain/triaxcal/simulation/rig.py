@@ -16,10 +16,13 @@ from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
 
 _RADIANS = np.pi / 180.0 / 3600.0
 _STREAM = 1
+_SHARED_STREAM = 2
 
 
 class Rig:
     """One rig, drawn from its imperfections by a seed.
+
+    With `rig_seed` it is the rig of all that state the same one; repeatability stays by `seed`.
 
     Attributes
     ----------
@@ -29,9 +32,20 @@ class Rig:
         What the thermometer shows too much.
     """
 
-    def __init__(self, imperfections: Imperfections, stated_gravity_g: float, seed: int) -> None:
-        self._random = np.random.Generator(np.random.PCG64([seed, _STREAM]))
-        draw = self._random.standard_normal
+    def __init__(
+        self,
+        imperfections: Imperfections,
+        stated_gravity_g: float,
+        seed: int,
+        rig_seed: int | None = None,
+    ) -> None:
+        # A rig of its own by `seed`; the rig of others by `rig_seed`, with dwells of its own.
+        own = np.random.Generator(np.random.PCG64([seed, _STREAM]))
+        shared = own
+        if rig_seed is not None:
+            shared = np.random.Generator(np.random.PCG64([rig_seed, _SHARED_STREAM]))
+        self._random = own
+        draw = shared.standard_normal
         sd_g = imperfections.gravity_sd_m_per_s2 / STANDARD_GRAVITY_M_PER_S2
         self.gravity_g = stated_gravity_g + sd_g * float(draw())
         self.thermometer_offset_degc = imperfections.thermometer_offset_sd_degc * float(draw())

@@ -26,6 +26,16 @@ IMPERFECTIONS = {
 }
 """Keys of [imperfections] and the largest value of each."""
 
+SERIES_KEYS = (
+    "scale_sd_ratio",
+    "cross_axis_sd_v_per_g",
+    "bias_sd_v",
+    "temperature_sd_ratio",
+    "units_per_run",
+    "runs_between_moves",
+)
+"""Keys of [series], which `simulation.series` reads."""
+
 _LAYOUT: Layout = {
     "": {"format": True},
     "curves": {"t0_degc": True, **dict.fromkeys(CONSTANT_NAMES, True)},
@@ -35,8 +45,10 @@ _LAYOUT: Layout = {
         "readings_per_dwell": True,
         "temperatures_degc": True,
         "check_temperatures_degc": True,
+        "rig_seed": False,
     },
     "imperfections": dict.fromkeys(IMPERFECTIONS, False),
+    "series": dict.fromkeys(SERIES_KEYS, False),
 }
 
 
@@ -113,12 +125,15 @@ class Plan:
         Readings in each mean.
     temperatures_degc, check_temperatures_degc : tuple of float
         Nominal temperatures of TP1..TP6 and of CP1..CP6, rising.
+    rig_seed : int or None
+        Seed of the rig that units measured on it share; None draws a rig for this unit.
     """
 
     seed: int
     readings_per_dwell: int
     temperatures_degc: tuple[float, ...]
     check_temperatures_degc: tuple[float, ...]
+    rig_seed: int | None = None
 
 
 def codes_of_voltage(adc: Adc, voltage_v: FloatArray) -> IntArray:
@@ -135,7 +150,7 @@ def read_truth(folder: Path) -> tuple[Truth, Plan]:
     RefusedError
         When the file cannot be read or breaks a rule of docs/file-formats.md.
     """
-    tables = read_tables(folder / TRUTH_FILE, _LAYOUT, FORMAT)
+    tables = read_truth_tables(folder)
     noise, wrong = tables["noise"], tables["imperfections"]
     truth = Truth(
         constants=_curves(tables["curves"]),
@@ -151,6 +166,17 @@ def read_truth(folder: Path) -> tuple[Truth, Plan]:
         ),
     )
     return truth, _plan(tables["plan"])
+
+
+def read_truth_tables(folder: Path) -> dict[str, Table]:
+    """Tables of a unit's truth.toml, keys checked.
+
+    Raises
+    ------
+    RefusedError
+        When the file cannot be read, or has other keys than docs/file-formats.md says.
+    """
+    return read_tables(folder / TRUTH_FILE, _LAYOUT, FORMAT)
 
 
 def check_seed(seed: int, where: str) -> None:
@@ -184,4 +210,5 @@ def _plan(table: Table) -> Plan:
         readings_per_dwell=table.integer("readings_per_dwell", 2, 1_000_000),
         temperatures_degc=table.rising("temperatures_degc", *PLAUSIBLE_DEGC, lengths),
         check_temperatures_degc=table.rising("check_temperatures_degc", *PLAUSIBLE_DEGC, lengths),
+        rig_seed=table.integer("rig_seed", 0, SEED_MAX) if "rig_seed" in table else None,
     )

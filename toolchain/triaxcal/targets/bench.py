@@ -15,7 +15,7 @@ from triaxcal.targets.build import TargetError, Toolset, build, run
 from triaxcal.targets.cores import CORES, Core, install_advice, missing_tools
 from triaxcal.targets.counting import Counts, build_plugin, measure
 from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB2
-from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, Case
+from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, QUADRATIC, Case
 from triaxcal.targets.sizes import Flash, flash_of
 
 OPTIMISATION = "-O2"
@@ -61,7 +61,7 @@ def subjects(cases: Sequence[Case]) -> list[Subject]:
     return [*result, Subject(cubic, PORTABLE, DOUBLE), Subject(cubic, PORTABLE, FLOAT)]
 
 
-BENCH_SHAPES = (CUBIC, CUBIC_LEFT, "AT-SIM", "AT-CHERNIAK", "inverse")
+BENCH_SHAPES = (CUBIC, CUBIC_LEFT, "AT-SIM", "AT-CHERNIAK", "inverse", QUADRATIC)
 
 
 def run_bench(

@@ -13,6 +13,7 @@ from triaxcal.delivery import compensation_of, inputs_sha256
 from triaxcal.errors import RefusedError
 from triaxcal.fit.calibrate import Calibration, calibrate
 from triaxcal.fixedpoint.plan import Plan, make_plan
+from triaxcal.model.terms import EXAMPLE_TERMS
 from triaxcal.records import MEASUREMENTS_FILE, read_measurements
 from triaxcal.unitfile import UnitDescription, read_unit
 
@@ -41,6 +42,7 @@ class Case:
 Change = Callable[[UnitDescription], UnitDescription]
 CUBIC = "cubic"
 CUBIC_LEFT = "cubic, left-justified"
+QUADRATIC = "quadratic terms"
 
 
 def _order_3(unit: UnitDescription) -> UnitDescription:
@@ -64,6 +66,7 @@ _SHAPES: tuple[tuple[str, str, str, Change], ...] = (
     ("saturating", "AT-SIM", "output_q 28: no spare bits", lambda u: replace(u, output_q=28)),
     ("no spare bit", "AT-SIM", "output_q 27", lambda u: replace(u, output_q=27)),
     ("odd range", "AT-SIM", "raw codes -8000000 to 8000000", _odd_range),
+    (QUADRATIC, "AT-SIM", "18 quadratic terms, order 3", _order_3),
     ("16 bits", "AT-SIM", "16-bit raw codes", lambda u: replace(u, adc=replace(
         u.adc, bits=16, code_min=-(2**15), code_max=2**15 - 1))),
     ("fine thermometer", "AT-SIM", "110000 temperature codes", lambda u: replace(
@@ -105,6 +108,8 @@ def _calibrated(folder: Path) -> tuple[UnitDescription, Calibration]:
 def _case(folder: Path, name: str, note: str, change: Change) -> Case:
     described, calibration = _calibrated(folder)
     unit = change(described)
+    if name == QUADRATIC:
+        calibration = replace(calibration, terms=EXAMPLE_TERMS)
     plan = make_plan(compensation_of(unit, calibration, unit.method), unit)
     files = render_routine(plan)
     provenance = Provenance(unit.serial, inputs_sha256(folder), (f"shape {name}: {note}",))

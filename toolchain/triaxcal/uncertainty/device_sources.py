@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.model.types import FloatArray
-from triaxcal.uncertainty.propagation import Propagation
+from triaxcal.uncertainty.propagation import Curves
 from triaxcal.uncertainty.source import RECTANGULAR, Source, direct, from_factor
 
 _ROOT_12, _ROOT_3 = math.sqrt(12.0), math.sqrt(3.0)
@@ -33,7 +33,7 @@ class Device:
     model_error_g: float
 
 
-def raw_code(p: Propagation) -> Source:
+def raw_code(p: Curves) -> Source:
     """Rounding of the reading to a code."""
     sd = p.unit.adc.volts_per_code / _ROOT_12
     return Source(
@@ -50,7 +50,7 @@ def raw_code(p: Propagation) -> Source:
     )
 
 
-def temperature_code(p: Propagation) -> Source:
+def temperature_code(p: Curves) -> Source:
     """Rounding of the temperature to a code."""
     sd = p.unit.temperature_sensor.degc_per_code / _ROOT_12
     return Source(
@@ -67,7 +67,7 @@ def temperature_code(p: Propagation) -> Source:
     )
 
 
-def output_lsb(p: Propagation, device: Device) -> Source:
+def output_lsb(p: Curves, device: Device) -> Source:
     """Rounding of the result."""
     sd = 2.0**-device.output_q / _ROOT_12
     return Source(
@@ -84,7 +84,7 @@ def output_lsb(p: Propagation, device: Device) -> Source:
     )
 
 
-def arithmetic(p: Propagation, device: Device) -> Source:
+def arithmetic(p: Curves, device: Device) -> Source:
     """The proven bound of the integer arithmetic, without the final rounding."""
     beyond = np.array([max(bound - 0.5, 0.0) for bound in device.bound_lsb])
     sds = beyond * 2.0**-device.output_q / _ROOT_3
@@ -102,7 +102,7 @@ def arithmetic(p: Propagation, device: Device) -> Source:
     )
 
 
-def method(p: Propagation, device: Device) -> Source:
+def method(p: Curves, device: Device) -> Source:
     """The compensation method's own distance from the fitted model."""
     sd = device.model_error_g / _ROOT_3
     return Source(
@@ -119,6 +119,6 @@ def method(p: Propagation, device: Device) -> Source:
     )
 
 
-def _each_axis(p: Propagation, sds_g: FloatArray) -> FloatArray:
+def _each_axis(p: Curves, sds_g: FloatArray) -> FloatArray:
     """Covariance of D of independent errors of the three axes."""
     return direct(p, np.broadcast_to(np.diag(sds_g), (len(p.temps_degc), 3, 3)))

@@ -25,7 +25,8 @@ from triaxcal.uncertainty.device_sources import (
 )
 from triaxcal.uncertainty.model_sources import thermal_model
 from triaxcal.uncertainty.orientation import DIRECTIONS, QUANTITIES, force_variance, weights
-from triaxcal.uncertainty.propagation import ROWS, propagation
+from triaxcal.uncertainty.propagation import ROWS, Curves, propagation
+from triaxcal.uncertainty.recording_sources import recording_sources
 from triaxcal.uncertainty.rig_sources import (
     gravity,
     level,
@@ -54,17 +55,20 @@ class Uncertainty:
     t0_index : int
         Where T0 is in `temps_degc`.
     sources : tuple of Source
-    scatter : Scatter
-        What the residuals say.
+    scatter : Scatter or None
+        What the residuals say of a tilter's positions; None for a recording.
     warnings : tuple of str
         Where what was stated contradicts the data.
+    units : tuple of str
+        Of the twelve constants.
     """
 
     temps_degc: FloatArray
     t0_index: int
     sources: tuple[Source, ...]
-    scatter: Scatter
+    scatter: Scatter | None
     warnings: tuple[str, ...]
+    units: tuple[str, ...] = ("V/g",) * 9 + ("V",) * 3
 
     @cached_property
     def constants_u(self) -> FloatArray:
@@ -96,7 +100,7 @@ class Uncertainty:
                 lines.append((_line(s), None))
             elif s.constants is not None:
                 lines.append((_line(s), math.sqrt(max(float(s.constants[temp, row, row]), 0.0))))
-        unit = "V/g" if constant < 9 else "V"
+        unit = self.units[constant]
         name = f"{CONSTANT_NAMES[constant]} at {self.temps_degc[temp]:.4g} °C"
         return budget(name, unit, lines)
 
@@ -137,6 +141,19 @@ def uncertainty(
     `temps_degc`, shape (n,), must rise and hold T0; None takes the working range.
     """
     temps = _temperatures(unit, calibration) if temps_degc is None else temps_degc
+    t0_index = int(np.argmin(np.abs(temps - unit.t0_degc)))
+    units = (calibration.gain_unit,) * 9 + (calibration.reading_unit,) * 3
+    if calibration.recording is not None:
+        curves = Curves(unit, measurements, calibration, temps)
+        found = recording_sources(curves, calibration.recording)
+        return Uncertainty(
+            temps,
+            t0_index,
+            (*found, *_of_device(curves, device)),
+            None,
+            (),
+            units,
+        )
     p = propagation(unit, measurements, calibration, temps)
     s = scatter(p)
     sources = [
@@ -148,13 +165,17 @@ def uncertainty(
         thermometer(p),
         thermometer_drift(p),
         thermal_model(p, s),
-        raw_code(p),
-        temperature_code(p),
+        *_of_device(p, device),
     ]
+    return Uncertainty(temps, t0_index, tuple(sources), s, tuple(_warnings(unit, s)), units)
+
+
+def _of_device(p: Curves, device: Device | None) -> list[Source]:
+    """The codes' rounding, and what is proven of the firmware, where there is one."""
+    sources = [raw_code(p), temperature_code(p)]
     if device is not None:
         sources += [output_lsb(p, device), arithmetic(p, device), method(p, device)]
-    t0_index = int(np.argmin(np.abs(temps - unit.t0_degc)))
-    return Uncertainty(temps, t0_index, tuple(sources), s, tuple(_warnings(unit, s)))
+    return sources
 
 
 def _temperatures(unit: UnitDescription, calibration: Calibration) -> FloatArray:

@@ -35,31 +35,13 @@ _STEP_DEGC = 0.01
 
 
 @dataclass(frozen=True)
-class Propagation:
-    """One unit's linear propagation at temperatures `temps_degc`, shape (n,)."""
+class Curves:
+    """One unit's constants at temperatures `temps_degc`, shape (n,), wherever they are from."""
 
     unit: UnitDescription
     measurements: MeasurementSet
     calibration: Calibration
-    data: TilterData
     temps_degc: FloatArray
-
-    @cached_property
-    def parameter_operator(self) -> FloatArray:
-        """Shape (3, 4, P, 6 G)."""
-        operator: FloatArray = parameter_operator(self.data, self.calibration.shape)[0]
-        return operator
-
-    def constants_operator(self, temps_degc: FloatArray) -> FloatArray:
-        """C at temperatures (m,), shape (m, 3, 4, 6 G)."""
-        basis = self.calibration.shape.basis(temps_degc)
-        result: FloatArray = np.einsum("np,ikpr->nikr", basis, self.parameter_operator)
-        return result
-
-    @cached_property
-    def operator(self) -> FloatArray:
-        """C at `temps_degc`, shape (n, 3, 4, 6 G)."""
-        return self.constants_operator(self.temps_degc)
 
     @cached_property
     def rows(self) -> FloatArray:
@@ -77,6 +59,37 @@ class Propagation:
         at = self.calibration.thermal.constants_at
         change = at(self.temps_degc + _STEP_DEGC) - at(self.temps_degc - _STEP_DEGC)
         return rows_of(change / (2.0 * _STEP_DEGC))
+
+    def force_factor(self, constants: FloatArray) -> FloatArray:
+        """Factor of D, shape (n, 12, m), of one of [K U0] of the same shape."""
+        blocks = constants.reshape(len(self.temps_degc), 3, 4, -1)
+        D = -np.einsum("nij,njkm->nikm", self.inverse, blocks)
+        result: FloatArray = D.reshape(constants.shape)
+        return result
+
+
+@dataclass(frozen=True)
+class Propagation(Curves):
+    """The tilter's linear propagation on top."""
+
+    data: TilterData
+
+    @cached_property
+    def parameter_operator(self) -> FloatArray:
+        """Shape (3, 4, P, 6 G)."""
+        operator: FloatArray = parameter_operator(self.data, self.calibration.shape)[0]
+        return operator
+
+    def constants_operator(self, temps_degc: FloatArray) -> FloatArray:
+        """C at temperatures (m,), shape (m, 3, 4, 6 G)."""
+        basis = self.calibration.shape.basis(temps_degc)
+        result: FloatArray = np.einsum("np,ikpr->nikr", basis, self.parameter_operator)
+        return result
+
+    @cached_property
+    def operator(self) -> FloatArray:
+        """C at `temps_degc`, shape (n, 3, 4, 6 G)."""
+        return self.constants_operator(self.temps_degc)
 
     @cached_property
     def forces_g(self) -> FloatArray:
@@ -112,13 +125,6 @@ class Propagation:
         parameters = rows.reshape(12, -1)[list(ROWS)]
         return shifted_voltage(readings, shape, parameters, self.unit.gravity_g)
 
-    def force_factor(self, constants: FloatArray) -> FloatArray:
-        """Factor of D, shape (n, 12, m), of one of [K U0] of the same shape."""
-        blocks = constants.reshape(len(self.temps_degc), 3, 4, -1)
-        D = -np.einsum("nij,njkm->nikm", self.inverse, blocks)
-        result: FloatArray = D.reshape(constants.shape)
-        return result
-
     def constants_factor(self, readings_v: FloatArray) -> FloatArray:
         """Factor of [K U0], (n, 12, m), of m errors of the readings (6 G, 3, m) in V."""
         factor = np.einsum("nikr,rim->nikm", self.operator, readings_v)
@@ -139,7 +145,7 @@ def propagation(
         calibration.estimator, unit.gravity_g, readings.variance_v2, len(groups)
     )
     data = TilterData(readings, operators[None], unit.gravity_g)
-    return Propagation(unit, measurements, calibration, data, temps_degc)
+    return Propagation(unit, measurements, calibration, temps_degc, data)
 
 
 def rows_of(constants: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from triaxcal.uncertainty.propagation import RADIANS_PER_ARCSEC, Propagation, mapped
+from triaxcal.uncertainty.propagation import RADIANS_PER_ARCSEC, Curves, Propagation, mapped
 from triaxcal.uncertainty.scatter import Scatter
 from triaxcal.uncertainty.source import NORMAL, STUDENT, Source, from_factor, stated_or
 from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
@@ -143,7 +143,7 @@ def gravity(p: Propagation) -> Source:
     )
 
 
-def thermometer(p: Propagation) -> Source:
+def thermometer(p: Curves) -> Source:
     """What the thermometer shows wrong at calibration and in use alike.
 
     It moves the constants along the curves. The device reads the same thermometer, so that the
@@ -166,7 +166,7 @@ def thermometer(p: Propagation) -> Source:
     )
 
 
-def thermometer_drift(p: Propagation) -> Source:
+def thermometer_drift(p: Curves) -> Source:
     """What the thermometer shows otherwise in use than it did at calibration."""
     stated = p.unit.stated.thermometer_drift_degc
     sd, dof, origin = stated_or(stated, DRIFT_DEGC, "thermometer_drift_degc")

@@ -42,6 +42,9 @@ class Scatter:
     repeatability_dof, squareness_dof : float
     resolution_rad : float
         Standard error of a squareness of zero.
+    pattern_g : array, shape (3, 3)
+        What stays at all temperatures: half-sum of the pair along x, y, z (row) about the mean of
+        the three, in the force's x, y, z. The tilter's own, whatever the unit's constants are.
     """
 
     variance_v2: FloatArray
@@ -52,11 +55,14 @@ class Scatter:
     squareness_rad: float
     squareness_dof: float
     resolution_rad: float
+    pattern_g: FloatArray
 
 
 def scatter(p: Propagation) -> Scatter:
     """Noise of the readings, and placement from their residuals."""
-    within, mean = _sums_of_squares(p)
+    about = _half_sums(p)
+    pattern = about.mean(axis=0)
+    within, mean = float(np.sum((about - pattern) ** 2)), float(np.sum(pattern**2))
     G, g2 = p.groups, p.unit.gravity_g**2
     gain = np.sqrt(np.mean(np.sum(p.dwell_gain**2, axis=2), axis=0))
     within_dof = 6.0 * (G - 1)
@@ -85,15 +91,15 @@ def scatter(p: Propagation) -> Scatter:
         squareness_rad=math.sqrt(max(found, resolution, 0.0) / g2),
         squareness_dof=6.0,
         resolution_rad=math.sqrt(resolution / g2),
+        pattern_g=pattern,
     )
 
 
-def _sums_of_squares(p: Propagation) -> tuple[float, float]:
-    """S_w and S_m in g^2."""
+def _half_sums(p: Propagation) -> FloatArray:
+    """Half-sums over opposite positions about the mean of the three, (G, pair, axis), in g."""
     temps = p.data.readings.temps_degc
     K = p.calibration.thermal.constants_at(temps)[:, :9].reshape(-1, 3, 3)
     force = np.einsum("gij,gdj->gdi", np.linalg.inv(K), p.shifted)
     half_sums = np.stack([(force[:, a] + force[:, b]) / 2.0 for a, b in _PAIRS], axis=1)
-    about = half_sums - half_sums.mean(axis=1, keepdims=True)
-    mean = about.mean(axis=0)
-    return float(np.sum((about - mean) ** 2)), float(np.sum(mean**2))
+    result: FloatArray = half_sums - half_sums.mean(axis=1, keepdims=True)
+    return result

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.model.types import FloatArray
-from triaxcal.uncertainty.propagation import Propagation, square
+from triaxcal.uncertainty.propagation import Curves, square
 
 NORMAL, RECTANGULAR, STUDENT = "normal", "rectangular", "Student"
 ASSUMED_DOF = 8.0
@@ -55,12 +55,12 @@ class Source:
         return self.sd is None
 
 
-def from_factor(p: Propagation, factor: FloatArray) -> tuple[FloatArray, FloatArray]:
+def from_factor(p: Curves, factor: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Covariances of constants and of force from the factor (n, 12, m) of [K U0]."""
     return square(factor), square(p.force_factor(factor))
 
 
-def direct(p: Propagation, factor_g: FloatArray) -> FloatArray:
+def direct(p: Curves, factor_g: FloatArray) -> FloatArray:
     """Covariance of D of errors (n, 3, m) of the force that do not depend on it, in g."""
     blocks = np.zeros((len(p.temps_degc), 3, 4, factor_g.shape[-1]))
     blocks[:, :, 3] = factor_g

@@ -8,10 +8,12 @@ lies above the exact one or one of the two is wrong. docs/verification.md has th
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
+from pathlib import Path
 
 from triaxcal.verify.image_reader import Image, read_image
 from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
@@ -26,6 +28,8 @@ TIGHT = 1.2
 
 _KEY, _TITLE = "gappa", "Gappa: error bound"
 _NAMES = "ABCD"
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Axes of the products, as docs/fixed-point.md, step Q, names them."""
 _NUMBER = r"(-?\d+)(?:b(-?\d+))?"
 _APPROXIMATION = r"(?: \{[^}]*\})?"
 _INTERVAL = re.compile(rf" in \[{_NUMBER}{_APPROXIMATION}, {_NUMBER}{_APPROXIMATION}\]")
@@ -50,6 +54,8 @@ def check(work: Workspace) -> Outcome:
     with ThreadPoolExecutor(2) as pool:
         bounds = list(pool.map(lambda job: _bound(work, image, *job), jobs))
     per_axis = [max(b for (a, _), b in zip(jobs, bounds, strict=True) if a == i) for i in range(3)]
+    if image.quadratic:
+        per_axis = [b + e for b, e in zip(per_axis, _quadratic(work, image, per_axis), strict=True)]
     exact = work.bound.per_axis_lsb
     good = all(found >= e for found, e in zip(per_axis, exact, strict=True))
     ratio = max(per_axis) / work.bound.lsb
@@ -74,11 +80,59 @@ def _bound(work: Workspace, image: Image, axis: int, s: int) -> float:
     script = work.render(
         f"verify_{axis}_{s}.g", "verify_gappa.g.j2", script_context(work, image, axis, s)
     )
+    return largest_magnitude(_run(work, script))
+
+
+def _run(work: Workspace, script: Path) -> str:
+    """What Gappa printed of a script that it could check."""
     answer = run([GAPPA.find(), script.name], work.folder)
     if answer.code or "arning" in answer.text:
         # A hint that Gappa cannot check itself comes as a warning: then nothing is proven.
         raise BrokenToolError(f"gappa: {' '.join(answer.text.split())[:200]}")
-    return largest_magnitude(answer.text)
+    return answer.text
+
+
+def _quadratic(work: Workspace, image: Image, linear_lsb: Sequence[float]) -> list[float]:
+    """Gappa's bound of what quadratic terms add to each axis, in LSB, rounded up.
+
+    h lies within the linear bound of the exact result, less the final 1/2 and with a floor of its
+    own; its reach follows from the words of the image.
+    """
+    real = work.plan.real_quadratic
+    assert real is not None
+    place = Fraction(2) ** (image.output_shift - 32)
+    error = [(Fraction(lsb) - Fraction(1, 2)) * place + 1 for lsb in linear_lsb]
+    reach = [_reach(image, axis) + e for axis, e in enumerate(error)]
+    bounds = []
+    for axis in range(3):
+        terms = [
+            {"a": a, "b": b, "integer": q, "real": _dyadic(Fraction(float(exact)))}
+            for q, exact, (a, b) in zip(image.quadratic[axis], real[axis], PAIRS, strict=True)
+        ]
+        context = {
+            "axis": "xyz"[axis],
+            "terms": terms,
+            "reach": [_dyadic(Fraction(math.ceil(r))) for r in reach],
+            "error": [_dyadic(e) for e in error],
+        }
+        script = work.render(f"verify_q{axis}.g", "verify_gappa_quadratic.g.j2", context)
+        found = largest_magnitude(_run(work, script))
+        bounds.append(math.nextafter(float(Fraction(found) / place), math.inf))
+    return bounds
+
+
+def _reach(image: Image, axis: int) -> int:
+    """Bound of |h| of an axis over all codes, by the size of each function's words."""
+    box = max(abs(image.raw_min), abs(image.raw_max)) << image.raw_shift
+    reach = 0
+    for segment in image.segments:
+        # |p_0| <= |c_0| + |c_1| / 2 + |c_2| / 4 + ..., and less than 2 for the floors.
+        n0, n1, n2, b = (
+            sum(abs(c) >> k for k, c in enumerate(words)) + len(words) + 2
+            for words in segment.coefficients[4 * axis : 4 * axis + 4]
+        )
+        reach = max(reach, (n0 + n1 + n2) * box // 2**32 + 1 + b)
+    return reach
 
 
 def largest_magnitude(text: str) -> float:
@@ -106,7 +160,7 @@ def script_context(work: Workspace, image: Image, axis: int, s: int) -> dict[str
     """What the template of the script shows; numbers are exact, as integers over powers of two."""
     segment = image.segments[s]
     spare = image.output_shift - 32
-    preload = 1 << (spare - 1) if spare > 0 else 0
+    preload = 1 << (spare - 1) if spare > 0 and not image.quadratic else 0
     box = max(abs(image.raw_min), abs(image.raw_max)) << image.raw_shift
     return {
         "axis": "xyz"[axis],

@@ -38,6 +38,7 @@ class Image:
     raw_max: int
     raw_shift: int
     segments: tuple[ImageSegment, ...]
+    quadratic: tuple[tuple[int, ...], ...] = ()
 
 
 def read_image(image: bytes) -> Image:
@@ -57,12 +58,18 @@ def read_image(image: bytes) -> Image:
         raise RefusedError("image", "size or CRC is wrong", remedy="write it again")
     form, segments, order, _, output_shift, raw_min, raw_max, raw_shift = words[3:11]
     step = 3 + FUNCTIONS * (order + 1)
-    starts = [HEADER_WORDS + 2 + s * step for s in range(segments)]
-    lasts = [words[start] - 1 for start in starts[1:]] + [words[HEADER_WORDS + 1]]
+    # Version 2 has a word more: which terms there are.
+    header = HEADER_WORDS + words[1] - 1
+    terms = words[HEADER_WORDS] if words[1] == 2 else 0
+    starts = [header + 2 + s * step for s in range(segments)]
+    lasts = [words[start] - 1 for start in starts[1:]] + [words[header + 1]]
+    at_terms = header + 2 + segments * step
+    rows = [words[at_terms + 6 * i : at_terms + 6 * i + 6] for i in range(3)] if terms & 1 else []
     return Image(
         bool(form), order, output_shift, raw_min, raw_max, raw_shift,
         tuple(_segment(words[at : at + step], last, order)
               for at, last in zip(starts, lasts, strict=True)),
+        tuple(rows),
     )  # fmt: skip
 
 

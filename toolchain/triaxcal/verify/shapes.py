@@ -15,6 +15,7 @@ from triaxcal.delivery import IMAGE_FILE, compensation_of, inputs_sha256
 from triaxcal.fit.calibrate import calibrate
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
+from triaxcal.model.terms import EXAMPLE_TERMS
 from triaxcal.records import MEASUREMENTS_FILE, read_measurements
 from triaxcal.unitfile import UnitDescription, read_unit
 
@@ -47,9 +48,13 @@ SHAPES = {
     "direct-two-segments": ("AT-CHERNIAK", _as_shipped),
     "inverse": ("AT-SIM", _inverse),
     "saturating": ("AT-SIM", _saturating),
+    "quadratic": ("AT-SIM", _as_shipped),
 }
 """Unit that gives the measurements, and what is changed in its description. Together: one segment
-and two, raw codes of 24 bits and 32, both range tests and none, both forms, both ends of apply."""
+and two, raw codes of 24 bits and 32, both range tests and none, both forms, both ends of apply, and
+quadratic terms."""
+
+WITH_TERMS = {"quadratic": EXAMPLE_TERMS}
 
 
 def subject(name: str, units: Path) -> Subject:
@@ -64,6 +69,8 @@ def subject(name: str, units: Path) -> Subject:
     folder = units / unit_name
     unit = change(read_unit(folder))
     calibration = calibrate(unit, read_measurements(folder / MEASUREMENTS_FILE, unit))
+    if name in WITH_TERMS:
+        calibration = replace(calibration, terms=WITH_TERMS[name])
     plan = make_plan(compensation_of(unit, calibration, unit.method), unit)
     texts = render_routine(plan)
     provenance = Provenance(unit.serial, inputs_sha256(folder), (f"shape {name}",))

@@ -12,7 +12,7 @@ import numpy as np
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.report.passport.content import Passport
-from triaxcal.report.passport.words import in_unit, signed
+from triaxcal.report.passport.words import handy, in_unit, signed
 
 WIDTH, HEIGHT = 232.0, 150.0
 LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 8.0, 20.0
@@ -56,18 +56,20 @@ def ticks(low: float, high: float, count: int) -> list[float]:
 
 
 def curve_panels(p: Passport) -> list[dict[str, Any]]:
-    """Context of the twelve panels: change since T0 in µV/g or µV, points, curve, band."""
+    """Context of the twelve panels: change since T0 in handy units, points, curve, band."""
     calibration, u = p.delivery.calibration, p.uncertainty
-    curves = calibration.thermal.constants_at(u.temps_degc) * 1e6
-    at_t0 = calibration.thermal.constants_at(calibration.thermal.t0_degc) * 1e6
-    bands = u.constants_u * 1e6
-    points = np.array([q.constants for q in calibration.points]) * 1e6
+    units = u.units
+    scale = handy(units[9])[1]
+    curves = calibration.thermal.constants_at(u.temps_degc) * scale
+    at_t0 = calibration.thermal.constants_at(calibration.thermal.t0_degc) * scale
+    bands = u.constants_u * scale
+    points = np.array([q.constants for q in calibration.points]) * scale
     temps = [q.temp_degc for q in calibration.points]
     return [
         {
             "name": CONSTANT_NAMES[c],
-            "unit": "µV/g" if c < 9 else "µV",
-            "note": "± " + in_unit(float(bands[:, c].max()) * 1e-6, "V/g" if c < 9 else "V"),
+            "unit": handy(units[c])[0],
+            "note": "± " + in_unit(float(bands[:, c].max()) / scale, units[c]),
             **_panel(
                 u.temps_degc, curves[:, c] - at_t0[c], bands[:, c], temps, points[:, c] - at_t0[c]
             ),

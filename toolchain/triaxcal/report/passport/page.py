@@ -9,6 +9,7 @@ from triaxcal import __version__
 from triaxcal.codegen.render import environment
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.model.metrological import CONSTANT_NAMES
+from triaxcal.report.measured import measured_words
 from triaxcal.report.passport.content import Acceptance, Passport
 from triaxcal.report.passport.curves import HEIGHT, LEFT, WIDTH, curve_panels, uncertainty_panel
 from triaxcal.report.passport.residuals import residual_panels
@@ -22,7 +23,6 @@ from triaxcal.report.passport.words import (
     thousands,
     with_uncertainty,
 )
-from triaxcal.report.temperatures import degrees
 from triaxcal.uncertainty.budget import Budget, Line
 
 _NEGLIGIBLE = 1e-9
@@ -36,7 +36,7 @@ def passport_html(p: Passport) -> bytes:
         "shown": p.shown,
         "acceptance": [_acceptance(a) for a in p.acceptance],
         "unchecked": p.unchecked,
-        "warnings": p.uncertainty.warnings,
+        "warnings": (*p.uncertainty.warnings, *_findings(p)),
         "constants": _constants(p),
         "t0": signed(f"{p.delivery.calibration.thermal.t0_degc:g}"),
         "panels": curve_panels(p),
@@ -66,8 +66,6 @@ def passport_html(p: Passport) -> bytes:
 
 def _identity(p: Passport) -> dict[str, Any]:
     d = p.delivery
-    temps = ", ".join(signed(degrees(q.temp_degc)) for q in d.calibration.points)
-    checks = len(d.calibration.check_dwells)
     low, high = d.calibration.range_degc
     return {
         "unit": d.unit.name,
@@ -75,11 +73,7 @@ def _identity(p: Passport) -> dict[str, Any]:
         "rows": [
             ("Serial number", d.unit.serial),
             ("Working range", signed(f"{low:g} to {high:g} °C")),
-            (
-                "Measured",
-                f"{len(d.measurements.dwells)} dwells: six positions at {temps} °C"
-                + (f"; {checks} check dwells" if checks else "; no check dwells"),
-            ),
+            ("Measured", signed(measured_words(d).replace("degC", "°C"))),
             ("Local gravity", f"{d.unit.gravity_g * 9.80665:.6g} m/s²"),
             ("Thermal model", f"{signed(d.calibration.shape.label.replace('degC', '°C'))}"),
             ("Bias estimator", d.calibration.estimator),
@@ -88,6 +82,14 @@ def _identity(p: Passport) -> dict[str, Any]:
             ("Inputs", f"sha256 {d.inputs_sha256[:16]}…"),
         ],
     }
+
+
+def _findings(p: Passport) -> tuple[str, ...]:
+    """What was found in a recording, for the top of the page."""
+    recording = p.delivery.calibration.recording
+    if recording is None:
+        return ()
+    return tuple(signed(f[0].upper() + f[1:].replace("degC", "°C")) for f in recording.findings)
 
 
 def _superscript(number: int) -> str:
@@ -122,7 +124,8 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
     at_t0 = calibration.thermal.constants_at(calibration.thermal.t0_degc)
     rows = []
     for c, budget in enumerate(p.constant_budgets):
-        scale, unit = (1e3, "mV/g") if c < 9 else (1e3, "mV")
+        name = p.uncertainty.units[c]
+        scale, unit = (1e3, f"m{name}") if name.startswith("V") else (1.0, name)
         value, expanded = with_uncertainty(float(at_t0[c]), budget.expanded, scale)
         worst = next((line for line in budget.lines if line.contribution), None)
         rows.append(

@@ -9,7 +9,7 @@ from typing import Any
 from triaxcal.codegen.tryout import BEFORE, Residual
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.passport.words import signed
-from triaxcal.report.temperatures import by_temperature, degrees
+from triaxcal.report.temperatures import by_temperature, degrees, position_order
 
 WIDTH, LEFT, RIGHT = 700.0, 56.0, 6.0
 PLOT, HEAD, FOOT = 150.0, 24.0, 26.0
@@ -35,7 +35,11 @@ def residual_panels(p: Passport) -> list[dict[str, Any]]:
     largest = max(abs(r.error_g) for m in (before, p.delivered) for r in m.residuals)
     axis = _Axis(round(math.log10(FLOOR_MG)), math.ceil(math.log10(max(largest * 1e3, 1.0))))
     rows = []
-    for prefix, title in (("TP", "Test positions (fitted)"), ("CP", "Check positions (held out)")):
+    for prefix, title in (
+        ("TP", "Test positions (fitted)"),
+        ("CP", "Check positions (held out)"),
+        ("P", "Poses of the recording (fitted)"),
+    ):
         groups = by_temperature(before, prefix)
         if groups:
             rows.append({"title": title, **_row(p, before.residuals, groups, axis)})
@@ -51,7 +55,7 @@ def _row(
     for k, (temp, indices) in enumerate(groups):
         x0 = LEFT + k * span
         step = (span - 10.0) / len(indices)
-        ordered = sorted(indices, key=lambda i: before[i].dwell.position)
+        ordered = sorted(indices, key=lambda i: position_order(before[i].dwell.position))
         columns.append(
             {
                 "x": round(x0, 2),
@@ -64,7 +68,7 @@ def _row(
                         "x": round(x0 + 5.0 + step * (n + 0.5), 2),
                         "before": axis.y(before[i].error_g),
                         "after": axis.y(p.delivered.residuals[i].error_g),
-                        "label": before[i].dwell.position[-1],
+                        "label": before[i].dwell.position.lstrip("TCP"),
                     }
                     for n, i in enumerate(ordered)
                 ],

@@ -1,0 +1,303 @@
+"""A raw log to its calibration: poses found, candidates judged, and what is wrong told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from family_cases import COLUMNS, U0, K, csv_text, directions, log, write_unit
+from scipy.io import savemat
+
+from triaxcal.delivery import deliver
+from triaxcal.errors import RefusedError
+from triaxcal.fit.calibrate import Calibration
+from triaxcal.fit.family.route import calibrate_recording
+from triaxcal.model.types import FloatArray
+from triaxcal.unitfile import read_unit
+
+
+def calibrated(folder: Path) -> Calibration:
+    unit = read_unit(folder)
+    assert unit.recording is not None
+    return calibrate_recording(unit, unit.recording, folder)[2]
+
+
+def symmetric_part(matrix: FloatArray) -> FloatArray:
+    """K R^T with R such that it is symmetric: the frame "sensor", by polar decomposition."""
+    u, s, vt = np.linalg.svd(matrix)
+    result: FloatArray = u @ np.diag(s) @ u.T
+    assert np.linalg.det(u @ vt) > 0.0
+    return result
+
+
+def found(calibration: Calibration) -> tuple[FloatArray, FloatArray]:
+    constants = calibration.thermal.constants_at(20.0)
+    return constants[:9].reshape(3, 3), constants[9:]
+
+
+# ---- the truth comes back ----
+
+
+def test_a_hand_turned_log_gives_the_truth_in_the_sensors_frame(tmp_path: Path) -> None:
+    calibration = calibrated(write_unit(tmp_path / "U", log(directions(20))))
+    recording = calibration.recording
+    assert recording is not None
+    assert len(recording.poses.poses) == 20
+    matrix, bias = found(calibration)
+    sd = np.sqrt(np.diag(calibration.constants_covariance(20.0)))
+    truth = np.concatenate([symmetric_part(K).ravel(), U0])
+    errors = np.concatenate([matrix.ravel(), bias]) - truth
+    # Twelve values, nine of them independent: beyond 4.5 once in ten thousand.
+    assert np.abs(errors / sd).max() < 4.5
+    # 150 samples of 0.02 m/s^2: 0.17 mg a pose.
+    assert sd.max() < 3e-3
+    assert recording.rms_g < 0.3e-3
+    assert "linear, nine constants" in calibration.selection_reason
+
+
+def test_the_frame_of_the_case_is_that_of_its_faces(tmp_path: Path) -> None:
+    """Faces are exact here, so all twelve constants come back."""
+    folder = write_unit(tmp_path / "U", log(directions(20)), COLUMNS + '\nframe = "case"')
+    calibration = calibrated(folder)
+    # A pose is good to 0.17 mg, six faces turn the frame to 0.1 mrad: 3e-3 of 9.8 is three of that.
+    assert np.abs(found(calibration)[0] - K).max() < 3e-3
+    assert calibration.recording is not None
+    assert "frame of the case from 6 poses" in calibration.recording.findings[-1]
+
+
+def test_counts_in_a_mat_file_with_a_large_bias(tmp_path: Path) -> None:
+    """Unsigned counts about 33000, as imu-tk's: the codes are widened to 17 bits."""
+    rows = log(directions(20))
+    rows[:, 1:] = np.rint(33000.0 + 415.0 * rows[:, 1:])
+    recording = "acceleration = [2, 3, 4]\nacceleration_unit = 'count'\ntime = 1"
+    folder = write_unit(tmp_path / "U", rows, recording)
+    (folder / "log.csv").unlink()
+    savemat(folder / "log.mat", {"IMU": rows})
+    toml = (folder / "unit.toml").read_text().replace("log.csv", "log.mat")
+    (folder / "unit.toml").write_text(toml)
+    unit = read_unit(folder)
+    assert unit.recording is not None
+    unit, _, calibration = calibrate_recording(unit, unit.recording, folder)
+    assert (unit.adc.bits, unit.adc.volts_per_code) == (17, 1.0)
+    matrix, bias = found(calibration)
+    assert np.abs(matrix / 415.0 - symmetric_part(K)).max() < 4e-3
+    assert np.abs((bias - 33000.0) / 415.0 - U0).max() < 4e-3
+    assert calibration.gain_unit == "count/g"
+
+
+@pytest.mark.parametrize(
+    ("change", "recording"),
+    [
+        (lambda text: text.replace(",", ";").replace(".", ","), COLUMNS + '\ndecimal = ","'),
+        (lambda text: text.replace(",", "\t"), COLUMNS),
+        (lambda text: text.replace(",", "   "), COLUMNS),
+        (lambda text: "made by hand\n\n" + text, COLUMNS + "\nskip_rows = 1"),
+        (lambda text: "% one\n" + text, COLUMNS + '\ncomment = "%"'),
+        (
+            lambda text: text.split("\n", 1)[1],
+            'acceleration = [2, 3, 4]\nacceleration_unit = "m/s^2"\ntime = 1',
+        ),
+        (
+            lambda text: text.replace("ax", "a x [m/s2] \N{DEGREE SIGN}"),
+            COLUMNS.replace('"ax"', '"a x [m/s2] \N{DEGREE SIGN}"'),
+        ),
+    ],
+    ids=["semicolon-comma", "tab", "spaces", "skip", "comment", "no-header", "odd-name"],
+)
+def test_other_layouts_read_the_same(
+    tmp_path: Path, change: Callable[[str], str], recording: str
+) -> None:
+    text = csv_text(log(directions(10)), "t,ax,ay,az")
+    plain = calibrated(write_unit(tmp_path / "A", text))
+    other = calibrated(write_unit(tmp_path / "B", change(text), recording))
+    assert np.array_equal(found(plain)[0], found(other)[0])
+
+
+def test_a_recording_ends_in_the_same_c(tmp_path: Path) -> None:
+    """Poses to header with the whole cross-check; the compiled C keeps the residuals of the fit."""
+    delivery = deliver(write_unit(tmp_path / "U", log(directions(12))))
+    recording = delivery.calibration.recording
+    assert recording is not None
+    assert delivery.check.total > 10**6
+    compiled = next(m for m in delivery.methods if m.method == "matrix")
+    errors = np.array([r.error_g for r in compiled.residuals])
+    # Rounding: a raw code of 2^-16 m/s^2 in three axes, the proven bound, the output.
+    rounding = 3 * 2.0**-17 / 9.8 + (delivery.bound.lsb + 1) * 2.0**-24
+    assert np.abs(errors - recording.residual_g).max() < rounding
+    assert b"raw code = reading / 1.52587891e-05 m/s^2" in delivery.files["triax_calib.h"]
+
+
+# ---- poses and the reasons of refusals ----
+
+
+def test_a_short_pose_is_refused_with_its_length(tmp_path: Path) -> None:
+    hold = [3.0] * 12
+    hold[3] = 1.7
+    calibration = calibrated(write_unit(tmp_path / "U", log(directions(12), hold)))
+    assert calibration.recording is not None
+    (refused,) = calibration.recording.poses.refused
+    assert refused.number == 4
+    # The window that shows stillness hides a quarter of a second at either end.
+    assert refused.reason in {f"1.{d} s still, needs 2.0" for d in range(1, 8)}
+
+
+def test_a_clipped_axis_is_named(tmp_path: Path) -> None:
+    rows = log(directions(14))
+    rows[:, 3] = np.minimum(rows[:, 3], 9.5)
+    calibration = calibrated(write_unit(tmp_path / "U", rows))
+    assert calibration.recording is not None
+    reasons = {r.number: r.reason for r in calibration.recording.poses.refused}
+    told = "axis z is clipped: it stays at 9.5, the end of what the file shows; "
+    assert reasons == dict.fromkeys((1, 7), told + "measure with a wider range")
+
+
+def test_a_pose_that_drifts_is_refused(tmp_path: Path) -> None:
+    rows = log(directions(14))
+    part = slice(4 * 200, 4 * 200 + 150)  # the fifth pose: 3 s held, 1 s turning before each
+    rows[part, 1] += np.linspace(0.0, 0.12, 150)
+    calibration = calibrated(write_unit(tmp_path / "U", rows))
+    assert calibration.recording is not None
+    assert [r.number for r in calibration.recording.poses.refused] == [5]
+    assert "axis x drifts by 0.0" in calibration.recording.poses.refused[0].reason
+
+
+def test_gaps_and_missing_rows_are_told(tmp_path: Path) -> None:
+    rows = log(directions(14))
+    rows[500:, 0] += 7.0
+    text = csv_text(rows, "t,ax,ay,az").split("\n")
+    text[100] = text[100].split(",")[0] + ",,,"
+    text[200] = text[199]
+    calibration = calibrated(write_unit(tmp_path / "U", "\n".join(text)))
+    assert calibration.recording is not None
+    missing, repeated, gap = calibration.recording.findings[:3]
+    assert missing == "1 row without all readings left out, the first is line 101"
+    assert repeated.startswith("1 row with the time of the row before left out (1 of them the same")
+    assert gap.startswith("1 gap in time, the longest 7.02 s before line 502")
+
+
+def crowded() -> FloatArray:
+    some = directions(10)
+    return np.concatenate([some, np.tile(some[:1], (24, 1))])
+
+
+def test_a_crowd_of_alike_poses_is_told_and_counts_once(tmp_path: Path) -> None:
+    poses = crowded()
+    # Apart from each other: two alike in a row are one pose without turning between.
+    order = np.random.default_rng(3).permutation(len(poses))
+    calibration = calibrated(write_unit(tmp_path / "U", log(poses[order])))
+    assert calibration.recording is not None
+    told = [f for f in calibration.recording.findings if "look alike" in f]
+    assert len(told) == 1
+    assert "together they count as one orientation" in told[0]
+    assert "(10 orientations left out in turn)" in calibration.selection_reason
+
+
+# ---- what is refused, each with what to do ----
+
+
+def left_handed() -> FloatArray:
+    """Readings with a gyro that turns the other way: exact rotation about slowly moving axes."""
+    t = np.arange(0.0, 60.0, 0.02)
+    rate = np.stack([0.8 * np.sin(0.31 * t), 0.7 * np.cos(0.23 * t), 0.6 * np.sin(0.17 * t)], 1)
+    a = np.empty((len(t), 3))
+    a[0] = [0.0, 0.0, 1.0]
+    for k in range(1, len(t)):
+        w = rate[k] * 0.02
+        angle = np.linalg.norm(w)
+        axis = w / angle
+        before = a[k - 1]
+        a[k] = (
+            before * np.cos(angle)
+            - np.cross(axis, before) * np.sin(angle)
+            + axis * (axis @ before) * (1 - np.cos(angle))
+        )
+    held = log(directions(12))
+    moving = np.column_stack([t + held[-1, 0] + 0.02, 9.8 * a, rate])
+    still = np.column_stack([held, 1e-3 * np.random.default_rng(1).standard_normal((len(held), 3))])
+    return np.concatenate([still, moving])
+
+
+WITH_GYRO = COLUMNS + '\ngyro = ["wx", "wy", "wz"]'
+
+
+def test_a_right_handed_pair_of_triads_passes(tmp_path: Path) -> None:
+    rows = left_handed()
+    calibrated(write_unit(tmp_path / "U", rows, WITH_GYRO, header="t,ax,ay,az,wx,wy,wz"))
+
+
+def hot(rows: FloatArray) -> FloatArray:
+    return np.column_stack([rows, np.full(len(rows), 25.0)])
+
+
+BACK = log(directions(12))
+BACK[900:, 0] -= 5.0
+COARSE = log(directions(12))
+COARSE[:, 0] = np.floor(COARSE[:, 0])
+
+REFUSED = {
+    "too-few": (
+        log(directions(3)),
+        {},
+        "3 poses in 3 orientations; expected 4 different orientations at least, 9 for all",
+    ),
+    "coplanar": (
+        log(np.array([[np.cos(t), np.sin(t), 0.0] for t in np.arange(0, 6.2, 0.5)])),
+        {},
+        "poses, which lie near one plane, leave ",
+    ),
+    "m/s^2-for-g": (
+        log(directions(12)),
+        {"recording": COLUMNS.replace('"m/s^2"', '"g"')},
+        'expected about 1 at rest; m/s^2 taken for g? then acceleration_unit = "m/s^2"',
+    ),
+    "left-handed": (
+        left_handed(),
+        {
+            "recording": WITH_GYRO.replace('"ax"', '"-ax"'),
+            "header": "t,ax,ay,az,wx,wy,wz",
+        },
+        "the readings turn with the gyro as x, y, z = -x, y, z would (correlation 1.00; ",
+    ),
+    "time-back": (BACK, {}, "line 902: time runs back by 4.98 s; expected rising time"),
+    "coarse-clock": (COARSE, {}, "rows repeat the time of the row before"),
+    "one-temperature": (
+        hot(log(directions(12))),
+        {
+            "recording": COLUMNS + '\ntemperature = "T"',
+            "header": "t,ax,ay,az,T",
+            "more": '[thermal]\nmodel = "polynomial"\norder = 2\n',
+        },
+        "order 2, but all 12 poses are at one temperature (25 to 25 degC)",
+    ),
+    "no-such-column": (
+        log(directions(12)),
+        {"header": "t,ax,ay,a_z"},
+        "no column 'az' ([recording] acceleration) (did you mean \"a_z\"?)",
+    ),
+    "all-moving": (
+        log(directions(12), 0.4),
+        {},
+        "m/s^2: it is not held still; expected poses of 2 s at least",
+    ),
+    "adc-too-narrow": (
+        log(directions(12)),
+        {"more": "[adc]\nbits = 16\n"},
+        "-32768 to 32767 codes of [adc]; set [adc] bits = 24",
+    ),
+    "beyond-limit": (
+        log(directions(12)),
+        {"more": "[limits]\nat_t0_g = 1e-6\n"},
+        "expected at most 0.001 mg (limits.at_t0_g); look at that pose with `triaxcal poses`",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_input_is_named_with_what_to_do(tmp_path: Path, name: str) -> None:
+    rows, options, told = REFUSED[name]
+    folder = write_unit(tmp_path / "U", rows, **options)
+    with pytest.raises(RefusedError) as refusal:
+        calibrated(folder)
+    assert told in str(refusal.value)

@@ -1,0 +1,183 @@
+"""Poses with a table's angles, from the file to the calibration, and the pair's command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from family_cases import U0, K, write_unit
+from test_recordings import calibrated
+
+from triaxcal.delivery import deliver
+from triaxcal.errors import RefusedError
+from triaxcal.model.orientation import AIRCRAFT, INCLINOMETER, gravity_direction
+from triaxcal.model.terms import products
+from triaxcal.model.types import FloatArray
+
+ARCSEC = np.pi / 180.0 / 3600.0
+AIR = (
+    'rows = "poses"\nacceleration = ["ux", "uy", "uz"]\nacceleration_unit = "m/s^2"\n'
+    'pitch = "pitch"\nroll = "roll"\nangle_unit = "deg"'
+)
+
+
+def table(kind: str = AIRCRAFT, *, turn: bool = False) -> FloatArray:
+    """Angles in rad: P0's 25 positions, or full turns of both angles."""
+    if turn:
+        steps = np.radians(np.arange(0.0, 360.0, 30.0))
+        roll = np.stack([np.zeros(12), steps], axis=1)
+        pitch = np.stack([np.radians(np.arange(-75.0, 76.0, 15.0)), np.full(11, np.pi / 2)], axis=1)
+        return np.concatenate([roll, pitch])
+    steps = np.radians(np.arange(-30.0, 31.0, 15.0))
+    if kind == INCLINOMETER:
+        zenith, face = (
+            np.radians([20.0, 50.0, 80.0, 110.0]),
+            np.radians(np.arange(0.0, 360.0, 45.0)),
+        )
+        return np.stack(np.meshgrid(zenith, face, indexing="ij"), axis=-1).reshape(-1, 2)
+    return np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def rows_of(
+    angles: FloatArray, kind: str = AIRCRAFT, *, error_arcsec: float = 4.0, quadratic: float = 0.0
+) -> FloatArray:
+    """Angles in degrees and readings at angles that are off by the table's error."""
+    random = np.random.default_rng(2)
+    off = error_arcsec * ARCSEC * random.standard_normal(angles.shape)
+    force = gravity_direction(kind, angles + off)
+    Q = quadratic * np.array([[1, -1, 0, 1, 0, 0], [0, 1, -1, 0, 0, 1], [0, 0, 0, 0, 1, 0]])
+    readings = (force + products(force) @ Q.T) @ K.T + U0
+    return np.column_stack([np.degrees(angles), readings])
+
+
+HEADER = "pitch,roll,ux,uy,uz"
+
+
+def test_p0s_grid_gives_the_truth_and_refuses_quadratic_terms(tmp_path: Path) -> None:
+    folder = write_unit(tmp_path / "U", rows_of(table()), AIR, header=HEADER)
+    calibration = calibrated(folder)
+    constants = calibration.thermal.constants_at(20.0)
+    sd = np.sqrt(np.diag(calibration.constants_covariance(20.0)))
+    truth = np.concatenate([K.ravel(), U0])
+    assert np.abs((constants - truth) / sd).max() < 4.5
+    assert calibration.recording is not None
+    # 4 arcsec are 19 micro-g; the best of the table is linear.
+    assert 10e-6 < calibration.recording.rms_g < 30e-6
+    chosen = next(c for c in calibration.candidates if c.chosen)
+    assert "quadratic" not in chosen.label
+    scores = {c.label: c.held_out_g for c in calibration.candidates if c.held_out_g is not None}
+    assert min(scores, key=lambda label: scores[label]) in {"linear (12)", "linear (28)"}
+    assert any(
+        "angles back from the readings (8): pitch" in f for f in calibration.recording.findings
+    )
+
+
+def test_a_quadratic_truth_is_found_where_it_is(tmp_path: Path) -> None:
+    rows = rows_of(table(turn=True), quadratic=3e-4)
+    calibration = calibrated(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
+    scores = {c.label: c.held_out_g or 1.0 for c in calibration.candidates}
+    assert min(scores, key=lambda label: scores[label]).startswith("quadratic")
+    assert min(scores.values()) < 0.2 * scores["linear (28)"]
+
+
+def test_inclinometer_angles_and_a_recording_end_in_c(tmp_path: Path) -> None:
+    recording = AIR.replace("pitch", "zenith").replace("roll", "tool_face")
+    rows = rows_of(table(INCLINOMETER), INCLINOMETER)
+    folder = write_unit(tmp_path / "U", rows, recording, header="zenith,tool_face,ux,uy,uz")
+    delivery = deliver(folder)
+    constants = delivery.calibration.thermal.constants_at(20.0)
+    # 20 micro-g of placement in 32 positions: some 1e-4 m/s^2.
+    assert np.abs(constants - np.concatenate([K.ravel(), U0])).max() < 5e-4
+    assert delivery.check.total > 10**6
+
+
+def test_full_turns_are_told(tmp_path: Path) -> None:
+    rows = rows_of(table(turn=True))
+    calibration = calibrated(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
+    assert calibration.recording is not None
+    turns = [
+        f for f in calibration.recording.findings if f.startswith("full turn of roll (13 poses)")
+    ]
+    assert len(turns) == 1
+
+
+@pytest.mark.parametrize(
+    ("azimuth_error", "told"),
+    [
+        (0.0, "azimuth does not matter"),
+        (60.0, "check (b): the table's plane is out of level by 5"),
+    ],
+)
+def test_azimuth_tells_a_table_out_of_level(
+    tmp_path: Path, azimuth_error: float, told: str
+) -> None:
+    """The plumb line turned by exact rotation, the azimuth running round.
+
+    Of 60 arcsec the biases take a few: the azimuths of 48 poses do not cancel in each.
+    """
+    from triaxcal.model.orientation import direction_cosines
+
+    random = np.random.default_rng(3)
+    angles = np.stack(
+        [*random.uniform(-1.2, 1.2, (2, 48)), np.radians(np.arange(0.0, 360.0, 7.5))], axis=1
+    )
+    e = azimuth_error * ARCSEC
+    plumb = np.array([np.sin(e), 0.0, np.cos(e)])
+    off = angles + 2.0 * ARCSEC * random.standard_normal(angles.shape)
+    readings = direction_cosines(AIRCRAFT, off) @ plumb @ K.T + U0
+    rows = np.column_stack([np.degrees(angles), readings])
+    recording = AIR + '\nyaw = "yaw"'
+    folder = write_unit(tmp_path / "U", rows, recording, header="pitch,roll,yaw,ux,uy,uz")
+    calibration = calibrated(folder)
+    assert calibration.recording is not None
+    assert any(told in f for f in calibration.recording.findings), calibration.recording.findings
+
+
+GOOD = rows_of(table(turn=True))
+REFUSED = {
+    "degrees-for-radians": (
+        GOOD,
+        AIR.replace('"deg"', '"rad"'),
+        'degrees taken for radians? then angle_unit = "deg"',
+    ),
+    "radians-for-degrees": (
+        np.column_stack([np.radians(GOOD[:, :2]), GOOD[:, 2:]]),
+        AIR,
+        'radians taken for degrees? then angle_unit = "rad"',
+    ),
+    "left-handed": (
+        GOOD * [1, 1, -1, 1, 1],
+        AIR,
+        "the outputs look x along -x, y along +y, z along +z of the table; expected x along x",
+    ),
+    "exchanged": (
+        GOOD[:, [0, 1, 3, 2, 4]],
+        AIR,
+        "the outputs look x along +y, y along +x, z along +z of the table",
+    ),
+    "too-few": (GOOD[:5], AIR, "5 poses with angles; expected 6 at least"),
+    "one-angle-only": (
+        rows_of(np.stack([np.zeros(12), np.radians(np.arange(0.0, 360.0, 30.0))], axis=1)),
+        AIR,
+        "leave constants open (condition number",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_tables_are_named_with_what_to_do(tmp_path: Path, name: str) -> None:
+    rows, recording, told = REFUSED[name]
+    folder = write_unit(tmp_path / "U", rows, recording, header=HEADER)
+    with pytest.raises(RefusedError) as refusal:
+        calibrated(folder)
+    assert told in str(refusal.value)
+
+
+def test_all_signs_turned_is_the_convention_of_the_sensor(tmp_path: Path) -> None:
+    """A sensor that reads gravity instead of specific force: K stays positive, as read."""
+    plain = calibrated(write_unit(tmp_path / "A", GOOD, AIR, header=HEADER))
+    other = calibrated(write_unit(tmp_path / "B", GOOD * [1, 1, -1, -1, -1], AIR, header=HEADER))
+    first, second = (c.thermal.constants_at(20.0) for c in (plain, other))
+    assert np.abs(first[:9] - second[:9]).max() < 1e-12 * 10
+    assert np.abs(first[9:] + second[9:]).max() < 1e-12 * 10

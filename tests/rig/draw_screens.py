@@ -1,0 +1,78 @@
+"""Pictures of the operator's screen, to be looked at: `python draw_screens.py FOLDER`.
+
+SVG of every state at 80x24 and 120x40; `rsvg-convert -w 900 X.svg -o X.png` makes what docs show.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+import tempfile
+from pathlib import Path
+
+from rich.console import Console
+from rich.screen import Screen
+from rig_cases import rig_of, short_setup
+
+from triaxcal.rig.engine import Engine
+from triaxcal.rig.events import View
+from triaxcal.rig.runner import Robot
+from triaxcal.rig.screen import BusView, screen
+from triaxcal.rig.view import view
+
+BUS = BusView("can0", 211.0, 26000.0, 0, 1_000_000)
+SLIP = "TP1: slip of 144 micro-g on x at 8 s, retake"
+
+
+def phases(folder: Path) -> dict[str, View]:
+    """A view of each phase of a session, some seconds into it."""
+    setup = short_setup(folder, temps="[20, 25]")
+    engine, rig = Engine(setup, "test"), rig_of(setup)
+    robot, found, seconds = Robot(rig), {}, {}
+    while not engine.session.done:
+        engine.feed(rig.advance())
+        robot.act(engine.session)
+        now = view(engine.session)
+        seconds[now.phase] = seconds.get(now.phase, 0) + 1
+        if seconds[now.phase] <= 12:
+            found[now.phase] = now
+    return {**found, "done": view(engine.session)}
+
+
+def exceptions(folder: Path) -> dict[str, View]:
+    """A slip, and a position out of order."""
+    setup = short_setup(folder, temps="[20]")
+    slipped, rig = Engine(setup, "test"), rig_of(setup, "slip@84:150")
+    for _ in range(110):
+        slipped.feed(rig.advance())
+    offered, rig = Engine(setup, "test"), rig_of(setup)
+    rig.turn_to("TP4")
+    for _ in range(121):
+        offered.feed(rig.advance())
+    return {"slip": view(slipped.session), "offer": view(offered.session)}
+
+
+def svg(seen: View, alarms: tuple[str, ...], width: int, height: int) -> str:
+    console = Console(
+        width=width, height=height, record=True, file=io.StringIO(), force_terminal=True,
+        color_system="truecolor",
+    )  # fmt: skip
+    console.print(Screen(screen(seen, BUS, alarms)))
+    text = console.export_svg(title=f"triaxcal rig run, {width}x{height}")
+    # Fonts of this machine in place of one from the network; blanks are meant.
+    text = text.replace("Fira Code", "DejaVu Sans Mono")
+    return text.replace("<text ", '<text xml:space="preserve" ')
+
+
+def main(target: Path) -> None:
+    target.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        states = phases(Path(folder)) | exceptions(Path(folder))
+    for width, height in ((80, 24), (120, 40)):
+        for name, seen in states.items():
+            alarms = (SLIP,) if name == "slip" else ()
+            (target / f"{name}-{width}.svg").write_text(svg(seen, alarms, width, height))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,190 @@
+"""The live commands: keys on a terminal, `rig record`, `rig simulate`, python-can's other buses."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import select
+import struct
+import subprocess
+import sys
+import termios
+import threading
+import time
+from itertools import count
+
+import numpy as np
+import pytest
+from rig_cases import rig_of, short_setup
+from test_cli_rig import bench_copy, triaxcal
+
+from triaxcal.cli.rig import rig
+from triaxcal.errors import RefusedError
+from triaxcal.rig.candump import parse
+from triaxcal.rig.journal import read_journal
+from triaxcal.rig.recording import JOURNAL_FILE
+from triaxcal.rig.samples import SampleDecoder
+from triaxcal.rig.sources import BusSource, messages_of, open_bus
+
+ENTRY = "from triaxcal.cli.entry import entry; entry()"
+CHANNELS = count(1)
+LIMIT_S = 60.0
+
+
+class Terminal:
+    """A session on a terminal of 80x24."""
+
+    def __init__(self, arguments):
+        self.end, theirs = pty.openpty()
+        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+        environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"}
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", ENTRY, *map(str, arguments)],
+            stdin=theirs, stdout=theirs, stderr=theirs, env=environment, start_new_session=True,
+        )  # fmt: skip
+        os.close(theirs)
+        self.text = ""
+
+    def until(self, said):
+        end = time.monotonic() + LIMIT_S
+        while said() is False and time.monotonic() < end:
+            if select.select([self.end], [], [], 0.05)[0]:
+                try:
+                    self.text += os.read(self.end, 65536).decode("utf-8", "replace")
+                except OSError:  # the other side has gone
+                    break
+        assert said(), self.text[-2000:]
+
+    def close(self):
+        self.process.kill()
+        self.process.wait()
+        os.close(self.end)
+
+
+def test_the_operators_keys(tmp_path):
+    unit, setup = bench_copy(tmp_path), short_setup(tmp_path, temps="[20]")
+    terminal = Terminal(["rig", "run", "--bus", "virtual", "--unit", unit,
+                         "--plan", setup.plan.source])  # fmt: skip
+    journal = unit / "sessions" / "001" / JOURNAL_FILE
+
+    def commands():
+        records = read_journal(journal).records if journal.exists() else ()
+        return [r["command"]["name"] for r in records if r["kind"] == "command"]
+
+    try:
+        terminal.until(lambda: "\x1b[?1049h" in terminal.text and "█" in terminal.text)
+        # An arrow key, an unknown one; then two in one go.
+        os.write(terminal.end, b"\x1b[1~")
+        os.write(terminal.end, b"x")
+        os.write(terminal.end, b"y1")
+        terminal.until(lambda: len(commands()) >= 2)
+        os.write(terminal.end, b"q")
+        terminal.until(lambda: "go on with: triaxcal rig resume" in terminal.text)
+        assert terminal.process.wait(LIMIT_S) == 1
+    finally:
+        terminal.close()
+    assert commands() == ["Agree", "Redo"]
+    texts = [r["event"]["text"] for r in read_journal(journal).records if r["kind"] == "event"]
+    assert "nothing is offered" in texts
+    assert "TP1 has not been accepted at this temperature" in texts
+    # The terminal is as before: the other screen left, the cursor shown.
+    assert terminal.text.rindex("\x1b[?1049l") > terminal.text.rindex("\x1b[?1049h")
+    assert terminal.text.rindex("\x1b[?25h") > terminal.text.rindex("\x1b[?25l")
+
+
+def test_ctrl_c_stops_a_session_like_q(tmp_path):
+    unit, setup = bench_copy(tmp_path), short_setup(tmp_path, temps="[20]")
+    terminal = Terminal(["rig", "run", "--bus", "virtual", "--unit", unit, "--plain",
+                         "--plan", setup.plan.source])  # fmt: skip
+    try:
+        terminal.until(lambda: "reference: noise at rest learned" in terminal.text)
+        terminal.process.send_signal(2)
+        terminal.until(lambda: "go on with: triaxcal rig resume" in terminal.text)
+        assert terminal.process.wait(LIMIT_S) == 1
+    finally:
+        terminal.close()
+    assert "Traceback" not in terminal.text
+
+
+def test_a_recorded_bus_is_the_simulated_one(tmp_path):
+    """`rig simulate` at one end of a python-can channel, `rig record` at the other."""
+    setup = short_setup(tmp_path)
+    channel, log = f"virtual:live-{next(CHANNELS)}", tmp_path / "x.log"
+    common = ["--unit", str(setup.folder), "--plan", setup.plan.source, "--bus", channel]
+
+    def record():
+        rig.main(["record", *common, "--seconds", "3", str(log)], standalone_mode=False)
+
+    recorder = threading.Thread(target=record)
+    recorder.start()
+    end = time.monotonic() + LIMIT_S
+    while not log.exists() and time.monotonic() < end:
+        time.sleep(0.01)
+    rig.main(["simulate", *common, "--seconds", "2"], standalone_mode=False)
+    recorder.join(LIMIT_S)
+    assert not recorder.is_alive()
+    parsed = parse(log.read_bytes())
+    assert parsed.bad_lines == 0
+    alone = rig_of(setup)
+    sent = [alone.advance() for _ in range(2)]
+    codes = [SampleDecoder(setup.dbc, "classic", 100).feed(f).codes for f in (parsed.frames,)]
+    decoder = SampleDecoder(setup.dbc, "classic", 100)
+    expected = np.concatenate([decoder.feed(frames).codes for frames in sent])
+    # The recorder may have come to the channel some frames late, never lost one in between.
+    assert len(codes[0]) > 100
+    np.testing.assert_array_equal(codes[0], expected[-len(codes[0]) :])
+
+
+def test_record_goes_on_behind_what_is_there(tmp_path):
+    unit, setup = bench_copy(tmp_path), short_setup(tmp_path)
+    log = tmp_path / "x.log"
+    log.write_bytes(b"(1600000000.000000) can0 100#00\n(160000")
+    done = triaxcal("rig", "record", "--bus", "virtual", "--unit", unit, "--seconds", "0.2",
+                    "--plan", setup.plan.source, log)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    lines = log.read_bytes().splitlines()
+    assert lines[0] == b"(1600000000.000000) can0 100#00"
+    assert f"{log}: {len(lines) - 1} frames" in done.stdout
+    assert parse(log.read_bytes()).bad_lines == 0
+
+
+def test_a_bus_gets_python_cans_own_configuration(monkeypatch):
+    monkeypatch.setenv("CAN_CONFIG", '{"receive_own_messages": true}')
+    bus = open_bus(f"virtual:live-{next(CHANNELS)}", fd=False)
+    assert bus.receive_own_messages
+    bus.shutdown()
+
+
+@pytest.mark.parametrize("layout", ["classic", "fd"])
+def test_frames_over_a_bus_of_python_can(tmp_path, layout):
+    setup = short_setup(tmp_path, layout=layout)
+    name = f"virtual:live-{next(CHANNELS)}"
+    sender = open_bus(name, fd=layout == "fd")
+    source = BusSource(open_bus(name, fd=layout == "fd"), name)
+    frames = rig_of(setup).advance()
+    for message in messages_of(frames):
+        sender.send(message)
+    found, end = source.read(), time.monotonic() + LIMIT_S
+    while not len(found) and time.monotonic() < end:
+        found = source.read()
+    np.testing.assert_array_equal(found.can_id, frames.can_id)
+    np.testing.assert_array_equal(found.data[:, :8], frames.data[:, :8])
+    assert source.notes() == []
+    while not (notes := source.notes()) and time.monotonic() < end:
+        source.read()
+    assert notes == [f"{name}: no frames; is the rig on, the plug in, the bus up?"]
+    sender.send(messages_of(frames)[0])
+    while not (notes := source.notes()) and time.monotonic() < end:
+        source.read()
+    assert notes == [f"{name}: frames come again"]
+    source.close()
+    sender.shutdown()
+
+
+def test_a_bus_that_breaks_is_told():
+    name = f"virtual:live-{next(CHANNELS)}"
+    bus = open_bus(name, fd=False)
+    bus.shutdown()
+    with pytest.raises(RefusedError, match=f"{name}: cannot be read: .*`triaxcal rig resume`"):
+        BusSource(bus, name).read()

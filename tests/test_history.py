@@ -1,0 +1,156 @@
+"""A unit calibrated several times: what agrees, what contradicts, what repeats."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from triaxcal.cli.history import history as command
+from triaxcal.errors import RefusedError
+from triaxcal.fit.calibrate import calibrate
+from triaxcal.simulation.dwells import simulate
+from triaxcal.simulation.truth import Imperfections, Truth, read_truth
+from triaxcal.simulation.unit import write_simulated_unit
+from triaxcal.uncertainty.history import (
+    EN_MAX,
+    Calibrated,
+    changes,
+    read_history,
+    repeatability,
+)
+from triaxcal.unitfile import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
+
+AT_SIM = Path(__file__).resolve().parents[1] / "units" / "AT-SIM"
+RIG = Imperfections(
+    squareness_sd_arcsec=8.0,
+    repeatability_sd_arcsec=2.0,
+    level_sd_arcsec=5.0,
+    gravity_sd_m_per_s2=2e-5,
+    thermometer_offset_sd_degc=0.05,
+)
+STATED = StatedUncertainty(8.0, 2.0, 5.0, 2e-5, 0.05, 0.02)
+
+
+@pytest.fixture(scope="module")
+def unit() -> UnitDescription:
+    thermal = ThermalChoice("polynomial", 3, None)
+    return replace(read_unit(AT_SIM), stated=STATED, thermal=thermal, estimator="least-squares")
+
+
+def calibrations(unit: UnitDescription, truths: list[Truth], seed: int) -> list[Calibrated]:
+    """The unit as it is each time, each time on a rig drawn anew."""
+    _, plan = read_truth(AT_SIM)
+    found = []
+    for k, truth in enumerate(truths):
+        # Check dwells and 400 readings add nothing here but time.
+        its = replace(plan, seed=1000 * seed + k, readings_per_dwell=30, check_temperatures_degc=())
+        measured = simulate(unit, replace(truth, imperfections=RIG), its)
+        day = date(2020 + k, 6, 1)
+        found.append(Calibrated(str(day), day, measured, calibrate(unit, measured)))
+    return found
+
+
+def aged(truth: Truth, constant: int, by: float) -> Truth:
+    """The truth with one constant moved at every temperature."""
+    curves = truth.constants.curves
+    coefficients = curves.coefficients.copy()
+    coefficients[0, constant, 0] += by
+    moved = replace(curves, coefficients=coefficients)
+    return replace(truth, constants=replace(truth.constants, curves=moved))
+
+
+def test_calibrations_of_one_truth_agree(unit: UnitDescription) -> None:
+    """Stated: a contradiction in one of twenty. 30 pairs: more than 6 once in 1700."""
+    truth, _ = read_truth(AT_SIM)
+    told = sum(
+        changes(unit, calibrations(unit, [truth, truth], seed))[0].contradicts for seed in range(30)
+    )
+    assert told <= 6
+
+
+def test_an_aged_bias_contradicts_and_is_named(unit: UnitDescription) -> None:
+    truth, _ = read_truth(AT_SIM)
+    history = calibrations(unit, [truth, truth, aged(truth, 10, 2e-4)], 7)
+    first, second = changes(unit, history)
+    assert not first.contradicts
+    assert second.contradicts
+    assert second.en > EN_MAX
+    assert second.where.startswith("U0y at")
+    # 0.2 mV over -0.5485 V/g; the rig's tilts add some hundredths of a mg.
+    assert second.bias_mg == pytest.approx(-0.365, abs=0.1)
+
+
+def test_repeatability_and_ageing(unit: UnitDescription) -> None:
+    """Scale factors that grow by 100 ppm a year, over twelve calibrations a year apart."""
+    truth, _ = read_truth(AT_SIM)
+    kxx = float(truth.constants.curves.coefficients[0, 0, 0])
+    truths = [aged(truth, 0, kxx * 1e-4 * k) for k in range(12)]
+    history = calibrations(unit, truths, 11)
+    found = repeatability(unit, history)
+    assert found is not None
+    assert found.years == pytest.approx(11.0, abs=0.01)
+    # Gravity, 2 ppm, and tilts, quadratic in a few arcsec, scatter it: 3 ppm / sqrt(143) a year.
+    assert found.scale_ppm_a_year == pytest.approx(100.0, abs=1.5)
+    # Tilts of 8 and 5 arcsec are 24 to 55 micro-rad of cross-axis sensitivity.
+    assert 15.0 < found.cross_axis_micro_rad < 80.0
+    assert found.scale_ppm < 10.0
+
+
+def test_too_few_calibrations_say_nothing_of_repeatability(unit: UnitDescription) -> None:
+    truth, _ = read_truth(AT_SIM)
+    history = calibrations(unit, [truth, truth, truth, truth], 3)
+    assert repeatability(unit, history[:2]) is None
+    undated = [replace(c, day=None) for c in history[:3]]
+    about_mean = repeatability(unit, undated)
+    assert about_mean is not None
+    assert about_mean.years is None
+    expected = np.array([c.calibration.thermal.constants_at(20.0)[8] for c in undated])
+    assert about_mean.scale_ppm < 1e6 * float(np.ptp(expected)) / 0.5 + 20.0
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A unit with two earlier calibrations; the present one is of another bias."""
+    unit = tmp_path / "units" / "H-1"
+    shutil.copytree(AT_SIM, unit)
+    (unit / "history").mkdir()
+    for day, seed in (("2024-03-30", 1), ("2025-03-30", 2)):
+        write_simulated_unit(unit, seed)
+        (unit / "measurements.csv").rename(unit / "history" / f"{day}.csv")
+    truth = unit / "truth.toml"
+    truth.write_text(truth.read_text().replace("U0x = [0.004491", "U0x = [0.004991"))
+    write_simulated_unit(unit, 3)
+    return unit
+
+
+def test_the_command(folder: Path) -> None:
+    done = CliRunner().invoke(command, [str(folder)])
+    assert done.exit_code == 0, done.output
+    lines = done.output.splitlines()
+    assert lines[0].startswith("3 calibrations of AT-SIM-001")
+    assert [line.split()[0] for line in lines[3:6]] == ["2024-03-30", "2025-03-30", "now"]
+    assert lines[-1].startswith("warning: calibration now contradicts the one before: U0x at ")
+    assert max(map(len, lines[:-1])) <= 100
+
+
+def test_a_unit_without_history(folder: Path) -> None:
+    shutil.rmtree(folder / "history")
+    with pytest.raises(RefusedError) as refusal:
+        read_history(folder, read_unit(folder))
+    assert str(refusal.value) == (
+        f"{folder}/history: no earlier measurements; expected history/<day>.csv, as "
+        "history/2025-03-30.csv; move measurements.csv there before you put a new one in its place"
+    )
+
+
+def test_a_broken_file_of_the_history_is_named(folder: Path) -> None:
+    path = folder / "history" / "2024-03-30.csv"
+    path.write_text(path.read_text().replace("TP3", "TP4", 1), encoding="utf-8")
+    with pytest.raises(RefusedError, match=r"history/2024-03-30.csv, rows .*TP4 twice"):
+        read_history(folder, read_unit(folder))

@@ -1,0 +1,111 @@
+"""Units on this machine's cores: a pool of processes that survives the death of one.
+
+No more units are under way than there are workers, so that those under way when a worker dies are
+the only suspects. Each of them is made again, alone; the one that a worker dies on alone is
+refused.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import tempfile
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+
+from triaxcal.batch.order import Make, Order, Outcome, refused
+
+_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""A worker is a core's worth: libraries that would start threads of their own are told so."""
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def run_local(make: Make, orders: list[Order], jobs: int) -> Iterator[Outcome]:
+    """Outcomes of all orders as they come, on `jobs` processes.
+
+    An interrupt is left to the caller: units under way are finished first.
+    """
+    waiting, suspects = deque(orders), deque[Order]()
+    with tempfile.TemporaryDirectory(prefix="triaxcal-batch-") as scratch:
+        before = {name: os.environ.get(name) for name in _ONE_THREAD}
+        os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+        try:
+            while waiting or suspects:
+                if suspects:
+                    yield from _alone(make, suspects, scratch)
+                else:
+                    yield from _together(make, waiting, suspects, jobs, scratch)
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    os.environ.pop(name, None)
+                else:
+                    os.environ[name] = value
+
+
+def _together(
+    make: Make, waiting: deque[Order], suspects: deque[Order], jobs: int, scratch: str
+) -> Iterator[Outcome]:
+    """Make the waiting; when a worker dies, those under way become suspects."""
+    under_way: dict[Future[Outcome], Order] = {}
+    with _pool(min(jobs, len(waiting)), scratch) as pool:
+        try:
+            while waiting or under_way:
+                while waiting and len(under_way) < jobs:
+                    under_way[pool.submit(make, waiting[0])] = waiting[0]
+                    waiting.popleft()
+                done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+                for future in done:
+                    outcome = future.result()
+                    del under_way[future]
+                    yield outcome
+        except BrokenProcessPool:
+            for future, order in under_way.items():
+                if future.done() and not future.cancelled() and future.exception() is None:
+                    yield future.result()
+                else:
+                    suspects.append(order)
+
+
+def _alone(make: Make, suspects: deque[Order], scratch: str) -> Iterator[Outcome]:
+    order = suspects.popleft()
+    with _pool(1, scratch) as pool:
+        try:
+            yield pool.submit(make, order).result()
+        except BrokenProcessPool:
+            yield refused(
+                order,
+                f"{order.folder}: the worker process died on it twice; is there memory enough? "
+                "run again with fewer --jobs",
+            )
+
+
+def _pool(jobs: int, scratch: str) -> ProcessPoolExecutor:
+    # Spawned, not forked: the progress bar has a thread, and a fork copies its locks.
+    return ProcessPoolExecutor(
+        max(1, jobs), mp_context=get_context("spawn"), initializer=_start, initargs=(scratch,)
+    )
+
+
+def _start(scratch: str) -> None:
+    """Leave interrupts to the parent, and litter to its folder."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    tempfile.tempdir = scratch
+    threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
+
+
+def _leave_with(parent: int) -> None:
+    """End when the parent is gone: the pool's pipes never tell a worker that it was killed."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os.kill(os.getpid(), signal.SIGTERM)

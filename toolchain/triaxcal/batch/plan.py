@@ -1,0 +1,135 @@
+"""Which units there are, which must be made, and which are refused before anything starts."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from triaxcal.batch import journal
+from triaxcal.batch.order import Order, Outcome, refused
+from triaxcal.batch.toolchain import toolchain
+from triaxcal.errors import RefusedError
+from triaxcal.records import MEASUREMENTS_FILE
+from triaxcal.tomltable import read_toml
+from triaxcal.unitfile import UNIT_FILE, find_unit, list_units
+
+
+@dataclass(frozen=True)
+class Work:
+    """The series before the run.
+
+    Attributes
+    ----------
+    orders : list of Order
+        To be made.
+    done : dict
+        Journal entries of units made before from the same inputs by the same toolchain.
+    refused : list of Outcome
+        Units that cannot be read, and those that share a name or serial.
+    skipped : list of Path
+        What was named and is no folder.
+    """
+
+    orders: list[Order]
+    done: dict[str, dict[str, Any]]
+    refused: list[Outcome]
+    skipped: list[Path]
+
+    @property
+    def total(self) -> int:
+        """Units in all."""
+        return len(self.orders) + len(self.done) + len(self.refused)
+
+
+def plan_work(folders: Iterable[Path], build: Path) -> Work:
+    """Read every unit's inputs and compare them with what `build` holds.
+
+    Raises
+    ------
+    RefusedError
+        When no unit is named, or the journal cannot be read.
+    """
+    named = sorted(dict.fromkeys(folders))
+    skipped = [path for path in named if path.is_file()]
+    units = [path for path in named if path not in set(skipped)]
+    if not units:
+        raise RefusedError("batch", "no units named", remedy="say triaxcal batch units/*")
+    before, by = journal.read_journal(build), toolchain()
+    orders, failed = [], []
+    for folder in units:
+        try:
+            orders.append(_order(folder, by))
+        except RefusedError as refusal:
+            failed.append(Outcome(folder.absolute().name, "", str(refusal)))
+    clashes = _clashes(orders, before)
+    failed += [refused(o, clashes[o.folder]) for o in orders if o.folder in clashes]
+    orders = [o for o in orders if o.folder not in clashes]
+    done = {
+        o.name: before[o.name]
+        for o in orders
+        if before.get(o.name, {}).get("key") == o.key and journal.intact(build, before[o.name])
+    }
+    return Work([o for o in orders if o.name not in done], done, failed, skipped)
+
+
+def _order(folder: Path, by: str) -> Order:
+    find_unit(folder)
+    inputs = {}
+    for name in (UNIT_FILE, MEASUREMENTS_FILE):
+        try:
+            inputs[name] = (folder / name).read_bytes()
+        except OSError as error:
+            raise RefusedError(
+                str(folder / name), f"cannot be read: {(error.strerror or str(error)).lower()}"
+            ) from error
+    digest = hashlib.sha256(by.encode())
+    digest.update(folder.absolute().name.encode())
+    for content in inputs.values():
+        digest.update(hashlib.sha256(content).digest())
+    return Order(folder.absolute().name, str(folder), digest.hexdigest(), by, inputs)
+
+
+def _clashes(orders: list[Order], before: dict[str, dict[str, Any]]) -> dict[str, RefusedError]:
+    """Refusals by folder: two units with one name or serial, named or beside those named."""
+    by_name, by_serial = defaultdict(list), defaultdict(list)
+    for order in orders:
+        by_name[order.name].append(order.folder)
+        known = before.get(order.name, {})
+        # Unchanged inputs have the serial they had: a thousand parses are saved.
+        if known.get("key") == order.key:
+            serial = known["record"]["serial"]
+        else:
+            serial = _serial(Path(order.folder))
+        by_serial[serial].append(order.folder)
+    named = {Path(order.folder).absolute() for order in orders}
+    for units_dir in {folder.parent for folder in named}:
+        for name in list_units(units_dir):
+            if units_dir / name not in named:
+                by_serial[_serial(units_dir / name)].append(str(units_dir / name))
+    by_serial.pop(None, None)
+    clashes: dict[str, RefusedError] = {}
+    for what, groups in (("serial", by_serial), ("name", by_name)):
+        for value, found in groups.items():
+            for folder in found if len(found) > 1 else ():
+                other = next(f for f in found if f != folder)
+                where = f"{folder}/{UNIT_FILE}, serial" if what == "serial" else folder
+                clashes[folder] = RefusedError(
+                    where,
+                    f'"{value}" is also the {what} of {other}',
+                    expected=f"a {what} of its own for each unit",
+                    remedy="correct one of the two",
+                )
+    return clashes
+
+
+def _serial(folder: Path) -> str | None:
+    """Serial of a unit; None when its file is wrong, which is told when it is made."""
+    try:
+        found = read_toml(folder / UNIT_FILE).get("serial")
+    except RefusedError:
+        return None
+    return found if isinstance(found, str) else None

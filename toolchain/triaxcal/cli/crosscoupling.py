@@ -1,0 +1,32 @@
+"""triaxcal crosscoupling: an orthogonal pair of accelerometers on a dividing head, P3."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--gravity",
+    type=click.FloatRange(9.7, 9.9),
+    default=9.80665,
+    show_default=True,
+    help="Local gravity, m/s^2.",
+)
+@click.option("--picture", type=click.Path(path_type=Path), help="Also draw the convergence.")
+def crosscoupling(file: Path, gravity: float, picture: Path | None) -> None:
+    """Coefficients from FILE, a CSV with columns theta_deg, a_g, b_g, one row a position."""
+    from triaxcal.cli.recorded import write_picture  # noqa: PLC0415
+    from triaxcal.fit.family.cross_coupling import fit_pair, recursive_pair  # noqa: PLC0415
+    from triaxcal.recording.pair import read_pair  # noqa: PLC0415
+    from triaxcal.report.studies import pair_picture, pair_text  # noqa: PLC0415
+
+    theta, a, b = read_pair(file)
+    fit = fit_pair(str(file), theta, a, b, gravity / 9.80665)
+    recursion = recursive_pair(theta, a, b, gravity / 9.80665)
+    if picture is not None:
+        write_picture(picture, pair_picture(recursion))
+    click.echo(pair_text(fit, recursion))

@@ -1,0 +1,42 @@
+"""`triaxcal history`: a unit's calibrations over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from triaxcal.delivery import Delivery
+from triaxcal.report.history import contradiction, history_text
+from triaxcal.uncertainty.history import (
+    Calibrated,
+    changes,
+    latest_change,
+    read_history,
+    repeatability,
+)
+from triaxcal.unitfile import read_unit
+
+
+@click.command()
+@click.argument("unit", type=click.Path(path_type=Path))
+def history(unit: Path) -> None:
+    """Compare the calibrations of UNIT: its history/*.csv, by name, and measurements.csv."""
+    description = read_unit(unit)
+    found = read_history(unit, description)
+    click.echo(
+        history_text(
+            description.serial,
+            found,
+            changes(description, found),
+            repeatability(description, found),
+        )
+    )
+
+
+def warn_of_contradiction(folder: Path, delivery: Delivery) -> None:
+    """Tell when the calibration just made contradicts the last one in the unit's history."""
+    newest = Calibrated("now", None, delivery.measurements, delivery.calibration)
+    change = latest_change(folder, delivery.unit, newest)
+    if change is not None and change.contradicts:
+        click.echo(contradiction(change), err=True)

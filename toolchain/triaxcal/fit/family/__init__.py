@@ -1,0 +1,1 @@
+"""Calibrations from other static recordings than the tilter's: known and unknown orientations."""

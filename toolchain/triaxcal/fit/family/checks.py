@@ -1,0 +1,165 @@
+"""What is wrong with a set of poses before anything is fitted, each fault with what to do."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+from triaxcal.recording.poses import ALIKE_DEG, PoseSet
+from triaxcal.recording.samples import Samples
+from triaxcal.recordinglayout import RecordingLayout
+
+CONDITION_MAX = 100.0
+"""Of the scaled Jacobian: beyond it a hundredth of a constant's effect tells it from the others."""
+_CROWD = 0.6
+"""Of the poses in one orientation: a crowd that is told."""
+_HANDED_MIN = 0.35
+"""Correlation of the movement with the gyro that can decide: logs turned by hand have about 0.5."""
+_MOVING_MIN = 50
+"""Samples of movement that can decide."""
+
+
+def refuse_wrong_unit(source: str, readings: FloatArray, layout: RecordingLayout) -> None:
+    """Refuse readings whose length is not near 1 g in the unit that is stated.
+
+    The median over the poses: biases and scale errors stay far within a factor of two.
+    """
+    one_g = layout.reading_of_1_g
+    if one_g is None:
+        return
+    length = float(np.median(np.linalg.norm(readings, axis=1)))
+    if 0.5 * one_g <= length <= 2.0 * one_g:
+        return
+    taken = {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3}
+    near = [u for u, size in taken.items() if 0.7 * size <= length <= 1.4 * size]
+    remedy = (
+        f'{near[0]} taken for {layout.acceleration_unit}? then acceleration_unit = "{near[0]}"'
+        if near
+        else 'if these are raw codes, acceleration_unit = "count"'
+    )
+    raise RefusedError(
+        source,
+        f"the poses' readings are about {length:.4g} {layout.acceleration_unit} long",
+        expected=f"about {one_g:g} at rest",
+        remedy=remedy,
+    )
+
+
+def refuse_left_handed(samples: Samples, centre: FloatArray) -> None:
+    """Refuse readings that turn the other way than the gyro says; `centre` is a rough bias, (3,).
+
+    A force fixed in the world, seen from the turning unit, obeys da/dt = a x w. Over slow movement
+    both sides correlate for one way of naming and signing the axes: it must be theirs.
+    """
+    if samples.gyro is None or len(samples.reading) < _MOVING_MIN:
+        return
+    window = max(1, round(0.1 / samples.step_s))
+    force = _smooth(samples.reading - centre, window)
+    rate = _smooth(samples.gyro - np.median(samples.gyro, axis=0), window)
+    change = np.gradient(force, axis=0)
+    length, speed = np.linalg.norm(force, axis=1), np.linalg.norm(rate, axis=1)
+    middle = float(np.median(length))
+    # Where |a| is far from 1 g the hand pushes, and it is not gravity that is seen.
+    moving = (np.abs(length - middle) < 0.1 * middle) & (speed > np.percentile(speed, 70))
+    if moving.sum() < _MOVING_MIN:
+        return
+    scores = {
+        turned: _correlation(change[moving] @ matrix.T, force[moving] @ matrix.T, rate[moving])
+        for turned, matrix in _TURNS.items()
+    }
+    best = max(scores, key=lambda turned: scores[turned])
+    own = scores["x, y, z"]
+    if scores[best] < _HANDED_MIN or scores[best] < 2.0 * own:
+        return
+    raise RefusedError(
+        samples.source,
+        f"the readings turn with the gyro as x, y, z = {best} would (correlation "
+        f"{scores[best]:.2f}; {own:.2f} as they are)",
+        expected="da/dt = a x w, right-handed axes for both",
+        remedy='left-handed axes? set signs and columns so, as ["ax", "-ay", "az"]; if only the '
+        "gyro is turned, leave it out",
+    )
+
+
+def _correlation(change: FloatArray, force: FloatArray, rate: FloatArray) -> float:
+    predicted = np.cross(force, rate)
+    size = float(np.linalg.norm(change) * np.linalg.norm(predicted))
+    return float((change * predicted).sum()) / size if size else 0.0
+
+
+def _turns() -> dict[str, FloatArray]:
+    """The 24 ways to name and sign three axes, by their names.
+
+    A sign of all three changes nothing here: of two such ways the one with fewer signs.
+    """
+    turns = {}
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            if sum(signs) < 0.0:
+                continue
+            matrix = np.zeros((3, 3))
+            matrix[np.arange(3), list(order)] = signs
+            words = [("" if s > 0 else "-") + AXES[k] for k, s in zip(order, signs, strict=True)]
+            turns[", ".join(words)] = matrix
+    return turns
+
+
+_TURNS = _turns()
+
+
+def _smooth(values: FloatArray, window: int) -> FloatArray:
+    kernel = np.ones(window) / window
+    return np.stack([np.convolve(values[:, k], kernel, mode="same") for k in range(3)], axis=1)
+
+
+def crowd_finding(groups: list[list[int]], poses: PoseSet) -> str:
+    """Sentence about poses of which most look alike; "" when they do not."""
+    largest = max(groups, key=len)
+    if len(groups) < 2 or len(largest) < _CROWD * len(poses.poses):
+        return ""
+    numbers = ", ".join(str(poses.poses[k].number) for k in largest[:6])
+    more = ", ..." if len(largest) > 6 else ""
+    return (
+        f"{len(largest)} of {len(poses.poses)} poses look alike (within {ALIKE_DEG:g} deg: poses "
+        f"{numbers}{more}); together they count as one orientation"
+    )
+
+
+def refuse_few(poses: PoseSet, orientations: int, needed: int) -> None:
+    """Refuse fewer orientations than the smallest model has constants."""
+    if orientations >= needed:
+        return
+    looked = f"{len(poses.poses)} pose{'s' * (len(poses.poses) != 1)}"
+    refused = "; ".join(f"pose {r.number}: {r.reason}" for r in poses.refused[:3])
+    raise RefusedError(
+        poses.source,
+        f"{looked} in {orientations} orientation{'s' * (orientations != 1)}"
+        + (f" ({refused})" if refused else ""),
+        expected=f"{needed} different orientations at least, 9 for all constants, 12 and more to "
+        "have some left to check on",
+        remedy="add poses that are not alike: six faces, then edges and corners"
+        + (
+            "; `triaxcal drift` shows one orientation over temperature"
+            if len(poses.poses) == 1
+            else ""
+        ),
+    )
+
+
+def refuse_unseen(poses: PoseSet, condition: float, unseen: str) -> None:
+    """Refuse poses that leave a constant open; tell a plane from another lack."""
+    if condition <= CONDITION_MAX:
+        return
+    spread = np.linalg.svd(poses.readings - poses.readings.mean(axis=0), compute_uv=False)
+    plane = ", which lie near one plane," if spread[-1] < 0.1 * spread[0] else ""
+    raise RefusedError(
+        poses.source,
+        f"the {len(poses.poses)} poses{plane} leave {unseen} open (condition number "
+        f"{condition:.3g})",
+        expected=f"a condition number of at most {CONDITION_MAX:g}",
+        remedy="add poses with each axis up and down, and some between",
+    )

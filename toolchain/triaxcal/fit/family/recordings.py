@@ -1,0 +1,344 @@
+"""A recording of poses in unknown orientations -> the calibration of its unit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.fit.calibrate import Calibration, CalibrationPoint
+from triaxcal.fit.family.checks import (
+    crowd_finding,
+    refuse_few,
+    refuse_left_handed,
+    refuse_unseen,
+    refuse_wrong_unit,
+)
+from triaxcal.fit.family.frame import CASE, case_rotation, turned_constants, turned_quadratic
+from triaxcal.fit.family.result import RecordingFit
+from triaxcal.fit.family.scalar import MODELS, NINE, ScalarData, ScalarModel, scalar_data
+from triaxcal.fit.family.trials import Judged, Trial, choose, folds, judge, reason
+from triaxcal.fit.grouping import GROUP_GAP_DEGC
+from triaxcal.fit.thermal import EDGE_DEGC, POLYNOMIAL, ThermalShape, polynomial_shape
+from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.terms import NO_TERMS, Terms
+from triaxcal.model.types import FloatArray
+from triaxcal.recording.poses import PoseSet, find_poses, orientation_groups
+from triaxcal.recording.samples import Samples
+from triaxcal.recordinglayout import RecordingLayout
+from triaxcal.records import Dwell, MeasurementSet
+from triaxcal.unitfile import UnitDescription
+
+ESTIMATOR = "|a| = g"
+THERMAL_SPREAD_DEGC = 5.0
+"""Poses over less than this are at one temperature: an order is not asked of them."""
+ORDER_MAX = 3
+QUADRATIC_IN_C = False
+"""Whether the firmware evaluates quadratic terms yet; until then they are shown and not chosen."""
+_OUTLIER = 6.0
+"""Robust deviations: a pose that stands out by more is told."""
+
+
+def calibrate_poses(
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples
+) -> tuple[MeasurementSet, Calibration]:
+    """Calibrate from poses of which only |a| = g is known.
+
+    Raises
+    ------
+    RefusedError
+        When the poses are too few, alike, in one plane, in another unit or left-handed, or do not
+        carry what unit.toml asks for.
+    """
+    poses = find_poses(samples, layout)
+    data, temps, findings = _prepared(unit, layout, samples, poses)
+    orientations, temperatures = _groups(data, temps)
+    left_out = folds(orientations, temperatures, len(temps))
+    trials = _trials(unit, temps, temperatures)
+    rows = [judge(trial, data, temps, left_out, unit.loss) for trial in trials]
+    if not any(row.able for row in rows):
+        largest = max(rows, key=lambda row: -row.trial.parameters)
+        refuse_unseen(poses, largest.fit.condition, largest.fit.unseen())
+        refuse_few(poses, len(orientations), rows[0].trial.parameters + 1)
+    values = sum(int(mask.sum()) for mask in left_out)
+    deliverable = [row for row in rows if QUADRATIC_IN_C or not len(row.trial.model.quadratic)]
+    best = choose(deliverable, values)
+    turns = _turns(orientations, temperatures)
+    why = reason(deliverable, best, turns, values)
+    findings += _outlier(best, poses) + _passed_over(rows, best)
+    measurements = MeasurementSet(poses.source, pose_dwells(poses, temps))
+    made = _Made(unit, layout, poses, temps, rows, best, why, findings)
+    return measurements, made.calibration()
+
+
+def _prepared(
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples, poses: PoseSet
+) -> tuple[ScalarData, FloatArray, list[str]]:
+    """Scaled poses with weights, their temperatures, and what has been found so far."""
+    findings = [*poses.findings]
+    refuse_wrong_unit(poses.source, poses.readings, layout)
+    recorded = poses.temps_degc
+    temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
+    refuse_few(poses, len(poses.poses), MODELS[0].parameters)
+    ones = np.ones(len(temps))
+    rough = scalar_data(poses.readings, ones[:, None], ones, unit.gravity_g)
+    refuse_left_handed(samples, rough.centre)
+    orientations, _ = _groups(rough, temps)
+    refuse_few(poses, len(orientations), MODELS[0].parameters)
+    crowd = crowd_finding(orientations, poses)
+    if crowd:
+        findings.append(crowd)
+    if recorded is None:
+        findings.append(
+            f"no temperature in the recording: the constants are taken as those of T0 = "
+            f"{unit.t0_degc:g} degC, and nothing shows how they change"
+        )
+    weight = np.ones(len(temps))
+    for group in _cells(orientations, temps):
+        weight[group] = 1.0 / math.sqrt(len(group))
+    data = scalar_data(poses.readings, ones[:, None], weight, unit.gravity_g)
+    return data, temps, findings
+
+
+def _directions(data: ScalarData) -> FloatArray:
+    unit: FloatArray = data.reading / np.linalg.norm(data.reading, axis=1, keepdims=True)
+    return unit
+
+
+def _groups(data: ScalarData, temps: FloatArray) -> tuple[list[list[int]], list[list[int]]]:
+    """Poses by orientation, and by temperature (rising)."""
+    order = [int(k) for k in np.argsort(temps, kind="stable")]
+    temperatures = [[order[0]]]
+    for before, k in pairwise(order):
+        if temps[k] - temps[before] > GROUP_GAP_DEGC:
+            temperatures.append([])
+        temperatures[-1].append(k)
+    return orientation_groups(_directions(data)), temperatures
+
+
+def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
+    """Poses alike in orientation and temperature: they say one thing, and count as one."""
+    cells = []
+    for group in orientations:
+        ordered = sorted(group, key=lambda k: temps[k])
+        cells.append([ordered[0]])
+        for before, k in pairwise(ordered):
+            if temps[k] - temps[before] > GROUP_GAP_DEGC:
+                cells.append([])
+            cells[-1].append(k)
+    return cells
+
+
+def _trials(unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]) -> list[Trial]:
+    """Every model at one temperature, and the nine constants with each thermal order."""
+    spread = float(np.ptp(temps))
+    asked = unit.thermal.order
+    constant = polynomial_shape(temps, unit.t0_degc, 0)
+    where = f"{unit.name}/unit.toml, [thermal]"
+    if unit.thermal.model not in ("auto", POLYNOMIAL):
+        raise RefusedError(
+            f"{where} model",
+            f'"{unit.thermal.model}" for a recording',
+            expected='"polynomial" or "auto"',
+        )
+    if spread < THERMAL_SPREAD_DEGC:
+        if asked:
+            raise RefusedError(
+                f"{where} order",
+                f"order {asked}, but all {len(temps)} poses are at one temperature "
+                f"({temps.min():.4g} to {temps.max():.4g} degC)",
+                expected=f"poses over {THERMAL_SPREAD_DEGC:g} degC at least",
+                remedy="record poses at more temperatures, or order = 0",
+            )
+        return [Trial(model, constant, 1) for model in _models(unit)]
+    trials = [Trial(model, constant, 1) for model in _models(unit)] if not asked else []
+    highest = min(ORDER_MAX, len(temperatures) - 1)
+    if asked and asked > highest:
+        raise RefusedError(
+            f"{where} order",
+            f"order {asked} with poses at {len(temperatures)} temperature"
+            f"{'s' * (len(temperatures) != 1)}",
+            expected=f"{highest} at most",
+        )
+    for order in range(1, highest + 1):
+        shape = polynomial_shape(temps, unit.t0_degc, order)
+        if not asked or asked == order:
+            gains = sorted({1, order, order + 1})
+            trials += [Trial(NINE, shape, g) for g in gains]
+    return trials
+
+
+def _models(unit: UnitDescription) -> tuple[ScalarModel, ...]:
+    kept = {"auto": MODELS, "linear": MODELS[:3], "quadratic": MODELS[3:]}
+    return kept[unit.terms]
+
+
+def _turns(orientations: list[list[int]], temperatures: list[list[int]]) -> str:
+    inner = max(len(temperatures) - 2, 0) if len(temperatures) >= 4 else 0
+    words = f"{len(orientations)} orientations"
+    return words + (f" and {inner} temperatures" if inner else "")
+
+
+def _outlier(best: Judged, poses: PoseSet) -> list[str]:
+    errors = best.fit.residual_g
+    usual = 1.4826 * float(np.median(np.abs(errors)))
+    worst = int(np.abs(errors).argmax())
+    if abs(errors[worst]) <= _OUTLIER * usual:
+        return []
+    told = (
+        f"pose {poses.poses[worst].number} stands out: {errors[worst] * 1e3:.3g} mg where the "
+        f'others have {usual * 1e3:.2g}; look at it, or set [fit] loss = "huber"'
+    )
+    return [told]
+
+
+def _passed_over(rows: list[Judged], best: Judged) -> list[str]:
+    """A quadratic candidate that is better at what it has not seen, and cannot be delivered."""
+    rivals = [(r.held_out_g, r) for r in rows if r.held_out_g is not None and r.able]
+    score, rival = min(rivals, key=lambda pair: pair[0], default=(None, best))
+    if QUADRATIC_IN_C or score is None or not len(rival.trial.model.quadratic):
+        return []
+    return [f"{rival.trial.label} would have {score * 1e3:.3g} mg held out; the firmware is linear"]
+
+
+def pose_dwells(poses: PoseSet, temps: FloatArray) -> tuple[Dwell, ...]:
+    """Poses as dwells, named P and their number."""
+    return tuple(
+        Dwell(
+            row=pose.line,
+            position=f"P{pose.number}",
+            temp_degc=float(temp),
+            voltage_v=pose.reading,
+            count=None,
+            sd_v=None,
+        )
+        for pose, temp in zip(poses.poses, temps, strict=True)
+    )
+
+
+@dataclass(frozen=True)
+class _Made:
+    """What a calibration is put together from."""
+
+    unit: UnitDescription
+    layout: RecordingLayout
+    poses: PoseSet
+    temps: FloatArray
+    rows: list[Judged]
+    best: Judged
+    why: str
+    findings: list[str]
+
+    def calibration(self) -> Calibration:
+        """The calibration, in the frame of the layout."""
+        fit, shape = self.best.fit, self.best.trial.shape
+        constants, slopes = fit.constants(), fit.constants_jacobian()
+        quadratic = fit.quadratic
+        findings = list(self.findings)
+        if self.layout.frame == CASE:
+            force = force_from_voltage((shape.basis(self.temps) @ constants.T), self.poses.readings)
+            rotation, told = case_rotation(self.poses.source, force)
+            findings.append(told)
+            constants = turned_constants(constants, rotation)
+            quadratic = turned_quadratic(quadratic, rotation)
+            turned = [turned_constants(slopes[..., k], rotation) for k in range(slopes.shape[-1])]
+            slopes = np.stack(turned, axis=-1)
+        covariance = np.einsum("apk,kl,bql->apbq", slopes, fit.covariance, slopes)
+        return self._calibration(shape, constants, quadratic, covariance, findings)
+
+    def _calibration(
+        self,
+        shape: ThermalShape,
+        constants: FloatArray,
+        quadratic: FloatArray,
+        covariance: FloatArray,
+        findings: list[str],
+    ) -> Calibration:
+        fit, t0 = self.best.fit, self.unit.t0_degc
+        thermal = shape.model(constants)
+        basis = shape.basis(t0)
+        dof = max(len(fit.residual_g) - len(fit.theta), 1)
+        terms = Terms(quadratic_per_g=quadratic) if len(fit.model.quadratic) else NO_TERMS
+        result = RecordingFit(
+            poses=self.poses,
+            route=f"only |a| = g known; frame: {self.layout.frame}",
+            covariance=covariance,
+            dof=dof,
+            rms_g=fit.rms_g,
+            rms_free_g=math.sqrt(float((fit.residual_g**2).sum()) / dof),
+            held_out_g=self.best.held_out_g,
+            condition=fit.condition,
+            weakest=fit.unseen(),
+            residual_g=fit.residual_g,
+            findings=tuple(findings),
+        )
+        return Calibration(
+            serial=self.unit.serial,
+            estimator=ESTIMATOR,
+            thermal=thermal,
+            shape=shape,
+            range_degc=recording_range(self.unit, self.poses, self.temps),
+            points=(
+                CalibrationPoint(
+                    temp_degc=t0,
+                    constants=thermal.constants_at(t0),
+                    covariance=np.einsum("p,apbq,q->ab", basis, covariance, basis),
+                    position_residual_g=fit.rms_g,
+                    curve_residual_g=fit.rms_g,
+                ),
+            ),
+            parameter_covariance=_blocks(covariance),
+            covariance_source="scatter of |a| - g over the poses, "
+            f"{dof} degree{'s' * (dof != 1)} of freedom",
+            candidates=tuple(
+                row.candidate(ESTIMATOR, chosen=row is self.best) for row in self.rows
+            ),
+            selection_reason=self.why,
+            check_dwells=(),
+            terms=terms,
+            recording=result,
+            reading_unit=self.layout.acceleration_unit,
+        )
+
+
+def _blocks(covariance: FloatArray) -> FloatArray:
+    """The blocks of each output, (3, 4, P, 4, P), of (12, P, 12, P)."""
+    rows = np.array([[3 * i, 3 * i + 1, 3 * i + 2, 9 + i] for i in range(3)])
+    return np.stack([covariance[r][:, :, r] for r in rows])
+
+
+def recording_range(
+    unit: UnitDescription, poses: PoseSet, temps: FloatArray
+) -> tuple[float, float]:
+    """Working range: that of the poses, outward to 0.1 degC, or the one stated in unit.toml.
+
+    Raises
+    ------
+    RefusedError
+        When the stated range reaches beyond the poses' temperatures. Without any temperature in
+        the recording it is the user's word.
+    """
+    low, high = float(temps.min()), float(temps.max())
+    stated = unit.range_degc
+    if stated is None:
+        if high - low < 2.0 * EDGE_DEGC:
+            middle = (low + high) / 2.0
+            low, high = middle - EDGE_DEGC, middle + EDGE_DEGC
+        # The 1e-6 forgives the rounding of decimal temperatures.
+        return round(math.floor(low * 10.0 + 1e-6) / 10.0, 1), round(
+            math.ceil(high * 10.0 - 1e-6) / 10.0, 1
+        )
+    if poses.temps_degc is not None and (
+        stated[0] < low - EDGE_DEGC or stated[1] > high + EDGE_DEGC
+    ):
+        raise RefusedError(
+            f"{unit.name}/unit.toml, [thermal] range_degc",
+            f"{stated[0]:g} to {stated[1]:g} degC",
+            expected=f"within {EDGE_DEGC:g} degC of the poses' temperatures, {low:.4g} to "
+            f"{high:.4g} degC",
+            remedy="narrow the range, or record poses further out: nothing is extrapolated",
+        )
+    return stated

@@ -1,0 +1,48 @@
+"""What a calibration from a recording knows beyond the twelve constants."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from triaxcal.model.types import FloatArray
+from triaxcal.recording.poses import PoseSet
+
+
+@dataclass(frozen=True)
+class RecordingFit:
+    """The poses behind a calibration, and how well they determine it.
+
+    Attributes
+    ----------
+    poses : PoseSet
+    route : str
+        What was known of the poses, in words.
+    covariance : array, shape (12, P, 12, P)
+        Of the constants' parameters, in the order of `CONSTANT_NAMES`.
+    dof : int
+        Degrees of freedom of the residuals.
+    rms_g, rms_free_g : float
+        Rms of |a| - g at the fitted poses, and the same per degree of freedom.
+    held_out_g : float or None
+        Rms of |a| - g at poses left out in turn.
+    condition : float
+        Condition number of the scaled Jacobian.
+    weakest : str
+        The constants that the poses see least.
+    residual_g : array, shape (poses,)
+        |a| - g at each pose.
+    findings : tuple of str
+        What the user should know, the worst first.
+    """
+
+    poses: PoseSet
+    route: str
+    covariance: FloatArray
+    dof: int
+    rms_g: float
+    rms_free_g: float
+    held_out_g: float | None
+    condition: float
+    weakest: str
+    residual_g: FloatArray
+    findings: tuple[str, ...]

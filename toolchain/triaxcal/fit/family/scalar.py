@@ -1,0 +1,400 @@
+"""Scalar calibration: only |a| = g is known of each pose.
+
+The model is that of P1 (1), a = K(T)^-1 (U - U0(T)), with optional quadratic terms in products of
+the linear result, a + Q p(a), p the six products of P0 (13)
+(`model.terms`). Minimised is
+
+    r_p = |a_p| - g,    weighted by the pose.
+
+A rotation of a changes no |a|, so K is sought among the symmetric matrices: of all frames the one
+that turns the outputs' own axes least. Six entries of K and three biases are the nine constants.
+On a sphere |a + Q p(a)| changes by the cubic form a.Q p(a) / |a|; its parts of degree one act as a
+bias, and only seven of the eighteen terms are left that |a| can see (`VISIBLE`).
+
+Readings are scaled by a sphere through them before anything is solved, so that K is about 1 and a
+singular value of the Jacobian means the same in counts and in m/s^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from triaxcal.model.terms import PRODUCT_AXES, products
+from triaxcal.model.types import BoolArray, FloatArray
+
+_STEPS_MAX = 60
+_STEPS_NEAR = 12
+_SETTLED = 1e-13
+"""Of the scaled constants, which are about 1: rounding."""
+_NINE = (("Kxx", 0, 0), ("Kyy", 1, 1), ("Kzz", 2, 2), ("Kxy", 0, 1), ("Kxz", 0, 2), ("Kyz", 1, 2))
+
+
+def _visible() -> FloatArray:
+    """The seven directions of Q, (7, 3, 6), that change |a| on a sphere otherwise than a bias."""
+    directions = np.random.default_rng(0).standard_normal((200, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    effect = np.einsum("ni,nk->nik", directions, products(directions)).reshape(-1, 18)
+    bias = np.linalg.qr(directions)[0]
+    _, singular, vt = np.linalg.svd(effect - bias @ (bias.T @ effect))
+    seen = vt[: int((singular > 1e-9 * singular[0]).sum())]
+    result: FloatArray = seen.reshape(-1, 3, 6)
+    return result
+
+
+VISIBLE = _visible()
+
+
+def _symmetric(i: int, j: int) -> FloatArray:
+    matrix = np.zeros((3, 3))
+    matrix[i, j] = matrix[j, i] = 1.0
+    return matrix
+
+
+def _square(i: int) -> FloatArray:
+    matrix = np.zeros((3, 6))
+    matrix[i, PRODUCT_AXES.index((i, i))] = 1.0
+    return matrix
+
+
+@dataclass(frozen=True)
+class ScalarModel:
+    """Which constants are free.
+
+    Attributes
+    ----------
+    label : str
+        Words for tables.
+    gain_names : tuple of str
+    gain : array, shape (m, 3, 3)
+        K is the sum of these, each with its parameter.
+    quadratic : array, shape (q, 3, 6)
+        Q likewise.
+    """
+
+    label: str
+    gain_names: tuple[str, ...]
+    gain: FloatArray
+    quadratic: FloatArray
+
+    @property
+    def parameters(self) -> int:
+        """Free constants at one temperature."""
+        return len(self.gain) + 3 + len(self.quadratic)
+
+
+_NONE = np.zeros((0, 3, 6))
+_GAINS = np.array([_symmetric(i, j) for _, i, j in _NINE])
+_NAMES = tuple(name for name, _, _ in _NINE)
+NINE = ScalarModel("linear, nine constants", _NAMES, _GAINS, _NONE)
+MODELS = (
+    ScalarModel("bias and one scale factor", ("K",), np.eye(3)[None], _NONE),
+    ScalarModel("bias and scale factors", _NAMES[:3], _GAINS[:3], _NONE),
+    NINE,
+    ScalarModel(
+        "nine constants and squares", _NAMES, _GAINS, np.array([_square(i) for i in range(3)])
+    ),
+    ScalarModel("nine constants and all quadratic terms", _NAMES, _GAINS, VISIBLE),
+)
+
+
+@dataclass(frozen=True)
+class ScalarData:
+    """Poses, scaled.
+
+    Attributes
+    ----------
+    reading : array, shape (n, 3)
+        (U - centre) / radius.
+    basis : array, shape (n, P)
+        Functions of temperature at the poses.
+    weight : array, shape (n,)
+        Square roots of the weights, rms 1.
+    gravity_g : float
+    """
+
+    reading: FloatArray
+    basis: FloatArray
+    weight: FloatArray
+    gravity_g: float
+    centre: FloatArray
+    radius: float
+
+    def select(self, kept: BoolArray) -> ScalarData:
+        """Only the poses of a mask."""
+        return ScalarData(
+            self.reading[kept],
+            self.basis[kept],
+            self.weight[kept],
+            self.gravity_g,
+            self.centre,
+            self.radius,
+        )
+
+    def with_basis(self, basis: FloatArray) -> ScalarData:
+        """The same poses with other functions of temperature."""
+        return ScalarData(
+            self.reading, basis, self.weight, self.gravity_g, self.centre, self.radius
+        )
+
+
+def scalar_data(
+    readings: FloatArray, basis: FloatArray, weight: FloatArray, gravity_g: float
+) -> ScalarData:
+    """Scale readings, shape (n, 3), by the sphere through them, a linear least-squares problem."""
+    middle = readings.mean(axis=0)
+    spread = float(np.sqrt(((readings - middle) ** 2).sum(axis=1).mean())) or 1.0
+    v = (readings - middle) / spread
+    # |v|^2 = 2 c.v + (r^2 - |c|^2); the minimum-norm solution where poses lie in a plane.
+    design = np.concatenate([2.0 * v, np.ones((len(v), 1))], axis=1)
+    solution = np.linalg.lstsq(design, (v**2).sum(axis=1), rcond=1e-6)[0]
+    radius = float(np.sqrt(max(solution[3] + (solution[:3] ** 2).sum(), 1e-12)))
+    centre = middle + spread * solution[:3]
+    return ScalarData(
+        reading=(readings - centre) / (spread * radius),
+        basis=basis,
+        weight=weight / float(np.sqrt((weight**2).mean())),
+        gravity_g=gravity_g,
+        centre=centre,
+        radius=spread * radius,
+    )
+
+
+@dataclass(frozen=True)
+class ScalarFit:
+    """A solution.
+
+    Attributes
+    ----------
+    model : ScalarModel
+    gain_functions : int
+        How many of the functions of temperature the entries of K use, the first ones.
+    theta : array
+        Gains (m, Pg), biases (3, P), quadratic (q,), flat, in scaled readings.
+    jacobian : array, shape (n, parameters)
+        Weighted, at the solution.
+    residual_g : array, shape (n,)
+        |a| - g, not weighted.
+    """
+
+    model: ScalarModel
+    gain_functions: int
+    theta: FloatArray
+    data: ScalarData
+    jacobian: FloatArray
+    residual_g: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each parameter."""
+        m, P = self.gain_functions, self.data.basis.shape[1]
+        names = [_thermal_name(n, p) for n in self.model.gain_names for p in range(m)]
+        names += [_thermal_name(f"U0{axis}", p) for axis in "xyz" for p in range(P)]
+        return (*names, *(f"quadratic {k + 1}" for k in range(len(self.model.quadratic))))
+
+    @property
+    def rms_g(self) -> float:
+        """Fit residual, rms over the poses."""
+        return float(np.sqrt(np.mean(self.residual_g**2)))
+
+    @cached_property
+    def singular(self) -> tuple[FloatArray, FloatArray]:
+        """Singular values of the Jacobian with columns of length 1, and right vectors as rows."""
+        length = np.linalg.norm(self.jacobian, axis=0)
+        scaled = self.jacobian / np.where(length > 0.0, length, 1.0)
+        _, singular, vt = np.linalg.svd(scaled, full_matrices=True)
+        padded = np.zeros(vt.shape[0])
+        padded[: len(singular)] = singular
+        return padded, vt
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the scaled Jacobian."""
+        singular = self.singular[0]
+        return float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
+
+    def unseen(self) -> str:
+        """Names of the parameters that make up the least visible combination."""
+        weakest = np.abs(self.singular[1][-1])
+        order = np.argsort(-weakest, kind="stable")
+        kept = [self.names[k] for k in order if weakest[k] >= 0.4 * weakest[order[0]]]
+        return ", ".join(kept[:4])
+
+    @cached_property
+    def variance_g2(self) -> float:
+        """Variance of a pose of weight 1 from the residuals."""
+        dof = max(len(self.residual_g) - len(self.theta), 1)
+        return float(((self.residual_g * self.data.weight) ** 2).sum() / dof)
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of theta."""
+        inverse = np.linalg.pinv(self.jacobian.T @ self.jacobian).astype(np.float64)
+        result: FloatArray = self.variance_g2 * inverse
+        return result
+
+    def split(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """K (P, 3, 3) and bias (P, 3) by function of temperature, and Q (3, 6)."""
+        return _split(self.model, self.gain_functions, self.data.basis.shape[1], theta)
+
+    def constants(self) -> FloatArray:
+        """Twelve constants by function of temperature, shape (12, P), in reading units."""
+        return self._constants(self.theta)
+
+    def constants_jacobian(self) -> FloatArray:
+        """Derivative of `constants` by theta, shape (12, P, parameters): it is linear."""
+        zero = self._constants(np.zeros_like(self.theta))
+        columns = [self._constants(unit) - zero for unit in np.eye(len(self.theta))]
+        return np.stack(columns, axis=-1)
+
+    def _constants(self, theta: FloatArray) -> FloatArray:
+        K, bias, _ = self.split(theta)
+        scaled = np.concatenate([K.reshape(len(K), 9), bias], axis=1) * self.data.radius
+        # The functions sum to the constant 1 with weight `ones`: the centre belongs to it.
+        ones = np.linalg.lstsq(self.data.basis, np.ones(len(self.data.basis)), rcond=None)[0]
+        scaled[:, 9:] += ones[:, None] * self.data.centre
+        result: FloatArray = scaled.T
+        return result
+
+    @property
+    def quadratic(self) -> FloatArray:
+        """Q, shape (3, 6), 1/g."""
+        return self.split(self.theta)[2]
+
+    def errors_g(self, data: ScalarData) -> FloatArray:
+        """|a| - g of other poses with these constants, shape (n,)."""
+        return _residual(self.model, self.gain_functions, data, self.theta)[0]
+
+
+def fit_scalar(
+    model: ScalarModel,
+    data: ScalarData,
+    gain_functions: int,
+    loss: str = "linear",
+    start: FloatArray | None = None,
+) -> ScalarFit:
+    """Solve for the constants of `model`.
+
+    Parameters
+    ----------
+    gain_functions : int
+        How many functions of temperature, the first ones, the entries of K have.
+    loss : str
+        One of `unitfile.LOSSES`; the robust ones turn at three robust deviations.
+    start : array or None
+        Theta to start from; None is K = 1 and no bias, in scaled readings.
+    """
+    first = _start(model, data, gain_functions) if start is None else start
+
+    def residual(theta: FloatArray) -> FloatArray:
+        return _residual(model, gain_functions, data, theta)[0] * data.weight
+
+    def jacobian(theta: FloatArray) -> FloatArray:
+        return _residual(model, gain_functions, data, theta)[1] * data.weight[:, None]
+
+    if start is not None and loss == "linear":
+        theta = _gauss_newton(residual, jacobian, first)
+        if theta is not None:
+            return _fitted(model, gain_functions, data, theta)
+    # trf takes fewer poses than parameters: the minimum-norm step, told by the condition number.
+    solve = partial(
+        least_squares,
+        residual,
+        jac=jacobian,
+        method="trf",
+        xtol=1e-14,
+        ftol=1e-14,
+        gtol=1e-15,
+        max_nfev=_STEPS_MAX,
+    )
+    found = solve(first)
+    if loss != "linear":
+        scale = 3.0 * 1.4826 * float(np.median(np.abs(found.fun))) or 1e-9
+        found = solve(found.x, loss="huber" if loss == "huber" else "cauchy", f_scale=scale)
+    return _fitted(model, gain_functions, data, np.asarray(found.x, dtype=np.float64))
+
+
+def _fitted(
+    model: ScalarModel, gain_functions: int, data: ScalarData, theta: FloatArray
+) -> ScalarFit:
+    errors, slopes = _residual(model, gain_functions, data, theta)
+    return ScalarFit(model, gain_functions, theta, data, slopes * data.weight[:, None], errors)
+
+
+def _gauss_newton(
+    residual: Callable[[FloatArray], FloatArray],
+    jacobian: Callable[[FloatArray], FloatArray],
+    start: FloatArray,
+) -> FloatArray | None:
+    """Solution from a near start in a few steps; None when they do not settle."""
+    theta = start
+    for _ in range(_STEPS_NEAR):
+        step = np.linalg.lstsq(jacobian(theta), -residual(theta), rcond=1e-10)[0]
+        theta = (theta + step).astype(np.float64)
+        if np.abs(step).max() < _SETTLED:
+            return theta
+    return None
+
+
+def _start(model: ScalarModel, data: ScalarData, gain_functions: int) -> FloatArray:
+    P = data.basis.shape[1]
+    ones = np.linalg.lstsq(data.basis, np.ones(len(data.basis)), rcond=None)[0]
+    gains = np.zeros((len(model.gain), gain_functions))
+    diagonal = np.trace(model.gain, axis1=1, axis2=2) > 0.0
+    gains[diagonal] = ones[:gain_functions] / data.gravity_g
+    return np.concatenate([gains.ravel(), np.zeros(3 * P + len(model.quadratic))])
+
+
+def _split(
+    model: ScalarModel, gain_functions: int, P: int, theta: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    m = len(model.gain)
+    gains = np.zeros((m, P))
+    gains[:, :gain_functions] = theta[: m * gain_functions].reshape(m, gain_functions)
+    rest = theta[m * gain_functions :]
+    bias = rest[: 3 * P].reshape(3, P).T
+    K = np.einsum("mp,mij->pij", gains, model.gain)
+    Q = np.einsum("q,qij->ij", rest[3 * P :], model.quadratic)
+    return K, bias, Q
+
+
+def _residual(
+    model: ScalarModel, gain_functions: int, data: ScalarData, theta: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """|a| - g (n,) and its derivatives (n, parameters)."""
+    n, P = data.basis.shape
+    K_p, bias_p, Q = _split(model, gain_functions, P, theta)
+    K = np.einsum("np,pij->nij", data.basis, K_p)
+    N = np.linalg.inv(K)
+    linear = np.einsum("nij,nj->ni", N, data.reading - data.basis @ bias_p)
+    force = linear + products(linear) @ Q.T
+    length = np.linalg.norm(force, axis=1)
+    unit = force / length[:, None]
+    through = np.broadcast_to(np.eye(3), (n, 3, 3))
+    if len(model.quadratic):
+        through = through + np.einsum("ik,nkj->nij", Q, _product_slopes(linear))
+    row = np.einsum("ni,nij,njk->nk", unit, through, N)  # d|a| / d(U - U0)
+    by_gain = -np.einsum("nk,mkl,nl->nm", row, model.gain, linear)
+    columns = [
+        (by_gain[:, :, None] * data.basis[:, None, :gain_functions]).reshape(n, -1),
+        (-row[:, :, None] * data.basis[:, None, :]).reshape(n, -1),
+        np.einsum("ni,qik,nk->nq", unit, model.quadratic, products(linear)),
+    ]
+    return length - data.gravity_g, np.concatenate(columns, axis=1)
+
+
+def _product_slopes(force: FloatArray) -> FloatArray:
+    """Derivative of the products by the force, shape (n, 6, 3)."""
+    slopes = np.zeros((len(force), 6, 3))
+    for k, (i, j) in enumerate(PRODUCT_AXES):
+        slopes[:, k, i] += force[:, j]
+        slopes[:, k, j] += force[:, i]
+    return slopes
+
+
+def _thermal_name(name: str, function: int) -> str:
+    return name if function == 0 else f"{name} (temperature term {function})"

@@ -1,0 +1,157 @@
+"""Candidates of a recording: each fitted, each judged by poses that it has not seen.
+
+Left out in turn is every orientation with all its poses (two poses alike would give each other
+away), and every inner temperature where there are four and more. What is left out is scored by
+|a| - g. Every candidate is scored on the same poses; one whose constants the remaining poses leave
+open in any turn is not scored and cannot be chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.fit.family.checks import CONDITION_MAX
+from triaxcal.fit.family.scalar import ScalarData, ScalarFit, ScalarModel, fit_scalar
+from triaxcal.fit.selection import Candidate
+from triaxcal.fit.thermal import ThermalShape
+from triaxcal.model.types import BoolArray, FloatArray
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate: which constants, and how they follow temperature.
+
+    Attributes
+    ----------
+    gain_functions : int
+        How many functions of `shape` the entries of K have; the biases have all.
+    """
+
+    model: ScalarModel
+    shape: ThermalShape
+    gain_functions: int
+
+    @property
+    def parameters(self) -> int:
+        """Free parameters over all temperatures."""
+        m, q = len(self.model.gain), len(self.model.quadratic)
+        return m * self.gain_functions + 3 * self.shape.parameters + q
+
+    @property
+    def label(self) -> str:
+        """Words for tables."""
+        if self.shape.parameters == 1:
+            return self.model.label
+        of_gain = f", K of order {self.gain_functions - 1}"
+        short = f"; {self.shape.label.replace('polynomial of ', '')}"
+        return self.model.label + short + (of_gain if self._gain_differs else "")
+
+    @property
+    def _gain_differs(self) -> bool:
+        return self.gain_functions != self.shape.parameters
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A trial's fit and scores.
+
+    Attributes
+    ----------
+    held_out_g : float or None
+        Rms |a| - g of what was left out; None when not scored.
+    able : bool
+        Whether the poses determine it, with and without each part left out.
+    """
+
+    trial: Trial
+    fit: ScalarFit
+    held_out_g: float | None
+    able: bool
+
+    def candidate(self, estimator: str, *, chosen: bool) -> Candidate:
+        """Row of the table."""
+        shape = self.trial.shape
+        return Candidate(
+            estimator=estimator,
+            thermal=shape.kind,
+            order=shape.order,
+            knots_degc=shape.knots_degc,
+            parameters=self.trial.parameters,
+            held_out_g=self.held_out_g,
+            fit_residual_g=self.fit.rms_g,
+            chosen=chosen,
+            label=self.trial.label,
+            condition=self.fit.condition,
+        )
+
+
+def folds(
+    orientations: Sequence[Sequence[int]], temperatures: Sequence[Sequence[int]], count: int
+) -> list[BoolArray]:
+    """Masks of what is left out in turn: orientations, then inner temperatures (rising)."""
+    inner = temperatures[1:-1] if len(temperatures) >= 4 else ()
+    masks: list[BoolArray] = []
+    for group in (*(orientations if len(orientations) > 1 else ()), *inner):
+        mask = np.zeros(count, dtype=np.bool_)
+        mask[list(group)] = True
+        masks.append(mask)
+    return masks
+
+
+def judge(
+    trial: Trial, data: ScalarData, temps_degc: FloatArray, left_out: Sequence[BoolArray], loss: str
+) -> Judged:
+    """Fit a trial to all poses, and to what each turn leaves."""
+    own = data.with_basis(trial.shape.basis(temps_degc))
+    fit = fit_scalar(trial.model, own, trial.gain_functions, loss)
+    if fit.condition > CONDITION_MAX:
+        return Judged(trial, fit, None, able=False)
+    errors = []
+    for mask in left_out:
+        part = fit_scalar(
+            trial.model, own.select(~mask), trial.gain_functions, loss, start=fit.theta
+        )
+        if part.condition > CONDITION_MAX or len(part.residual_g) < trial.parameters:
+            return Judged(trial, fit, None, able=False)
+        errors.append(part.errors_g(own.select(mask)))
+    if not errors:
+        return Judged(trial, fit, None, able=True)
+    return Judged(trial, fit, float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), able=True)
+
+
+def choose(rows: Sequence[Judged], values: int) -> Judged:
+    """The best by held-out error, or the simplest within one standard error of it.
+
+    An rms of n values is known to 1 / sqrt(2 n) of itself (fit.selection). Where nothing could be
+    left out, the model with the most constants that has as many poses as constants.
+    """
+    able = [row for row in rows if row.able]
+    scored = [(row.held_out_g, row) for row in able if row.held_out_g is not None]
+    if not scored:
+        return max(able, key=lambda row: row.trial.parameters)
+    limit = min(score for score, _ in scored) * (1.0 + 1.0 / np.sqrt(2.0 * values))
+    within = [row for score, row in scored if score <= limit]
+    return min(within, key=lambda row: (row.trial.parameters, row.held_out_g))
+
+
+def reason(rows: Sequence[Judged], best: Judged, turns: str, values: int) -> str:
+    """Why this candidate, in words."""
+    label = best.trial.label
+    if best.held_out_g is None:
+        return f"{label}: no orientation can be left out, so this is what the poses determine"
+    resolution = 100.0 / np.sqrt(2.0 * values)
+    scored = [row for row in rows if row.held_out_g is not None]
+    text = (
+        f"{label}: held-out error {_mg(best)} over {values} values ({turns} left out in turn), "
+        f"of {len(scored)} candidates the simplest within one "
+        f"standard error ({resolution:.0f} %) of the best"
+    )
+    top = min(scored, key=lambda row: row.held_out_g or 0.0)
+    return text if top is best else f"{text}, {_mg(top)} of {top.trial.label}"
+
+
+def _mg(row: Judged) -> str:
+    return f"{(row.held_out_g or 0.0) * 1e3:.3g} mg"

@@ -1,0 +1,1 @@
+"""Recordings of other makers: files to samples, samples to poses."""

@@ -1,0 +1,264 @@
+"""Poses of a recording: still stretches long and steady enough, and the reason of every refusal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+from triaxcal.recording.samples import Samples
+from triaxcal.recording.stillness import Stillness, duration_s, find_stillness
+from triaxcal.recordinglayout import POSES, RecordingLayout
+
+BATCHES = 8
+_DRIFT_MAX = 6.0
+"""Of its standard error: how far the two halves of a pose may differ."""
+_NOTED = 0.25
+"""Of the shortest pose: still stretches shorter than this are part of the movement."""
+_MOVING = 0.1
+"""Of 1 g: a pose whose readings scatter by more was not held still."""
+ALIKE_DEG = 5.0
+"""Poses nearer than this to each other are one orientation."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Mean readings of one pose.
+
+    Attributes
+    ----------
+    number : int
+        Among all still stretches that were looked at, from 1.
+    line : int
+        Line of its first sample.
+    start_s, duration_s : float
+    reading : array, shape (3,)
+        In the unit of the layout.
+    sd_mean : array, shape (3,), or None
+        Standard error of `reading`, from batch means; None where rows are poses.
+    count : int
+        Samples.
+    temp_degc : float or None
+    label : str
+        Of its section; "" without.
+    angles_rad : array, shape (2 or 3,), or None
+    """
+
+    number: int
+    line: int
+    start_s: float
+    duration_s: float
+    reading: FloatArray
+    sd_mean: FloatArray | None
+    count: int
+    temp_degc: float | None
+    label: str
+    angles_rad: FloatArray | None
+
+
+@dataclass(frozen=True)
+class RefusedPose:
+    """A still stretch that is no pose, and why."""
+
+    number: int
+    line: int
+    start_s: float
+    duration_s: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class PoseSet:
+    """Poses of one recording.
+
+    Attributes
+    ----------
+    source : str
+    poses : tuple of Pose
+    refused : tuple of RefusedPose
+    stillness : Stillness or None
+        None where rows are poses, or sections say where they are.
+    findings : tuple of str
+    """
+
+    source: str
+    poses: tuple[Pose, ...]
+    refused: tuple[RefusedPose, ...]
+    stillness: Stillness | None
+    findings: tuple[str, ...]
+
+    @property
+    def readings(self) -> FloatArray:
+        """Shape (poses, 3)."""
+        return np.array([p.reading for p in self.poses]).reshape(-1, 3)
+
+    @property
+    def temps_degc(self) -> FloatArray | None:
+        """Shape (poses,); None when the recording has no temperature."""
+        temps = [p.temp_degc for p in self.poses if p.temp_degc is not None]
+        return np.array(temps) if len(temps) == len(self.poses) and temps else None
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """Lowest and highest readings of the file, shape (3,), and about what 1 g reads."""
+
+    low: FloatArray
+    high: FloatArray
+    one_g: float
+
+    @staticmethod
+    def of(samples: Samples, layout: RecordingLayout) -> _Scale:
+        low, high = samples.reading.min(axis=0), samples.reading.max(axis=0)
+        # Counts do not say: half of what nine tenths of the samples span on the widest axis.
+        spans = np.ptp(np.percentile(samples.reading, [5.0, 95.0], axis=0), axis=0)
+        return _Scale(low, high, layout.reading_of_1_g or float(spans.max()) / 2.0)
+
+
+def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
+    """Poses of samples: one a row, one a labelled section, or found by stillness.
+
+    Raises
+    ------
+    RefusedError
+        When there is none; names the longest still stretch and what to change.
+    """
+    if layout.rows == POSES:
+        return PoseSet(samples.source, _row_poses(samples), (), None, samples.findings)
+    stillness = find_stillness(samples, layout.still_s)
+    scale = _Scale.of(samples, layout)
+    poses: list[Pose] = []
+    refused: list[RefusedPose] = []
+    number = 0
+    for run in stillness.runs:
+        length = duration_s(samples, run)
+        if length < _NOTED * layout.still_s:
+            continue
+        number += 1
+        pose = _pose(samples, run, number)
+        reason = _reason(samples, run, pose, layout, scale)
+        if reason:
+            refused.append(RefusedPose(number, pose.line, pose.start_s, length, reason))
+        elif not layout.faces or pose.label in layout.faces:
+            poses.append(pose)
+    if not poses:
+        raise _no_poses(samples, layout, refused)
+    return PoseSet(samples.source, tuple(poses), tuple(refused), stillness, samples.findings)
+
+
+def _row_poses(samples: Samples) -> tuple[Pose, ...]:
+    return tuple(
+        Pose(
+            number=k + 1,
+            line=int(samples.line[k]),
+            start_s=float(samples.time_s[k]),
+            duration_s=0.0,
+            reading=samples.reading[k],
+            sd_mean=None,
+            count=1,
+            temp_degc=None if samples.temp_degc is None else float(samples.temp_degc[k]),
+            label="" if samples.label is None else samples.label[k],
+            angles_rad=None if samples.angles_rad is None else samples.angles_rad[k],
+        )
+        for k in range(len(samples.reading))
+    )
+
+
+def _pose(samples: Samples, run: tuple[int, int], number: int) -> Pose:
+    start, stop = run
+    reading = samples.reading[start:stop]
+    batches = min(BATCHES, len(reading))
+    means = np.array([part.mean(axis=0) for part in np.array_split(reading, batches)])
+    sd_mean = means.std(axis=0, ddof=1) / np.sqrt(batches) if batches > 1 else np.full(3, np.inf)
+    temp = None if samples.temp_degc is None else float(samples.temp_degc[start:stop].mean())
+    return Pose(
+        number=number,
+        line=int(samples.line[start]),
+        start_s=float(samples.time_s[start]),
+        duration_s=duration_s(samples, run),
+        reading=reading.mean(axis=0),
+        sd_mean=sd_mean,
+        count=stop - start,
+        temp_degc=temp,
+        label="" if samples.label is None else samples.label[start],
+        angles_rad=None,
+    )
+
+
+def _reason(
+    samples: Samples,
+    run: tuple[int, int],
+    pose: Pose,
+    layout: RecordingLayout,
+    scale: _Scale,
+) -> str:
+    """Why a still stretch is no pose; "" when it is one."""
+    if pose.duration_s < layout.still_s:
+        return f"{pose.duration_s:.1f} s still, needs {layout.still_s:.1f}"
+    reading = samples.reading[run[0] : run[1]]
+    deviation = reading.std(axis=0)
+    for axis in range(3):
+        stuck = deviation[axis] == 0.0 and (np.delete(deviation, axis) > 0.0).any()
+        if stuck and reading[0, axis] in (scale.low[axis], scale.high[axis]):
+            return (
+                f"axis {AXES[axis]} is clipped: it stays at {reading[0, axis]:g}, the end of what "
+                "the file shows; measure with a wider range"
+            )
+    if deviation.max() > _MOVING * scale.one_g:
+        axis = int(deviation.argmax())
+        return (
+            f"axis {AXES[axis]} scatters by {deviation[axis]:.3g} {layout.acceleration_unit}: "
+            "it is not held still"
+        )
+    half = len(reading) // 2
+    drift = np.abs(reading[half:].mean(axis=0) - reading[:half].mean(axis=0))
+    assert pose.sd_mean is not None
+    # Halves of independent noise differ by 2 standard errors of the mean.
+    noise = 2.0 * deviation / np.sqrt(len(reading))
+    worst = int(np.argmax(drift - _DRIFT_MAX * noise))
+    if drift[worst] > _DRIFT_MAX * noise[worst] and drift[worst] > deviation[worst]:
+        return (
+            f"axis {AXES[worst]} drifts by {drift[worst]:.3g} {layout.acceleration_unit} between "
+            "its halves: it is still turning"
+        )
+    return ""
+
+
+def _no_poses(
+    samples: Samples, layout: RecordingLayout, refused: list[RefusedPose]
+) -> RefusedError:
+    longest = max((r.duration_s for r in refused), default=0.0)
+    first = f"; pose {refused[0].number}: {refused[0].reason}" if refused else ""
+    labels = ""
+    if layout.faces and samples.label is not None:
+        found = sorted(set(samples.label))
+        if not set(found) & set(layout.faces):
+            labels = f"; sections found: {', '.join(found[:10])}"
+    return RefusedError(
+        samples.source,
+        f"no pose found: the longest still stretch has {longest:.1f} s{first}{labels}",
+        expected=f"poses of {layout.still_s:g} s at least",
+        remedy="hold each pose longer, or lower [recording] still_s; "
+        "`triaxcal poses` shows what was found",
+    )
+
+
+def orientation_groups(directions: FloatArray, angle_deg: float = ALIKE_DEG) -> list[list[int]]:
+    """Indices of poses that point alike: unit vectors (n, 3), chained within `angle_deg`."""
+    near = directions @ directions.T >= np.cos(np.radians(angle_deg))
+    groups: list[list[int]] = []
+    left = set(range(len(directions)))
+    while left:
+        front = [min(left)]
+        group = set(front)
+        while front:
+            k = front.pop()
+            new = {int(j) for j in np.flatnonzero(near[k])} - group
+            group |= new
+            front += list(new)
+        left -= group
+        groups.append(sorted(group))
+    return groups

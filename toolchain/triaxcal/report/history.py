@@ -1,0 +1,50 @@
+"""A unit's calibrations over time, for the terminal."""
+
+from __future__ import annotations
+
+from triaxcal.uncertainty.history import EN_MAX, Calibrated, Change, Repeatability
+
+
+def history_text(
+    serial: str, history: list[Calibrated], found: list[Change], repeat: Repeatability | None
+) -> str:
+    """Table of the changes, what repeats, and what contradicts."""
+    lines = [
+        f"{len(history)} calibrations of {serial}; largest change since the one before, at T0",
+        "",
+        f"{'calibration':<16}{'bias mg':>10}{'scale ppm':>12}{'cross urad':>12}{'En':>8}  where",
+        f"{history[0].name:<16}{'-':>10}{'-':>12}{'-':>12}{'-':>8}",
+        *(
+            f"{c.name:<16}{c.bias_mg:>+10.4f}{c.scale_ppm:>+12.1f}{c.cross_axis_micro_rad:>+12.1f}"
+            f"{c.en:>8.2f}  {c.where.replace('°C', 'degC')}"
+            for c in found
+        ),
+        "",
+        "En: the largest of 36 differences over its expanded uncertainty (95 %). Chance alone",
+        f"gives more than {EN_MAX:.2f} in one comparison of twenty: above it, the two contradict.",
+    ]
+    if repeat is None:
+        lines.append("Repeatability: too few calibrations to tell.")
+    else:
+        about = "about a straight line in time" if repeat.years else "about their mean"
+        lines.append(
+            f"Repeatability of {repeat.calibrations} calibrations {about}: bias "
+            f"{repeat.bias_mg:.2g} mg, scale {repeat.scale_ppm:.2g} ppm, cross-axis "
+            f"{repeat.cross_axis_micro_rad:.2g} urad."
+        )
+        if repeat.years and repeat.bias_mg_a_year is not None:
+            lines.append(
+                f"Ageing over {repeat.years:.1f} years, a year: bias {repeat.bias_mg_a_year:+.2g} "
+                f"mg, scale {repeat.scale_ppm_a_year:+.2g} ppm."
+            )
+    lines += [contradiction(c) for c in found if c.contradicts]
+    return "\n".join(lines)
+
+
+def contradiction(change: Change) -> str:
+    """Warning of a calibration that contradicts the one before."""
+    return (
+        f"warning: calibration {change.name} contradicts the one before: {change.where} differs "
+        f"by {change.en:.2g} times its uncertainty; the unit has aged or was damaged, or one of "
+        "the two is wrong"
+    ).replace("°C", "degC")

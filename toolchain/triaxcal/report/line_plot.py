@@ -1,0 +1,129 @@
+"""Lines over a common axis, panels below each other: one SVG for poses, drift and convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from triaxcal.codegen.render import environment
+from triaxcal.model.types import FloatArray
+from triaxcal.report.passport.curves import ticks
+
+WIDTH, LEFT, RIGHT, TOP = 960.0, 80.0, 16.0, 76.0
+HEIGHT, FOOT = 190.0, 62.0
+POINTS_MAX = 1600
+COLOURS = ("#0a5fb4", "#c8553d", "#2a9d8f", "#7b4ea3")
+GOOD, BAD = "#e3f2e6", "#fbe3dc"
+
+
+@dataclass(frozen=True)
+class Line:
+    """One polyline; lines of one label share an entry in the legend."""
+
+    label: str
+    colour: str
+    x: FloatArray
+    y: FloatArray
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Band:
+    """A coloured stretch of the axis."""
+
+    start: float
+    stop: float
+    colour: str
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Lines and bands of one picture; `y_range` None takes in all lines."""
+
+    title: str
+    x_label: str
+    lines: Sequence[Line]
+    bands: Sequence[Band] = ()
+    y_range: tuple[float, float] | None = None
+
+
+def line_plot(title: str, panels: Sequence[Panel]) -> bytes:
+    """SVG of the panels."""
+    context = {
+        "title": title,
+        "width": WIDTH,
+        "height": TOP + len(panels) * (HEIGHT + FOOT),
+        "left": LEFT,
+        "right": WIDTH - RIGHT,
+        "legend": _legend(panels),
+        "panels": [_panel(p, TOP + k * (HEIGHT + FOOT)) for k, p in enumerate(panels)],
+    }
+    return environment().get_template("lines.svg.j2").render(context).encode()
+
+
+def _legend(panels: Sequence[Panel]) -> list[dict[str, Any]]:
+    entries: dict[str, dict[str, Any]] = {}
+    x = LEFT
+    for line in (line for panel in panels for line in panel.lines):
+        if line.label and line.label not in entries:
+            entries[line.label] = {
+                "x": round(x, 1),
+                "label": line.label,
+                "colour": line.colour,
+                "dashed": line.dashed,
+            }
+            x += 46.0 + 6.2 * len(line.label)
+    return list(entries.values())
+
+
+def _panel(panel: Panel, top: float) -> dict[str, Any]:
+    xs = np.concatenate([line.x for line in panel.lines])
+    ys = np.concatenate([line.y for line in panel.lines])
+    x_low, x_high = float(xs.min()), float(xs.max())
+    low, high = panel.y_range or _padded(float(ys.min()), float(ys.max()))
+    x_span = (x_high - x_low) or 1.0
+
+    def x_at(value: float) -> float:
+        return round(LEFT + (WIDTH - LEFT - RIGHT) * (value - x_low) / x_span, 1)
+
+    def y_at(value: float) -> float:
+        inside = min(max(value, low), high)
+        return round(top + HEIGHT * (high - inside) / (high - low), 1)
+
+    return {
+        "title": panel.title,
+        "x_label": panel.x_label,
+        "top": top,
+        "bottom": top + HEIGHT,
+        "height": HEIGHT,
+        "x_ticks": [{"at": x_at(t), "label": f"{t:g}"} for t in ticks(x_low, x_high, 8)],
+        "y_ticks": [{"at": y_at(t), "label": f"{t:g}"} for t in ticks(low, high, 5)],
+        "bands": [
+            {
+                "x": x_at(b.start),
+                "width": round(x_at(b.stop) - x_at(b.start), 1),
+                "colour": b.colour,
+                "label": b.label,
+            }
+            for b in panel.bands
+        ],
+        "lines": [
+            {"colour": line.colour, "dashed": line.dashed, "points": _points(line, x_at, y_at)}
+            for line in panel.lines
+        ],
+    }
+
+
+def _padded(low: float, high: float) -> tuple[float, float]:
+    room = 0.06 * (high - low) or max(abs(high), 1.0)
+    return low - room, high + room
+
+
+def _points(line: Line, x_at: Any, y_at: Any) -> str:
+    step = max(1, len(line.x) // POINTS_MAX)
+    pairs = zip(line.x[::step].tolist(), line.y[::step].tolist(), strict=True)
+    return " ".join(f"{x_at(x)},{y_at(y)}" for x, y in pairs)

@@ -1,0 +1,25 @@
+"""What was measured, in words: the tilter's dwells, or the poses of a recording."""
+
+from __future__ import annotations
+
+from triaxcal.delivery import Delivery
+from triaxcal.report.temperatures import degrees
+
+
+def measured_words(delivery: Delivery) -> str:
+    """One line for summary and passport."""
+    calibration, dwells = delivery.calibration, delivery.measurements.dwells
+    recording = calibration.recording
+    if recording is None:
+        temps = ", ".join(degrees(p.temp_degc) for p in calibration.points)
+        checks = len(calibration.check_dwells)
+        told = f"; {checks} check dwells" if checks else "; no check dwells"
+        return f"{len(dwells)} dwells: six positions at {temps} degC{told}"
+    refused = len(recording.poses.refused)
+    name = recording.poses.source.replace("\\", "/").rpartition("/")[2]
+    words = f"{len(dwells)} poses of {name}, {recording.route}"
+    if refused:
+        first = recording.poses.refused[0]
+        words += f"; {refused} still stretches are no poses (pose {first.number}: {first.reason}"
+        words += "; `triaxcal poses` lists all)" if refused > 1 else ")"
+    return words

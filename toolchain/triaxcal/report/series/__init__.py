@@ -1,0 +1,1 @@
+"""A series of units: one unit's record, and the page that shows them all."""

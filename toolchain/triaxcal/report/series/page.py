@@ -1,0 +1,237 @@
+"""series.html and series.json: yield, distributions, outliers, drift."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from triaxcal import __version__
+from triaxcal.batch.run import Series
+from triaxcal.batch.statistics import (
+    FEWEST_UNITS,
+    Outlier,
+    Quantity,
+    Run,
+    outlier_factor,
+    outliers,
+    quantities,
+    runs,
+)
+from triaxcal.codegen.render import environment
+from triaxcal.report.passport.curves import ticks
+
+PAGE_FILE, JSON_FILE = "series.html", "series.json"
+FORMAT = 1
+MOST_ROWS = 30
+"""Of a table on the page; series.json has all."""
+WIDTH, HEIGHT, BASE = 232.0, 96.0, 74.0
+RUN_WIDTH, RUN_HEIGHT = 700.0, 190.0
+
+
+def series_files(series: Series) -> dict[str, bytes]:
+    """The page for people and for machines; no clock in them."""
+    records = series.records
+    found = quantities(records) if records else []
+    far, by_run = outliers(records, found), runs(records) if records else []
+    context = {
+        "version": __version__,
+        "total": len(records) + len(series.refused),
+        "passed": len(records),
+        "shown": sum(bool(r["shown"]) for r in records),
+        "refusals": [
+            {"unit": name, "why": why} for name, why in sorted(series.refused.items())[:MOST_ROWS]
+        ],
+        "more_refusals": max(0, len(series.refused) - MOST_ROWS),
+        "yield": _percent(len(records), len(records) + len(series.refused)),
+        "models": Counter(r["thermal_model"] for r in records).most_common(),
+        "sources": Counter(r["worst_source"] for r in records).most_common(),
+        "acceptance": [_acceptance(records, w) for w in ("at T0", "over the range") if records],
+        "t0": ", ".join(sorted({f"{r['t0_degc']:g}" for r in records})),
+        "width": WIDTH,
+        "height": HEIGHT,
+        "base": BASE,
+        "constants": [found[k : k + 3] for k in range(0, len(found), 3)],
+        "histograms": [_histogram(q, records, far) for q in found],
+        "outliers": [
+            {**asdict(o), "value": f"{o.value:.6g}", "spreads": _spreads(o)}
+            for o in far[:MOST_ROWS]
+        ],
+        "more_outliers": max(0, len(far) - MOST_ROWS),
+        "factor": f"{outlier_factor(len(records), 36):.2f}" if records else "",
+        "enough": len(records) >= FEWEST_UNITS,
+        "fewest": FEWEST_UNITS,
+        "runs": [_run(r) for r in by_run[:60]],
+        "more_runs": max(0, len(by_run) - 60),
+        "drift": _drift(by_run),
+    }
+    page = environment().get_template("series.html.j2").render(context)
+    return {PAGE_FILE: page.encode(), JSON_FILE: _json(series, found, far, by_run)}
+
+
+def _json(
+    series: Series, found: Sequence[Quantity], far: Sequence[Outlier], by_run: Sequence[Run]
+) -> bytes:
+    document = {
+        "format": FORMAT,
+        "triaxcal": __version__,
+        "units": len(series.records) + len(series.refused),
+        "passed": len(series.records),
+        "refused": dict(sorted(series.refused.items())),
+        "distributions": [
+            {
+                "quantity": q.name,
+                "unit": q.unit,
+                "median": q.median,
+                "spread": q.spread,
+                "mean": float(q.values.mean()),
+                "sd": float(q.values.std(ddof=1)) if len(q.values) > 1 else None,
+                "min": float(q.values.min()),
+                "max": float(q.values.max()),
+            }
+            for q in found
+        ],
+        "outliers": [
+            asdict(o) | {"spreads": o.spreads if math.isfinite(o.spreads) else None} for o in far
+        ],
+        "runs": [asdict(r) for r in by_run],
+        "records": series.records,
+    }
+    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _percent(part: int, whole: int) -> str:
+    return f"{100 * part / whole:.1f} %" if whole else "-"
+
+
+def _spreads(outlier: Outlier) -> str:
+    return f"{outlier.spreads:.1f}" if math.isfinite(outlier.spreads) else "all others agree"
+
+
+def _acceptance(records: Sequence[dict[str, Any]], where: str) -> dict[str, str]:
+    """Largest residuals of the units against the limit, as share of it."""
+    shares = [
+        a["largest_residual_g"] / a["limit_g"]
+        for r in records
+        for a in r["acceptance"]
+        if a["where"] == where
+    ]
+    ends = [
+        (a["largest_residual_g"] + a["expanded_uncertainty_g"]) / a["limit_g"]
+        for r in records
+        for a in r["acceptance"]
+        if a["where"] == where
+    ]
+    if not shares:
+        return {"where": where, "units": "0", "median": "-", "most": "-", "end": "-"}
+    return {
+        "where": where,
+        "units": str(len(shares)),
+        "median": f"{100 * float(np.median(shares)):.2g} %",
+        "most": f"{100 * max(shares):.2g} %",
+        "end": f"{100 * max(ends):.2g} %",
+    }
+
+
+def _histogram(
+    q: Quantity, records: Sequence[dict[str, Any]], far: Sequence[Outlier]
+) -> dict[str, Any]:
+    """Bars of a quantity; units far from the others as red bars."""
+    low, high = float(q.values.min()), float(q.values.max())
+    if high == low:
+        pad = abs(low) * 1e-3 or 1.0
+        low, high = low - pad, high + pad
+    bins = max(5, min(29, round(2 * len(q.values) ** (1 / 3)) * 2 - 1))
+    red = {o.unit for o in far if o.quantity == q.name}
+    is_far = np.array([r["unit"] in red for r in records])
+    edges = np.linspace(low, high, bins + 1)
+    near = np.histogram(q.values[~is_far], edges)[0]
+    away = np.histogram(q.values[is_far], edges)[0]
+    top = max(1, int((near + away).max()))
+    step = (WIDTH - 12.0) / bins
+    bars = []
+    for k in range(bins):
+        for count, colour in ((int(near[k]), "#0a5fb4"), (int(away[k]), "#c22")):
+            if count:
+                height = max(2.0, (BASE - 6.0) * count / top)
+                bars.append(
+                    {
+                        "x": round(6 + k * step + 0.5, 2),
+                        "y": round(BASE - height, 2),
+                        "width": round(max(step - 1.0, 1.0), 2),
+                        "height": round(height, 2),
+                        "colour": colour,
+                    }
+                )
+    labels: list[dict[str, Any]] = [
+        {"x": round(6 + (WIDTH - 12) * (t - low) / (high - low), 2), "label": f"{t:.6g}"}
+        for t in ticks(low, high, 3)
+    ]
+    return {
+        "name": q.name,
+        "unit": q.unit,
+        "median": _rounded(q.median, q.spread),
+        "spread": f"{q.spread:.2g}",
+        "bars": bars,
+        "labels": [x for x in labels if 22 <= x["x"] <= WIDTH - 22],
+    }
+
+
+def _rounded(value: float, spread: float) -> str:
+    """Value to the second digit of its spread."""
+    if spread <= 0.0:
+        return f"{value:.6g}"
+    return f"{value:.{max(0, 1 - math.floor(math.log10(spread)))}f}"
+
+
+def _run(r: Run) -> dict[str, Any]:
+    return {
+        "rig": r.rig,
+        "date": r.date,
+        "units": r.units,
+        "pattern": f"{r.pattern_arcsec:.2g}",
+        "worst": r.worst or "nothing to compare with",
+        "shift": f"{r.shift:+.3g} {r.of_unit}" if r.worst else "",
+        "z": f"{r.z:.1f}" if r.worst else "",
+        "told": r.told,
+    }
+
+
+def _drift(by_run: Sequence[Run]) -> list[dict[str, Any]]:
+    """One picture a rig with more than one run: the placement pattern's size, run by run."""
+    by_rig: dict[str, list[Run]] = defaultdict(list)
+    for run in by_run:
+        by_rig[run.rig].append(run)
+    pictures = []
+    for rig, its in by_rig.items():
+        if len(its) < 2:
+            continue
+        top = max(r.pattern_arcsec for r in its) or 1.0
+        scale = ticks(0.0, top * 1.1, 4)
+        step = (RUN_WIDTH - 70.0) / len(its)
+        pictures.append(
+            {
+                "rig": rig,
+                "width": RUN_WIDTH,
+                "height": RUN_HEIGHT,
+                "ticks": [
+                    {"y": round(150 - 136 * t / (top * 1.1), 2), "label": f"{t:g}"} for t in scale
+                ],
+                "marks": [
+                    {
+                        "x": round(56 + step * (k + 0.5), 2),
+                        "y": round(150 - 136 * r.pattern_arcsec / (top * 1.1), 2),
+                        "told": r.told,
+                    }
+                    for k, r in enumerate(its)
+                ],
+                "first": its[0].date,
+                "last": its[-1].date,
+            }
+        )
+    return pictures

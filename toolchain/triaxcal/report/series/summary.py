@@ -1,0 +1,40 @@
+"""The terminal's summary of a series."""
+
+from __future__ import annotations
+
+from triaxcal.batch.run import Series
+from triaxcal.batch.statistics import outliers, quantities, runs
+
+
+def series_summary(series: Series, kept: int, seconds: float, workers: int, where: str) -> str:
+    """Yield, rate, what stands out and where the page is."""
+    records = series.records
+    total = len(records) + len(series.refused)
+    lines = [f"{'series':<16}{total} units: {len(records)} passed, {len(series.refused)} refused"]
+    made = f"{series.made} units"
+    if series.made:
+        rate = 60.0 * series.made / seconds
+        made += f" in {_duration(seconds)}: {rate:.3g} a minute, {rate / workers:.3g} a worker"
+    if kept:
+        made += f"; {kept} were done and unchanged"
+    lines.append(f"{'made':<16}{made}")
+    far = outliers(records, quantities(records)) if records else []
+    names = list(dict.fromkeys(o.unit for o in far))
+    if names:
+        more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+        lines.append(f"{'far out':<16}{', '.join(names[:5])}{more}")
+    told = [r for r in (runs(records) if records else []) if r.told]
+    if told:
+        worst = max(told, key=lambda r: r.z)
+        lines.append(
+            f"{'drift':<16}{len(told)} run(s) differ from the one before on their rig, most "
+            f"{worst.rig} {worst.date}: {worst.worst} by {worst.shift:+.3g} "
+            f"{worst.of_unit.replace('µ', 'micro-')}"
+        )
+    lines.append(f"{'page':<16}{where}")
+    return "\n".join(lines)
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{seconds:.1f} s"

@@ -1,0 +1,220 @@
+"""What `triaxcal poses`, `drift` and `crosscoupling` print, and their pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from triaxcal.fit.family.cross_coupling import NAMES, UNITS, PairFit, Recursion, converged_at
+from triaxcal.fit.family.drift import Drift
+from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+from triaxcal.recording.poses import PoseSet
+from triaxcal.recording.samples import Samples
+from triaxcal.recordinglayout import RecordingLayout
+from triaxcal.report.line_plot import BAD, COLOURS, GOOD, Band, Line, Panel, line_plot
+from triaxcal.report.summary import table
+
+_ARCSEC_PER_RAD = 180.0 * 3600.0 / np.pi
+
+
+def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
+    """The sweep, the poses, and the reason of every refusal."""
+    unit = layout.acceleration_unit
+    blocks = []
+    if poses.stillness is not None:
+        rows = [
+            [
+                f"{'*' if k == poses.stillness.chosen else ' '} {step.threshold:.1f}",
+                str(step.poses),
+                f"{step.still_s:.0f}",
+            ]
+            for k, step in enumerate(poses.stillness.steps)
+        ]
+        head = ["threshold, times the floor", "poses", "still s"]
+        blocks.append("\n".join(table(head, rows)))
+    rows = [
+        [
+            f"{p.number}",
+            str(p.line),
+            f"{p.start_s:.1f}",
+            f"{p.duration_s:.1f}",
+            *(f"{v:.6g}" for v in p.reading),
+            "-" if p.temp_degc is None else f"{p.temp_degc:.1f}",
+            p.label,
+        ]
+        for p in poses.poses
+    ]
+    head = ["pose", "line", "from s", "still s", *(f"{a} {unit}" for a in AXES), "degC", "section"]
+    blocks.append("\n".join(table(head, rows)))
+    if poses.refused:
+        told = [f"pose {r.number} (line {r.line}): {r.reason}" for r in poses.refused]
+        blocks.append("no poses:\n  " + "\n  ".join(told))
+    if poses.findings:
+        blocks.append("found:\n  " + "\n  ".join(poses.findings))
+    count, refused = len(poses.poses), len(poses.refused)
+    blocks.append(f"{count} poses; {refused} still stretches refused")
+    return "\n\n".join(blocks)
+
+
+def poses_picture(samples: Samples, poses: PoseSet, layout: RecordingLayout) -> bytes:
+    """Readings over time with the poses behind them, and the activity with its threshold."""
+    t = samples.time_s
+    bands = [Band(p.start_s, p.start_s + p.duration_s, GOOD, str(p.number)) for p in poses.poses]
+    bands += [Band(r.start_s, r.start_s + r.duration_s, BAD, str(r.number)) for r in poses.refused]
+    low, high = np.percentile(samples.reading, [0.5, 99.5])
+    room = 0.1 * float(high - low) or 1.0
+    lines = [Line(AXES[k], COLOURS[k], t, samples.reading[:, k]) for k in range(3)]
+    panels = [
+        Panel(
+            f"readings, {layout.acceleration_unit}; green: poses, red: refused",
+            "s",
+            lines,
+            bands,
+            (float(low) - room, float(high) + room),
+        )
+    ]
+    if poses.stillness is not None:
+        activity = np.log10(np.maximum(poses.stillness.activity, 0.1))
+        level = np.full(2, np.log10(poses.stillness.threshold))
+        edges = t[[0, -1]]
+        panels.append(
+            Panel(
+                "activity, times its floor (powers of ten)",
+                "s",
+                [
+                    Line("activity", COLOURS[3], t, activity),
+                    Line("threshold", "#d0021b", edges, level, dashed=True),
+                ],
+            )
+        )
+    return line_plot(f"{len(poses.poses)} poses", panels)
+
+
+def drift_text(drift: Drift, layout: RecordingLayout) -> str:
+    """Hysteresis by name, then every candidate with what it misses on half-cycles left out."""
+    one_g = layout.reading_of_1_g
+    scale, unit = (1e3 / one_g, "mg") if one_g else (1.0, layout.acceleration_unit)
+    halves = "; ".join(h.label(drift.temp_degc) for h in drift.halves)
+    apart = ", ".join(
+        f"{AXES[k]} {drift.hysteresis[k] * scale:.3g} {unit} at {drift.hysteresis_degc[k]:.0f} degC"
+        for k in range(3)
+    )
+    rows = [
+        [
+            f"{'*' if row is drift.chosen else ' '} {row.label}",
+            str(row.parameters),
+            *(f"{v * scale:.2f}" for v in row.fitted),
+            *(["-"] * 3 if row.held_out is None else _held_out(row.held_out, scale)),
+        ]
+        for row in drift.rows
+    ]
+    names = [f"{a} {what}" for what in ("fitted", "held out") for a in AXES]
+    head = [f"candidates, rms {unit}", "parameters", *names]
+    lines = [
+        f"half-cycles   {halves}",
+        f"hysteresis    heating against cooling differ most by {apart}",
+        "",
+        *table(head, rows),
+        "",
+        _why(drift, scale, unit),
+    ]
+    return "\n".join(lines)
+
+
+def _held_out(values: FloatArray, scale: float) -> list[str]:
+    return [f"{v * scale:.2f}" for v in np.sqrt(np.mean(values**2, axis=0))]
+
+
+def _why(drift: Drift, scale: float, unit: str) -> str:
+    chosen = drift.chosen
+    if chosen.held_out is None:
+        return "one half-cycle: nothing can be held out, so nothing is chosen by it"
+    score = f"{chosen.score * scale:.3g} {unit}"
+    text = (
+        f"* {chosen.label}: {score} on half-cycles left out, the simplest within 10 % of the best"
+    )
+    plain = [row for row in drift.rows if row.rate is None]
+    best = min(plain, key=lambda row: row.score)
+    if chosen.rate is None:
+        return text + "; a term in dT/dt does not win"
+    rate = ", ".join(f"{v * scale:.3g}" for v in chosen.rate)
+    return (
+        f"{text}; without dT/dt the best is {best.score * scale:.3g} ({best.label}). dT/dt term: "
+        f"{rate} {unit} per K/s in x, y, z"
+    )
+
+
+def drift_picture(samples: Samples, drift: Drift, layout: RecordingLayout) -> bytes:
+    """Each output over temperature, half-cycle by half-cycle: hysteresis is what lies between."""
+    panels = []
+    for k in range(3):
+        mean = float(samples.reading[:, k].mean())
+        lines = [
+            Line(
+                h.label(drift.temp_degc),
+                COLOURS[n % len(COLOURS)],
+                drift.temp_degc[h.start : h.stop],
+                _running(samples.reading[h.start : h.stop, k]) - mean,
+                dashed=not h.rising,
+            )
+            for n, h in enumerate(drift.halves)
+        ]
+        title = f"{AXES[k]}, {layout.acceleration_unit} from its mean"
+        panels.append(Panel(title, "degC", lines))
+    return line_plot("Outputs over temperature: heating against cooling", panels)
+
+
+def _running(values: FloatArray, window: int = 25) -> FloatArray:
+    """Running mean, so that noise does not hide the curve."""
+    if len(values) <= window:
+        return values
+    sums = np.cumsum(np.concatenate([[0.0], values]))
+    index = np.arange(len(values))
+    low, high = np.maximum(index - window // 2, 0), np.minimum(index + window // 2 + 1, len(values))
+    result: FloatArray = (sums[high] - sums[low]) / (high - low)
+    return result
+
+
+def pair_text(fit: PairFit, recursion: Recursion) -> str:
+    """The seven coefficients with sd, and when they had settled."""
+    rows = [
+        [f"  {name}", *_coefficient(fit.values[k], fit.sd[k], UNITS[k])]
+        for k, name in enumerate(NAMES)
+    ]
+    rms = float(np.sqrt(np.mean(fit.residual_g2**2)))
+    count, settled = len(fit.residual_g2), converged_at(recursion)
+    lines = [
+        *table(["coefficients", "value", "sd", "unit"], rows),
+        "",
+        f"{count} positions, condition number {fit.condition:.2f}, residual of Z {rms:.2g} g^2 rms",
+        f"from position {settled} on the sd of both Kip stays within twice its last value",
+    ]
+    return "\n".join(lines)
+
+
+def _coefficient(value: float, sd: float, unit: str) -> list[str]:
+    if unit == "rad":
+        return [f"{value * _ARCSEC_PER_RAD:.4g}", f"{sd * _ARCSEC_PER_RAD:.2g}", "arcsec"]
+    return [f"{value:.4e}", f"{sd:.1e}", unit or "-"]
+
+
+def pair_picture(recursion: Recursion) -> bytes:
+    """Estimates of both Kip after each position, with their sd on either side.
+
+    From twice as many positions as unknowns: before, they are off any scale that shows the end.
+    """
+    first = min(len(NAMES), len(recursion.values) - 2)
+    x = np.arange(first, len(recursion.values), dtype=np.float64) + len(NAMES)
+    panels = []
+    for k, name in ((4, "KipA"), (5, "KipB"), (6, "b0")):
+        scale, unit = (_ARCSEC_PER_RAD, "arcsec") if k == 6 else (1e6, "1e-6 g/g^2")
+        values, sd = recursion.values[first:, k] * scale, recursion.sd[first:, k] * scale
+        last, room = float(values[-1]), 12.0 * float(sd[-1]) or 1.0
+        lines = [
+            Line("estimate", COLOURS[0], x, values),
+            Line("estimate ± sd", COLOURS[1], x, values + sd, dashed=True),
+            Line("estimate ± sd", COLOURS[1], x, values - sd, dashed=True),
+        ]
+        title = f"{name}, {unit}"
+        panels.append(Panel(title, "position", lines, (), (last - room, last + room)))
+    return line_plot("Cross-coupling, position after position", panels)

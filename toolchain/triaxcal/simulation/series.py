@@ -1,0 +1,191 @@
+"""`triaxcal simulate --series`: folders of many units that differ as a production does.
+
+Each unit's truth is the template's with every constant drawn about it; the units of a run are
+measured in one day on one rig, which moves after some days. The same template, number and seed
+give the same bytes.
+"""
+
+from __future__ import annotations
+
+import datetime
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
+from triaxcal.model.types import FloatArray
+from triaxcal.simulation.truth import (
+    IMPERFECTIONS,
+    SERIES_KEYS,
+    TRUTH_FILE,
+    Plan,
+    Truth,
+    check_seed,
+    read_truth,
+    read_truth_tables,
+)
+from triaxcal.simulation.unit import write_simulated_unit
+from triaxcal.unitfile import UNIT_FILE, read_unit
+
+COUNT_MAX = 9999
+FIRST_DAY = datetime.date(2026, 1, 5)
+"""Of the simulated runs, one a day: a date of the simulation's own, not of the clock."""
+_STREAM = 4
+_OWN_AXIS = (0, 4, 8)
+_SERIAL = re.compile(r'(?m)^serial\s*=\s*"[^"]*"')
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How the units of a series differ; standard deviations.
+
+    Attributes
+    ----------
+    scale_sd_ratio : float
+        Of Kxx, Kyy, Kzz, relative.
+    cross_axis_sd_v_per_g, bias_sd_v : float
+        Of the other entries of K, and of U0.
+    temperature_sd_ratio : float
+        Of each coefficient of dT, dT^2 and dT^3, relative to the template's.
+    units_per_run : int
+        Units measured on one day.
+    runs_between_moves : int
+        Days after which the rig is another: its tilts and its gravity are drawn anew.
+    """
+
+    scale_sd_ratio: float
+    cross_axis_sd_v_per_g: float
+    bias_sd_v: float
+    temperature_sd_ratio: float
+    units_per_run: int
+    runs_between_moves: int
+
+
+def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Iterator[Path]:
+    """Write `count` unit folders <template's name>-0001 ... into `into`; yields each.
+
+    Raises
+    ------
+    RefusedError
+        When the template has no truth.toml with a table [series], or a folder exists already.
+    """
+    check_seed(seed, "seed")
+    if not 1 <= count <= COUNT_MAX:
+        raise RefusedError("--series", f"found {count}", expected=f"1 to {COUNT_MAX} units")
+    description = read_unit(template)
+    truth, plan = read_truth(template)
+    spread = read_spread(template)
+    text = (template / UNIT_FILE).read_text(encoding="utf-8")
+    if description.measured.run is not None:
+        raise RefusedError(
+            f"{template / UNIT_FILE}, [measured]",
+            "given",
+            remedy="remove it: each unit gets its own",
+        )
+    names = [f"{template.absolute().name}-{k:04d}" for k in range(1, count + 1)]
+    there = [name for name in names if (into / name).exists()]
+    if there:
+        raise RefusedError(
+            str(into / there[0]), "exists already", remedy="remove it, or name another folder"
+        )
+    for k, name in enumerate(names):
+        run = k // spread.units_per_run
+        day = FIRST_DAY + datetime.timedelta(days=run)
+        rng = np.random.Generator(np.random.PCG64([seed, _STREAM, k]))
+        coefficients = drawn(truth.constants.curves.coefficients[0], spread, rng)
+        own = _SERIAL.sub(f'serial = "{name}"', text, count=1)
+        own += f'\n[measured]\nrig = "simulated"\ndate = {day.isoformat()}\n'
+        folder = into / name
+        try:
+            folder.mkdir(parents=True)
+            (folder / UNIT_FILE).write_text(own, encoding="utf-8")
+            (folder / TRUTH_FILE).write_text(
+                truth_text(
+                    truth,
+                    plan,
+                    coefficients,
+                    seed * (COUNT_MAX + 1) + k,
+                    seed + run // spread.runs_between_moves,
+                ),
+                encoding="utf-8",
+            )
+        except OSError as error:
+            raise RefusedError(
+                str(folder), f"cannot be written: {(error.strerror or str(error)).lower()}"
+            ) from error
+        write_simulated_unit(folder)
+        yield folder
+
+
+def read_spread(folder: Path) -> Spread:
+    """Table [series] of a unit's truth.toml.
+
+    Raises
+    ------
+    RefusedError
+        When it is incomplete or a value is out of range.
+    """
+    table = read_truth_tables(folder)["series"]
+    missing = [key for key in SERIES_KEYS if key not in table]
+    if missing:
+        raise RefusedError(
+            f"{folder / TRUTH_FILE}, [series]",
+            "missing: " + ", ".join(missing),
+            expected="how the units of a series differ",
+            remedy="add them, as docs/file-formats.md tells",
+        )
+    return Spread(
+        scale_sd_ratio=table.number("scale_sd_ratio", 0.0, 0.1),
+        cross_axis_sd_v_per_g=table.number("cross_axis_sd_v_per_g", 0.0, 1.0),
+        bias_sd_v=table.number("bias_sd_v", 0.0, 1.0),
+        temperature_sd_ratio=table.number("temperature_sd_ratio", 0.0, 1.0),
+        units_per_run=table.integer("units_per_run", 1, COUNT_MAX),
+        runs_between_moves=table.integer("runs_between_moves", 1, COUNT_MAX),
+    )
+
+
+def drawn(coefficients: FloatArray, spread: Spread, rng: np.random.Generator) -> FloatArray:
+    """One unit's coefficients (12, 4) about the template's."""
+    draws = rng.standard_normal(coefficients.shape)
+    result = coefficients * (1.0 + spread.temperature_sd_ratio * draws)
+    size = np.full(12, spread.cross_axis_sd_v_per_g)
+    size[list(BIASES)] = spread.bias_sd_v
+    for c in _OWN_AXIS:
+        size[c] = spread.scale_sd_ratio * abs(float(coefficients[c, 0]))
+    result[:, 0] = coefficients[:, 0] + size * draws[:, 0]
+    return result
+
+
+def truth_text(truth: Truth, plan: Plan, coefficients: FloatArray, seed: int, rig_seed: int) -> str:
+    """A truth.toml that gives these numbers back to the last bit."""
+    curves = "\n".join(
+        f"{name} = {[float(c) for c in row]}"
+        for name, row in zip(CONSTANT_NAMES, coefficients, strict=True)
+    )
+    wrong = "\n".join(f"{key} = {getattr(truth.imperfections, key)!r}" for key in IMPERFECTIONS)
+    return f"""# One unit of a simulated series; docs/file-formats.md explains every key.
+format = 1
+
+[curves]
+t0_degc = {truth.constants.t0_degc!r}
+{curves}
+
+[noise]
+reading_sd_v = {truth.reading_sd_v!r}
+thermometer_sd_degc = {truth.thermometer_sd_degc!r}
+dwell_temp_sd_degc = {truth.dwell_temp_sd_degc!r}
+
+[plan]
+seed = {seed}
+rig_seed = {rig_seed}
+readings_per_dwell = {plan.readings_per_dwell}
+temperatures_degc = {list(plan.temperatures_degc)}
+check_temperatures_degc = {list(plan.check_temperatures_degc)}
+
+[imperfections]
+{wrong}
+"""

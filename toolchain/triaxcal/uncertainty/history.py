@@ -1,0 +1,223 @@
+"""A unit calibrated several times: differences against their uncertainty, repeatability, ageing.
+
+Two results x1, x2 of one constant agree when
+
+    En = |x2 - x1| / sqrt(U1^2 + U2^2)
+
+is about 1 or less (ISO 13528), U being expanded (95 %). Twelve constants at T0 and at both ends of
+the common range are compared, so the largest En of 36 counts: by chance it exceeds `EN_MAX` in one
+comparison of twenty. Errors that both calibrations share, as on one rig, make En smaller.
+"""
+
+from __future__ import annotations
+
+import datetime
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from statistics import NormalDist
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
+from triaxcal.model.types import FloatArray
+from triaxcal.records import MEASUREMENTS_FILE, MeasurementSet, read_measurements
+from triaxcal.uncertainty.evaluate import uncertainty
+from triaxcal.unitfile import UnitDescription
+
+HISTORY_FOLDER = "history"
+EN_MAX = NormalDist().inv_cdf(1.0 - 0.05 / 72.0) / NormalDist().inv_cdf(0.975)
+_OWN_AXIS = (0, 4, 8)
+_DAYS_A_YEAR = 365.25
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """One calibration of the unit.
+
+    Attributes
+    ----------
+    name : str
+        Of its file, without the suffix; "now" is the unit's own measurements.csv.
+    day : date or None
+        From a name as 2025-03-30, or [measured] date.
+    """
+
+    name: str
+    day: datetime.date | None
+    measurements: MeasurementSet
+    calibration: Calibration
+
+
+@dataclass(frozen=True)
+class Change:
+    """From one calibration to the next.
+
+    Attributes
+    ----------
+    name : str
+        The later one.
+    bias_mg, scale_ppm, cross_axis_micro_rad : float
+        Largest change of its kind at T0, with its sign.
+    en : float
+        Largest En of the 36.
+    where : str
+        The constant and temperature that has it.
+    """
+
+    name: str
+    bias_mg: float
+    scale_ppm: float
+    cross_axis_micro_rad: float
+    en: float
+    where: str
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the two cannot both be right."""
+        return self.en > EN_MAX
+
+
+def older_files(folder: Path) -> list[Path]:
+    """Measurements of earlier calibrations, by name; none when the unit has no history."""
+    return sorted((folder / HISTORY_FOLDER).glob("*.csv"))
+
+
+def read_history(folder: Path, unit: UnitDescription) -> list[Calibrated]:
+    """All calibrations of a unit, the oldest first, the present one last.
+
+    Raises
+    ------
+    RefusedError
+        When there is no earlier one, or one of them is refused.
+    """
+    older = older_files(folder)
+    if not older:
+        raise RefusedError(
+            str(folder / HISTORY_FOLDER),
+            "no earlier measurements",
+            expected=f"{HISTORY_FOLDER}/<day>.csv, as {HISTORY_FOLDER}/2025-03-30.csv",
+            remedy=f"move {MEASUREMENTS_FILE} there before you put a new one in its place",
+        )
+    found = [calibrated(path, unit, path.stem, _day(path.stem)) for path in older]
+    newest = calibrated(folder / MEASUREMENTS_FILE, unit, "now", unit.measured.date)
+    return [*found, newest]
+
+
+def calibrated(
+    path: Path, unit: UnitDescription, name: str, day: datetime.date | None
+) -> Calibrated:
+    """One file, calibrated by the unit's description."""
+    measurements = read_measurements(path, unit)
+    return Calibrated(name, day, measurements, calibrate(unit, measurements))
+
+
+def _day(name: str) -> datetime.date | None:
+    try:
+        return datetime.date.fromisoformat(name[:10])
+    except ValueError:
+        return None
+
+
+def changes(unit: UnitDescription, history: list[Calibrated]) -> list[Change]:
+    """From each calibration to the next."""
+    return [_change(unit, a, b) for a, b in pairwise(history)]
+
+
+def latest_change(folder: Path, unit: UnitDescription, newest: Calibrated) -> Change | None:
+    """From the last earlier calibration to the newest; None when there is no earlier one."""
+    older = older_files(folder)
+    if not older:
+        return None
+    last = calibrated(older[-1], unit, older[-1].stem, _day(older[-1].stem))
+    return _change(unit, last, newest)
+
+
+def _change(unit: UnitDescription, before: Calibrated, after: Calibrated) -> Change:
+    low = max(c.calibration.range_degc[0] for c in (before, after))
+    high = min(c.calibration.range_degc[1] for c in (before, after))
+    temps = np.unique(np.clip([low, unit.t0_degc, high], min(low, high), max(low, high)))
+    values, expanded = [], []
+    for c in (before, after):
+        u = uncertainty(unit, c.measurements, c.calibration, None, _with_t0(temps, unit))
+        keep = np.isin(u.temps_degc, temps)
+        values.append(c.calibration.thermal.constants_at(temps))
+        expanded.append(u.constants_u[keep])
+    en = np.abs(values[1] - values[0]) / np.hypot(expanded[0], expanded[1])
+    worst = np.unravel_index(int(en.argmax()), en.shape)
+    at_t0 = [c.calibration.thermal.constants_at(unit.t0_degc) for c in (before, after)]
+    bias, scale, cross = _kinds(at_t0[1] - at_t0[0], at_t0[0])
+    return Change(
+        name=after.name,
+        bias_mg=_largest(bias),
+        scale_ppm=_largest(scale),
+        cross_axis_micro_rad=_largest(cross),
+        en=float(en.max()),
+        where=f"{CONSTANT_NAMES[int(worst[1])]} at {temps[int(worst[0])]:.4g} °C",
+    )
+
+
+def _with_t0(temps_degc: FloatArray, unit: UnitDescription) -> FloatArray:
+    result: FloatArray = np.unique([*temps_degc, unit.t0_degc])
+    return result
+
+
+def _kinds(change: FloatArray, constants: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Changes (..., 12) as bias in mg, scale factor in ppm, cross-axis sensitivity in micro-rad."""
+    own = constants[list(_OWN_AXIS)]
+    by_row = change[..., :9].reshape(*change.shape[:-1], 3, 3) / own[:, None]
+    off = ~np.eye(3, dtype=bool)
+    bias = 1e3 * change[..., list(BIASES)] / own
+    return bias, 1e6 * np.diagonal(by_row, axis1=-2, axis2=-1), 1e6 * by_row[..., off]
+
+
+def _largest(values: FloatArray) -> float:
+    return float(values.flat[int(np.abs(values).argmax())])
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Standard deviation from calibration to calibration, and the change a year, at T0.
+
+    Each is the root mean square over its constants; `*_a_year` are None without days.
+    """
+
+    calibrations: int
+    bias_mg: float
+    scale_ppm: float
+    cross_axis_micro_rad: float
+    years: float | None
+    bias_mg_a_year: float | None
+    scale_ppm_a_year: float | None
+
+
+def repeatability(unit: UnitDescription, history: list[Calibrated]) -> Repeatability | None:
+    """Scatter over all calibrations about a straight line in time, or about the mean without days.
+
+    None where there are too few to tell: three with a mean, four with a line.
+    """
+    at_t0 = np.array([c.calibration.thermal.constants_at(unit.t0_degc) for c in history])
+    kinds = _kinds(at_t0 - at_t0[0], at_t0[0])
+    days = [c.day.toordinal() for c in history if c.day]
+    dated = len(days) == len(history) and len(set(days)) > 1
+    columns = [np.ones(len(history))]
+    if dated and len(history) > 3:
+        columns.append((np.array(days) - days[0]) / _DAYS_A_YEAR)
+    design = np.column_stack(columns)
+    left = len(history) - design.shape[1]
+    if left < 2:
+        return None
+    scatter, slopes = [], []
+    for values in kinds:
+        solution, *_ = np.linalg.lstsq(design, values)
+        residual = values - design @ solution
+        scatter.append(math.sqrt(float(np.mean(np.sum(residual**2, axis=0))) / left))
+        slopes.append(_largest(solution[-1]))
+    found = Repeatability(len(history), scatter[0], scatter[1], scatter[2], None, None, None)
+    if len(columns) == 1:
+        return found
+    years = (days[-1] - days[0]) / _DAYS_A_YEAR
+    return replace(found, years=years, bias_mg_a_year=slopes[0], scale_ppm_a_year=slopes[1])

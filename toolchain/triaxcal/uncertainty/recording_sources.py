@@ -1,0 +1,100 @@
+"""Sources of a calibration from a recording: the poses' scatter, gravity, thermometer, held out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from triaxcal.fit.family.result import RecordingFit
+from triaxcal.uncertainty.propagation import ROWS, Curves, mapped
+from triaxcal.uncertainty.rig_sources import GRAVITY_M_PER_S2, thermometer, thermometer_drift
+from triaxcal.uncertainty.source import NORMAL, STUDENT, Source, direct, from_factor, stated_or
+from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
+
+
+def recording_sources(p: Curves, recording: RecordingFit) -> list[Source]:
+    """All sources but the device's own."""
+    return [
+        _poses(p, recording),
+        _gravity(p),
+        thermometer(p),
+        thermometer_drift(p),
+        _unmodelled(p, recording),
+        *([_temperature()] if recording.poses.temps_degc is None else []),
+    ]
+
+
+def _poses(p: Curves, recording: RecordingFit) -> Source:
+    """Scatter of the poses: the covariance of the fit."""
+    covariance = p.calibration.constants_covariance(p.temps_degc)
+    order = np.empty(12, dtype=np.int64)
+    order[list(ROWS)] = np.arange(12)
+    constants = covariance[:, order][:, :, order]
+    return Source(
+        key="poses",
+        name="the scatter of the poses",
+        sd=recording.rms_free_g,
+        unit="g",
+        distribution=STUDENT,
+        dof=float(recording.dof),
+        origin="|a| - g at the poses, per degree of freedom",
+        advice="record more poses, in orientations that are not alike",
+        constants=constants,
+        force=mapped(-p.inverse, constants),
+    )
+
+
+def _gravity(p: Curves) -> Source:
+    """Local gravity: scales K."""
+    sd, dof, origin = stated_or(
+        p.unit.stated.gravity_m_per_s2, GRAVITY_M_PER_S2, "gravity_m_per_s2"
+    )
+    rows = p.rows.copy()
+    rows[:, :, 3] = 0.0
+    factor = rows.reshape(-1, 12, 1) * (sd / STANDARD_GRAVITY_M_PER_S2 / p.unit.gravity_g)
+    constants, force = from_factor(p, factor)
+    return Source(
+        key="gravity",
+        name="local gravity",
+        sd=sd,
+        unit="m/s²",
+        distribution=NORMAL,
+        dof=dof,
+        origin=origin,
+        advice="take local gravity from a survey point or measure it",
+        constants=constants,
+        force=force,
+    )
+
+
+def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
+    """What the model misses at poses that it has not seen, beyond the fitted ones' scatter."""
+    held_out = recording.held_out_g
+    if held_out is None:
+        return Source(
+            "model", "the model", None, "g", "unknown", math.inf,
+            "unknown: no pose could be left out", "record more poses", None, None,
+        )  # fmt: skip
+    sd = math.sqrt(max(held_out**2 - recording.rms_free_g**2, 0.0))
+    return Source(
+        key="model",
+        name="the model",
+        sd=sd,
+        unit="g",
+        distribution=STUDENT,
+        dof=float(len(recording.residual_g)),
+        origin="held-out |a| - g beyond the scatter of the poses",
+        advice="record more poses, in orientations that are not alike",
+        constants=None,
+        force=direct(p, np.broadcast_to(np.eye(3) * sd, (len(p.temps_degc), 3, 3))),
+    )
+
+
+def _temperature() -> Source:
+    """Nothing was recorded of the temperature, so nothing is known of what it does."""
+    return Source(
+        "temperature", "the change with temperature", None, "g", "unknown", math.inf,
+        "unknown: the recording has no temperature", "record the temperature, and poses at several",
+        None, None,
+    )  # fmt: skip
