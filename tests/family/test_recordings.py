@@ -194,6 +194,25 @@ def test_a_crowd_of_alike_poses_is_told_and_counts_once(tmp_path: Path) -> None:
     assert "(10 orientations left out in turn)" in calibration.selection_reason
 
 
+def test_six_faces_twice_are_judged_by_single_poses(tmp_path: Path) -> None:
+    """No orientation can be spared of six; each face was taken twice."""
+    faces = directions(6)
+    calibration = calibrated(write_unit(tmp_path / "U", log(np.concatenate([faces, faces]))))
+    assert calibration.selection_reason.startswith("bias and scale factors: held-out error")
+    assert (
+        "12 single poses, alike ones staying in, left out in turn" in calibration.selection_reason
+    )
+
+
+def test_six_faces_once_determine_six_constants_and_nothing_checks_them(tmp_path: Path) -> None:
+    calibration = calibrated(write_unit(tmp_path / "U", log(directions(6))))
+    assert calibration.selection_reason.startswith(
+        "bias and scale factors: no pose can be spared to check on"
+    )
+    assert calibration.recording is not None
+    assert calibration.recording.held_out_g is None
+
+
 # ---- what is refused, each with what to do ----
 
 

@@ -73,6 +73,17 @@ def test_p0s_grid_gives_the_truth_and_refuses_quadratic_terms(tmp_path: Path) ->
     )
 
 
+def test_the_tables_budget_stands_beside_what_is_left(tmp_path: Path) -> None:
+    more = "[uncertainty]\nrepeatability_arcsec = 4\n"
+    folder = write_unit(tmp_path / "U", rows_of(table()), AIR, header=HEADER, more=more)
+    found = calibrated(folder).recording
+    assert found is not None
+    told = next(f for f in found.findings if f.startswith("table: 4 arcsec an angle, 0 arcsec"))
+    # 4 arcsec are 19.4 micro-g along the slope: cosines and three components make 15.
+    assert "of level are 15" in told
+    assert told.endswith("as the table allows")
+
+
 def test_a_quadratic_truth_is_found_where_it_is(tmp_path: Path) -> None:
     rows = rows_of(table(turn=True), quadratic=3e-4)
     calibration = calibrated(write_unit(tmp_path / "U", rows, AIR, header=HEADER))

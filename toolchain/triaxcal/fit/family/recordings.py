@@ -20,7 +20,7 @@ from triaxcal.fit.family.checks import (
 from triaxcal.fit.family.frame import CASE, case_rotation, turned_constants, turned_quadratic
 from triaxcal.fit.family.result import RecordingFit
 from triaxcal.fit.family.scalar import MODELS, NINE, ScalarData, ScalarModel, scalar_data
-from triaxcal.fit.family.trials import Judged, Trial, choose, folds, judge, reason
+from triaxcal.fit.family.trials import Judged, Trial, choose, folds, judge, reason, unscored
 from triaxcal.fit.grouping import GROUP_GAP_DEGC
 from triaxcal.fit.thermal import EDGE_DEGC, POLYNOMIAL, ThermalShape, polynomial_shape
 from triaxcal.model.metrological import force_from_voltage
@@ -59,6 +59,11 @@ def calibrate_poses(
     left_out = folds(orientations, temperatures, len(temps))
     trials = _trials(unit, temps, temperatures)
     rows = [judge(trial, data, temps, left_out, unit.loss) for trial in trials]
+    turns = _turns(orientations, temperatures)
+    if unscored(rows):
+        left_out = folds([[k] for k in range(len(temps))], temperatures, len(temps))
+        rows = [judge(trial, data, temps, left_out, unit.loss) for trial in trials]
+        turns = f"{len(temps)} single poses, alike ones staying in,"
     if not any(row.able for row in rows):
         largest = max(rows, key=lambda row: -row.trial.parameters)
         refuse_unseen(poses, largest.fit.condition, largest.fit.unseen())
@@ -66,7 +71,6 @@ def calibrate_poses(
     values = sum(int(mask.sum()) for mask in left_out)
     deliverable = [row for row in rows if QUADRATIC_IN_C or not len(row.trial.model.quadratic)]
     best = choose(deliverable, values)
-    turns = _turns(orientations, temperatures)
     why = reason(deliverable, best, turns, values)
     findings += _outlier(best, poses) + _passed_over(rows, best)
     measurements = MeasurementSet(poses.source, pose_dwells(poses, temps))

@@ -19,6 +19,7 @@ from triaxcal.fit.family.oriented import (
     design_condition,
     inverse_linear,
     inverse_quadratic,
+    table_error_g,
 )
 from triaxcal.fit.family.recordings import QUADRATIC_IN_C, pose_dwells, recording_range
 from triaxcal.fit.family.result import RecordingFit
@@ -37,6 +38,7 @@ from triaxcal.recordinglayout import Angles, RecordingLayout
 from triaxcal.records import MeasurementSet
 from triaxcal.unitfile import UnitDescription
 
+_RAD_PER_ARCSEC = math.pi / 180.0 / 3600.0
 _Solver = Callable[[FloatArray, FloatArray], OrientedFit]
 
 
@@ -123,6 +125,7 @@ def calibrate_table(
         *_passed_over(able, best),
         *table_findings(angles, table, readings, sign * best.fit.force_g(readings), unit.gravity_g),
         _angle_residuals(angles, table, sign * best.fit.force_g(readings)),
+        *_budget(unit, angles, table, best),
     ]
     dwells = MeasurementSet(poses.source, pose_dwells(poses, temps))
     return dwells, _calibration(
@@ -282,6 +285,24 @@ def _angle_residuals(angles: Angles, table: FloatArray, force: FloatArray) -> st
     return "angles back from the readings (8): " + ", ".join(
         f"{name} {value:.3g} arcsec rms" for name, value in zip(names, rms, strict=True)
     )
+
+
+def _budget(unit: UnitDescription, angles: Angles, table: FloatArray, best: _Row) -> list[str]:
+    """The table's own errors in g beside sqrt(eps), where unit.toml states them; P0, section 5."""
+    stated = unit.stated
+    if stated.repeatability_arcsec is None and stated.level_arcsec is None:
+        return []
+    angle, level = stated.repeatability_arcsec or 0.0, stated.level_arcsec or 0.0
+    errors = table_error_g(
+        angles.kind, table, angle * _RAD_PER_ARCSEC, level * _RAD_PER_ARCSEC, unit.gravity_g
+    )
+    budget = float(np.sqrt(np.mean(errors**2))) * 1e6
+    found = best.fitted_g * 1e6
+    words = "as the table allows" if found <= 2.0 * budget else "more than the table explains"
+    told = (
+        f"table: {angle:g} arcsec an angle, {level:g} arcsec of level are {budget:.3g} micro-g rms"
+    )
+    return [f"{told}; sqrt(eps) is {found:.3g} micro-g, {words}"]
 
 
 def _calibration(

@@ -3,7 +3,12 @@
 Left out in turn is every orientation with all its poses (two poses alike would give each other
 away), and every inner temperature where there are four and more. What is left out is scored by
 |a| - g. Every candidate is scored on the same poses; one whose constants the remaining poses leave
-open in any turn is not scored and cannot be chosen.
+open in any turn is not scored.
+
+Where a linear candidate that all poses determine cannot be scored so (six faces: no orientation can
+be spared), single poses are left out instead, a weaker test, for poses alike stay in. Where even
+that is impossible nothing is held out, and the candidate with the most constants is taken: as with
+the tilter, what the data determine exactly.
 """
 
 from __future__ import annotations
@@ -63,7 +68,7 @@ class Judged:
     held_out_g : float or None
         Rms |a| - g of what was left out; None when not scored.
     able : bool
-        Whether the poses determine it, with and without each part left out.
+        Whether all poses together determine it.
     """
 
     trial: Trial
@@ -107,7 +112,7 @@ def judge(
     """Fit a trial to all poses, and to what each turn leaves."""
     own = data.with_basis(trial.shape.basis(temps_degc))
     fit = fit_scalar(trial.model, own, trial.gain_functions, loss)
-    if fit.condition > CONDITION_MAX:
+    if fit.condition > CONDITION_MAX or len(fit.residual_g) < trial.parameters:
         return Judged(trial, fit, None, able=False)
     errors = []
     for mask in left_out:
@@ -115,11 +120,23 @@ def judge(
             trial.model, own.select(~mask), trial.gain_functions, loss, start=fit.theta
         )
         if part.condition > CONDITION_MAX or len(part.residual_g) < trial.parameters:
-            return Judged(trial, fit, None, able=False)
+            return Judged(trial, fit, None, able=True)
         errors.append(part.errors_g(own.select(mask)))
     if not errors:
         return Judged(trial, fit, None, able=True)
     return Judged(trial, fit, float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), able=True)
+
+
+def unscored(rows: Sequence[Judged]) -> list[Judged]:
+    """Linear candidates at one temperature that are determined, but could not be scored."""
+    return [
+        row
+        for row in rows
+        if row.able
+        and row.held_out_g is None
+        and not len(row.trial.model.quadratic)
+        and row.trial.shape.parameters == 1
+    ]
 
 
 def choose(rows: Sequence[Judged], values: int) -> Judged:
@@ -130,8 +147,8 @@ def choose(rows: Sequence[Judged], values: int) -> Judged:
     """
     able = [row for row in rows if row.able]
     scored = [(row.held_out_g, row) for row in able if row.held_out_g is not None]
-    if not scored:
-        return max(able, key=lambda row: row.trial.parameters)
+    if unscored(rows):
+        return max(unscored(rows), key=lambda row: row.trial.parameters)
     limit = min(score for score, _ in scored) * (1.0 + 1.0 / np.sqrt(2.0 * values))
     within = [row for score, row in scored if score <= limit]
     return min(within, key=lambda row: (row.trial.parameters, row.held_out_g))
@@ -141,7 +158,10 @@ def reason(rows: Sequence[Judged], best: Judged, turns: str, values: int) -> str
     """Why this candidate, in words."""
     label = best.trial.label
     if best.held_out_g is None:
-        return f"{label}: no orientation can be left out, so this is what the poses determine"
+        return (
+            f"{label}: no pose can be spared to check on, so this is what the poses determine; "
+            "record more, in other orientations"
+        )
     resolution = 100.0 / np.sqrt(2.0 * values)
     scored = [row for row in rows if row.held_out_g is not None]
     text = (

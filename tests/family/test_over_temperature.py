@@ -1,0 +1,90 @@
+"""Poses over temperature: thermal orders chosen on what was left out, the same C at the end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from family_cases import COLUMNS, U0, K, directions, log, write_unit
+from test_recordings import calibrated, symmetric_part
+
+from triaxcal.delivery import deliver
+from triaxcal.errors import RefusedError
+from triaxcal.model.types import FloatArray
+
+WITH_T = COLUMNS + '\ntemperature = "T"'
+TEMPS = (-20.0, 0.0, 20.0, 40.0, 60.0)
+SLOPE = np.array([2e-3, -3e-3, 4e-3])
+"""Of the biases, m/s^2 per degC; and a square of them besides."""
+SQUARE = np.array([2e-5, 1e-5, -3e-5])
+
+
+def cycle(temps: tuple[float, ...] = TEMPS, poses: int = 14, gain: float = 0.0) -> FloatArray:
+    """Fourteen poses at each temperature; gains change by `gain` a degC."""
+    parts, start = [], 0.0
+    for n, temp in enumerate(temps):
+        rows = log(directions(poses, seed=n), seed=n)
+        d = temp - 20.0
+        rows[:, 1:] = (rows[:, 1:] - U0) * (1.0 + gain * d) + U0 + SLOPE * d + SQUARE * d**2
+        rows[:, 0] += start
+        start = rows[-1, 0] + 600.0
+        parts.append(np.column_stack([rows, np.full(len(rows), temp)]))
+    return np.concatenate(parts)
+
+
+def unit_with(folder: Path, rows: FloatArray, more: str = "") -> Path:
+    return write_unit(folder, rows, WITH_T, header="t,ax,ay,az,T", more=more)
+
+
+def test_biases_of_second_order_are_found_and_end_in_c(tmp_path: Path) -> None:
+    delivery = deliver(unit_with(tmp_path / "U", cycle()))
+    calibration = delivery.calibration
+    # A third order does no harm that 70 poses could show; a first is seven times worse.
+    assert calibration.shape.order in (2, 3)
+    scores = {c.label: c.held_out_g or 1.0 for c in calibration.candidates}
+    assert min(scores.values()) < 0.25e-3
+    assert scores["linear, nine constants; order 1"] > 1e-3
+    assert (calibration.range_degc, delivery.unit.t0_degc) == ((-20.0, 60.0), 20.0)
+    temps = np.array([-15.0, 10.0, 35.0, 55.0])
+    d = (temps - 20.0)[:, None]
+    found = calibration.thermal.constants_at(temps)
+    sd = np.sqrt(np.diagonal(calibration.constants_covariance(temps), axis1=1, axis2=2))
+    truth = np.concatenate(
+        [np.tile(symmetric_part(K).ravel(), (4, 1)), U0 + SLOPE * d + SQUARE * d**2], axis=1
+    )
+    assert np.abs((found - truth) / sd).max() < 4.5
+    # The compiled C keeps what the fit has, over all temperatures.
+    errors = [
+        r.error_g for r in next(m for m in delivery.methods if m.method == "matrix").residuals
+    ]
+    assert delivery.calibration.recording is not None
+    limit = delivery.model_error_g * 2.0 + 1e-6  # two axes of the method's error, and rounding
+    assert np.abs(errors - delivery.calibration.recording.residual_g).max() < limit
+
+
+def test_a_slow_ramp_does_not_dominate(tmp_path: Path) -> None:
+    """Six sets at 20 degC beside one at each end weigh as the three temperatures do."""
+    rows = cycle((-20.0, 20.0, 20.0, 20.0, 20.0, 20.0, 20.0, 60.0), poses=10)
+    calibration = calibrated(unit_with(tmp_path / "U", rows))
+    assert calibration.recording is not None
+    assert len(calibration.recording.poses.poses) == 80
+    found = calibration.thermal.constants_at(np.array([-20.0, 60.0]))[:, 9:]
+    d = np.array([[-40.0], [40.0]])
+    # A pose is good to 0.17 mg; ten of them at each end.
+    assert np.abs(found - (U0 + SLOPE * d + SQUARE * d**2)).max() < 5e-3
+
+
+def test_an_order_beyond_the_temperatures_is_refused(tmp_path: Path) -> None:
+    more = '[thermal]\nmodel = "polynomial"\norder = 3\n'
+    folder = unit_with(tmp_path / "U", cycle((0.0, 20.0, 40.0), poses=10), more)
+    with pytest.raises(RefusedError, match="order 3 with poses at 3 temperatures; expected 2 at"):
+        calibrated(folder)
+
+
+def test_a_range_beyond_the_poses_is_refused(tmp_path: Path) -> None:
+    folder = unit_with(
+        tmp_path / "U", cycle((0.0, 20.0), poses=10), "[thermal]\nrange_degc = [-40, 60]\n"
+    )
+    with pytest.raises(RefusedError, match="record poses further out: nothing is extrapolated"):
+        calibrated(folder)
