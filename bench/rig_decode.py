@@ -5,6 +5,7 @@ python bench/rig_decode.py [frames]
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -13,33 +14,43 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import can
-import numpy as np
 
 from triaxcal.rig.candump import format_frames, parse
 from triaxcal.rig.dbc import default_dbc, load_database, read_dbc
-from triaxcal.rig.frames import concatenate
+from triaxcal.rig.engine import Setup
+from triaxcal.rig.plan import read_plan
+from triaxcal.rig.recording import replay
 from triaxcal.rig.samples import SampleDecoder
-from triaxcal.rig.simframes import FrameMaker
+from triaxcal.rig.simulator import RigSettings, SimulatedRig
+from triaxcal.simulation.truth import read_truth
+from triaxcal.unitfile import read_unit
 
 FRAMES = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
 PEER = 50_000
+RATE = 1000
+REPO = Path(__file__).parents[1]
 CHUNK = 4 << 20
 
 
-def make_log(path: Path) -> None:
-    maker = FrameMaker(read_dbc(default_dbc()), "classic", 100, 1, 1_700_000_000 * 10**9)
-    rng = np.random.default_rng(1)
+def make_log(path: Path, setup: Setup) -> None:
+    """A rig at 1 kHz, at rest in its first position."""
+    truth, _ = read_truth(setup.folder)
+    rig = SimulatedRig(setup.unit, truth, setup.plan, setup.dbc, RigSettings())
+    count = 0
     with path.open("wb") as file:
-        count = second = 0
         while count < FRAMES:
-            parts = []
-            for _ in range(100):
-                codes = rng.integers(-(2**23), 2**23, (100, 3))
-                parts.append(maker.frames(codes, rng.integers(-5000, 9000, 10), second, 1))
-                second += 1
-            frames = concatenate(parts)
+            frames = rig.advance()
             file.write(format_frames(frames, "can0"))
             count += len(frames)
+
+
+def about(folder: Path) -> Setup:
+    bench = REPO / "units" / "AT-SIM-BENCH"
+    unit = read_unit(bench)
+    plan = folder / "plan.toml"
+    text = (REPO / "rig" / "plans" / "five-temperatures.toml").read_text(encoding="utf-8")
+    plan.write_text(text.replace("rate_hz = 100", f"rate_hz = {RATE}"), encoding="utf-8")
+    return Setup(bench, unit, read_plan(plan, unit), read_dbc(default_dbc()))
 
 
 def chunks(path: Path) -> list[bytes]:
@@ -52,20 +63,32 @@ def chunks(path: Path) -> list[bytes]:
     return found
 
 
+def cpu_s() -> float:
+    """CPU seconds so far, of ended children too."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
 def timed(function) -> tuple[float, float]:
-    wall, cpu = time.perf_counter(), time.process_time()
+    """Seconds a frame: on the clock, and of CPU."""
+    wall, cpu = time.perf_counter(), cpu_s()
     count = function()
-    return (time.perf_counter() - wall) / count, (time.process_time() - cpu) / count
+    return (time.perf_counter() - wall) / count, (cpu_s() - cpu) / count
 
 
 def ours(path: Path) -> int:
-    decoder = SampleDecoder(read_dbc(default_dbc()), "classic", 100)
+    decoder = SampleDecoder(read_dbc(default_dbc()), "classic", RATE)
     count = 0
     with ThreadPoolExecutor(2) as pool:
         for parsed in pool.map(parse, chunks(path)):
             decoder.feed(parsed.frames)
             count += parsed.lines
     return count
+
+
+def replayed(setup: Setup, path: Path) -> int:
+    """`rig replay`: the same, and every decision of the session."""
+    return int(replay(setup, path).log["lines"])
 
 
 def python_can_and_cantools(path: Path) -> int:
@@ -79,15 +102,15 @@ def python_can_and_cantools(path: Path) -> int:
     return count
 
 
-def decode_message_only(path: Path) -> int:
+def decode_message_only(path: Path) -> float:
     database, count = load_database(default_dbc()), 0
     with can.CanutilsLogReader(str(path)) as reader:
         messages = [m for _, m in zip(range(PEER), reader, strict=False)]
-    start = time.perf_counter()
+    start = cpu_s()
     for message in messages:
         database.decode_message(message.arbitration_id, message.data)
         count += 1
-    return time.perf_counter() - start, count
+    return (cpu_s() - start) / count
 
 
 def command_line(path: Path) -> int:
@@ -100,26 +123,26 @@ def command_line(path: Path) -> int:
 
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "frames.log"
-        make_log(path)
-        wall, cpu = timed(lambda: ours(path))
-        print(
-            f"ours, parse + CRC + samples   {1e-3 / wall:7.0f} kframes/s, "
-            f"{1e6 * wall:.2f} s for 1e6, CPU {1e6 * cpu:.2f} us a frame"
-        )
-        seconds, count = decode_message_only(path)
-        print(
-            f"cantools decode_message only  {1e-3 * count / seconds:7.0f} kframes/s, "
-            f"ratio {seconds / count / wall:.1f}"
-        )
-        peer, _ = timed(lambda: python_can_and_cantools(path))
-        print(
-            f"python-can reader + cantools  {1e-3 / peer:7.0f} kframes/s, ratio {peer / wall:.1f}"
-        )
-        peer, _ = timed(lambda: command_line(path))
-        print(
-            f"cantools decode               {1e-3 / peer:7.0f} kframes/s, ratio {peer / wall:.1f}"
-        )
+        path, setup = Path(folder) / "frames.log", about(Path(folder))
+        make_log(path, setup)
+        mine = timed(lambda: ours(path))
+        whole = timed(lambda: replayed(setup, path))
+        for name, (wall, cpu) in (("parse, CRC, samples", mine), ("replay of a session", whole)):
+            print(
+                f"ours, {name}     {1e6 * wall:5.2f} s for 1e6 frames, "
+                f"CPU {1e6 * cpu:5.2f} us a frame"
+            )
+        peers = {
+            "cantools decode_message alone": decode_message_only(path),
+            "python-can reader + cantools ": timed(lambda: python_can_and_cantools(path))[1],
+            "cantools decode              ": timed(lambda: command_line(path))[1],
+        }
+        for name, cpu in peers.items():
+            print(
+                f"{name}                CPU {1e6 * cpu:6.2f} us a frame, {cpu / mine[1]:.1f} times "
+                f"the first, {cpu / whole[1]:.1f} times the second"
+            )
+    print(f"the clock is that of a machine with load {os.getloadavg()[0]:.1f}")
 
 
 main()

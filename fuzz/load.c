@@ -13,7 +13,6 @@
 #include "triax_comp.h"
 #include "triax_ref.h"
 
-#define HEADER_WORDS 15
 #define WORDS (TRIAX_IMAGE_SIZE / 4)
 static const uint32_t HEADER[HEADER_WORDS] = {FUZZ_HEADER};
 

@@ -88,12 +88,14 @@ def _load(shape: str, units: Path, work: Path) -> Target:
     made = subject(shape, units)
     space = Workspace.create(work / shape, made.files, made.plan, made.bound)
     image = made.files[IMAGE]
-    header = ",".join(
-        f"{w}u" for w in struct.unpack(f"<{HEADER_WORDS}I", image[: 4 * HEADER_WORDS])
-    )
+    # Version 2 has a word more: which terms there are.
+    words = HEADER_WORDS + int.from_bytes(image[4:8], "little") - 1
+    header = ",".join(f"{w}u" for w in struct.unpack(f"<{words}I", image[: 4 * words]))
     program = space.folder / "load"
     sources = [HERE / "load.c", space.folder / ROUTINE, *_reference_sources()]
-    _compile(program, sources, [space.folder], [f"-DFUZZ_HEADER={header}"])
+    _compile(
+        program, sources, [space.folder], [f"-DFUZZ_HEADER={header}", f"-DHEADER_WORDS={words}"]
+    )
     return Target(
         f"load-{shape}", (str(program),), (image, image + bytes(range(64))), len(image) + 64
     )

@@ -49,7 +49,7 @@ MUTANTS: dict[str, list[Mutant]] = {
         Mutant("Horner started low", "int32_t p = c[2];", "int32_t p = c[1];"),
         Mutant("wrong function", "coefficient[4u + j], x_q31", "coefficient[3u + j], x_q31"),
         Mutant("origin forgotten", "code - segment->origin_code", "code - segment->first_code"),
-        Mutant("gain halved", "* segment->gain);", "* (segment->gain / 2));"),
+        Mutant("gain halved", "* segment->gain;", "* (segment->gain / 2);"),
     ],
     "direct-left-justified-piecewise": [
         Mutant("segment starts one late", "code >= calib->segment[i]", "code > calib->segment[i]"),
@@ -73,7 +73,11 @@ MUTANTS: dict[str, list[Mutant]] = {
         ),
     ],
     "inverse-saturating": [
-        Mutant("shift truncated", "(~(~value >> shift))", "(-(-value >> shift))"),
+        Mutant(
+            "shift truncated",
+            "asr64(int64_t value, uint32_t shift)\n{\n    return (value < 0) ? (~(~value",
+            "asr64(int64_t value, uint32_t shift)\n{\n    return (value < 0) ? (-(-value",
+        ),
         Mutant("saturation upwards dropped", "result = (int64_t)INT32_MAX;", ";"),
         Mutant(
             "saturation one low", "result = (int64_t)INT32_MIN;", "result = (int64_t)INT32_MIN + 1;"

@@ -133,3 +133,32 @@ def test_a_drifting_temperature_is_refused():
     dwells = tuple(replace(d, temp_degc=t) for d, t in zip(base.dwells, temps, strict=True))
     message = refusal(replace(base, dwells=dwells))
     assert "4 degC between dwells that belong to one temperature (20 to 24 degC)" in message
+
+
+@pytest.mark.parametrize(("count", "pooled"), [(3, True), (9, True), (10, False)])
+def test_the_deviations_of_few_readings_are_pooled(count: int, pooled: bool) -> None:
+    """GUM H.3.6: one deviation an output, weighted by the degrees of freedom."""
+    measurements = measured(count=count)
+    random_sd = np.random.default_rng(3).uniform(1e-6, 9e-6, (len(measurements.dwells), 3))
+    dwells = tuple(
+        replace(d, sd_v=sd, count=count + (k == 0) * 4)
+        for k, (d, sd) in enumerate(zip(measurements.dwells, random_sd, strict=True))
+    )
+    groups = group_dwells(MeasurementSet("m.csv", dwells), 20.0)
+    found = grouped_readings(groups, 1e-9)
+    by_group = [d for g in groups for d in g.dwells]
+    counts = np.array([d.count for d in by_group])
+    assert found.pooled == pooled
+    assert found.variance_v2 is not None
+    if not pooled:
+        assert found.variance_dof == count - 1
+        own = np.array([d.sd_v**2 / d.count for d in by_group])
+        np.testing.assert_array_equal(found.variance_v2.reshape(-1, 3), own)
+        return
+    dof = sum(d.count - 1 for d in by_group)
+    assert found.variance_dof == dof
+    together = sum((d.count - 1) * d.sd_v**2 for d in by_group) / dof
+    # Sums of eighteen in another order.
+    np.testing.assert_allclose(
+        found.variance_v2.reshape(-1, 3), together / counts[:, None], rtol=1e-13
+    )

@@ -20,6 +20,7 @@ ROOM_OF_MODULE = {
     "tomltable": "records",
     "unitfile": "records",
     "errors": "ground",
+    "jsontext": "ground",
     "resources": "ground",
     "__init__": "ground",
     "__main__": "cli",
@@ -43,7 +44,7 @@ MAY_IMPORT = {
     "design": {"ground", "model", "records"},
     "targets": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
     "uncertainty": {"ground", "model", "records", "fit", "fixedpoint"},
-    "verify": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
+    "verify": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery", "targets"},
     "rig": {"ground", "model", "records", "simulation"},
     "batch": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery", "publish"},
     "report": {

@@ -21,7 +21,13 @@ from triaxcal.fixedpoint.gyro import TriadDescription, make_gyro_plan
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
-from triaxcal.model.imu import ImuCompensation, ImuModel, compensate_imu, constants_from_errors
+from triaxcal.model.imu import (
+    EXAMPLE_SENSITIVITY,
+    ImuCompensation,
+    ImuModel,
+    compensate_imu,
+    constants_from_errors,
+)
 from triaxcal.model.terms import EXAMPLE_TERMS, NO_TERMS, Terms
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.unitfile import Adc, TemperatureSensor
@@ -33,8 +39,7 @@ ACCEL_ADC = Adc(24, 16.0, -(2**23), 2**23 - 1)
 """A digital unit: "V" is the nominal g, 16 of them full scale."""
 GYRO_ADC = Adc(24, 500.0 * DEGREE, -(2**23), 2**23 - 1)
 """And the nominal rad/s, for 500 deg/s."""
-G = 0.02 * DEGREE * np.array([[1.0, -0.3, 0.2], [0.4, 0.9, -0.1], [0.0, 0.25, -1.2]])
-"""MEMS: some hundredths of a deg/s for 1 g."""
+G = EXAMPLE_SENSITIVITY
 
 
 def triad(seed: int, bias: float) -> ThermalModel:

@@ -23,12 +23,11 @@ from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.compensation import Compensation, compensate
-from triaxcal.model.terms import EXAMPLE_TERMS, RateTerm, Terms
+from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, RateTerm, Terms
 from triaxcal.unitfile import TemperatureSensor, UnitDescription
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
-TERM = RateTerm(np.array([0.021, -0.0075, 0.0003]), (-0.05, 0.08))
-"""Some mg of hysteresis at some K/min, which a real recording of a MEMS sensor shows."""
+TERM = EXAMPLE_RATE
 UNITS = {
     "24 bits": unit_of(sensor=COARSE),
     "inverse": unit_of(sensor=COARSE, method="inverse"),

@@ -42,7 +42,12 @@ class Coverage:
 
 
 def coverage(
-    units: int, stated: StatedUncertainty, imperfections: Imperfections, *, auto: bool
+    units: int,
+    stated: StatedUncertainty,
+    imperfections: Imperfections,
+    *,
+    auto: bool,
+    readings: int = 30,
 ) -> Coverage:
     """Over seeds 0 to units - 1, all constants and orientations at `TEMPS`.
 
@@ -62,7 +67,7 @@ def coverage(
     drift_degc = stated.thermometer_drift_degc or 0.0
     constants, forces = [], []
     for seed in range(units):
-        measurements = simulate(unit, truth, replace(plan, seed=seed, readings_per_dwell=30))
+        measurements = simulate(unit, truth, replace(plan, seed=seed, readings_per_dwell=readings))
         calibration = calibrate(unit, measurements)
         found = uncertainty(unit, measurements, calibration, None, TEMPS)
         at = calibration.thermal.constants_at
@@ -103,6 +108,13 @@ def test_intervals_of_1000_units_hold_the_truth(
     stated: StatedUncertainty, imperfections: Imperfections, auto: bool
 ) -> None:
     found = coverage(1000, stated, imperfections, auto=auto)
+    assert within(found), found
+
+
+@pytest.mark.slow
+def test_intervals_hold_with_three_readings_a_dwell() -> None:
+    nothing = StatedUncertainty(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    found = coverage(500, nothing, Imperfections(), auto=False, readings=3)
     assert within(found), found
 
 

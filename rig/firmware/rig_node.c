@@ -1,11 +1,11 @@
 /*
  * rig_node.c - the generated compensation as a node on the rig's bus.
  *
- * Takes RIG_TEMP, RIG_XY and RIG_Z, answers each sample with COMP_X, COMP_Y, COMP_Z of its
- * sequence number. Frames are packed and unpacked by the code that cantools makes of tilter.dbc;
- * frames with a wrong CRC or length are passed over.
+ * Takes RIG_TEMP, RIG_XY and RIG_Z, or RIG_FD, and answers each sample with COMP_X, COMP_Y, COMP_Z
+ * of its sequence number's low byte. Frames are packed and unpacked by the code that cantools makes
+ * of tilter.dbc; frames with a wrong CRC or length are passed over.
  *
- *     rig_node socket 7    on an inherited socket that carries struct can_frame
+ *     rig_node socket 7    on an inherited socket that carries struct can_frame and canfd_frame
  *     rig_node can vcan0   on a CAN device
  *
  * Ends with 0 when the socket is closed, 1 when it fails, 2 for a wrong command line.
@@ -116,11 +116,34 @@ static int take(node_t *node, const struct can_frame *frame)
     }
 }
 
+static int take_fd(node_t *node, const struct canfd_frame *frame)
+{
+    struct tilter_rig_fd_t sample;
+    int32_t raw[3];
+    int32_t accel[3];
+    uint32_t status;
+
+    if (frame->can_id != TILTER_RIG_FD_FRAME_ID || frame->len != TILTER_RIG_FD_LENGTH) {
+        return 0;
+    }
+    (void)tilter_rig_fd_unpack(&sample, frame->data, TILTER_RIG_FD_LENGTH);
+    if (sample.crc != rig_crc32(TILTER_RIG_FD_FRAME_ID, frame->data, TILTER_RIG_FD_LENGTH)) {
+        return 0;
+    }
+    node->temp_status = triax_set_temperature(&node->state, &TRIAX_CALIB, sample.temp_code);
+    raw[0] = sample.accel_x;
+    raw[1] = sample.accel_y;
+    raw[2] = sample.accel_z;
+    status = triax_apply(&node->state, raw, accel);
+    return answer(node, (uint8_t)(sample.sequence & 0xFFU), accel, status | node->temp_status);
+}
+
 static int open_can(const char *device)
 {
     struct sockaddr_can address;
     struct ifreq request;
     int size = 4 << 20;
+    int on = 1;
     int opened = socket(PF_CAN, SOCK_RAW, CAN_RAW);
 
     if (opened < 0) {
@@ -135,14 +158,19 @@ static int open_can(const char *device)
     address.can_family = AF_CAN;
     address.can_ifindex = request.ifr_ifindex;
     (void)setsockopt(opened, SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof size);
+    (void)setsockopt(opened, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
     return bind(opened, (struct sockaddr *)&address, sizeof address) == 0 ? opened : -1;
 }
 
 int main(int argc, char **argv)
 {
     node_t node;
-    struct can_frame frame;
+    union {
+        struct can_frame classic;
+        struct canfd_frame fd;
+    } frame;
     ssize_t size;
+    int failed;
 
     memset(&node, 0, sizeof node);
     if (argc != 3 || (strcmp(argv[1], "socket") != 0 && strcmp(argv[1], "can") != 0)) {
@@ -162,7 +190,13 @@ int main(int argc, char **argv)
         if (size < 0 && errno == EINTR) {
             continue;
         }
-        if (size < 0 || (size == (ssize_t)sizeof frame && take(&node, &frame) != 0)) {
+        failed = size < 0;
+        if (size == (ssize_t)sizeof frame.classic) {
+            failed = take(&node, &frame.classic);
+        } else if (size == (ssize_t)sizeof frame.fd) {
+            failed = take_fd(&node, &frame.fd);
+        }
+        if (failed != 0) {
             fprintf(stderr, "rig_node: %s: %s\n", argv[2], strerror(errno));
             return 1;
         }

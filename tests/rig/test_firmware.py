@@ -16,7 +16,9 @@ from triaxcal.delivery import deliver
 from triaxcal.errors import RefusedError
 from triaxcal.rig.dbc import REQUIRED
 from triaxcal.rig.e2e import frame_crc
+from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import exchange, packing_source, vectors
+from triaxcal.unitfile import read_unit
 
 FIRMWARE = REPO / "rig" / "firmware"
 
@@ -60,6 +62,70 @@ def test_the_node_answers_bit_for_bit(node, delivery):
     with node_on(node, None) as link:
         done = exchange(link, dbc(), temps, raw, python_routine(plan))
     assert done.samples == 5000
+
+
+def test_the_node_answers_can_fd_bit_for_bit(node, delivery):
+    plan = delivery.plan
+    temps, raw = vectors(2000, (plan.temp_min_code, plan.temp_max_code), 9)
+    with node_on(node, None) as link:
+        done = exchange(link, dbc(), temps, raw, python_routine(plan), "fd")
+    assert done.samples == 2000
+
+
+@pytest.fixture(scope="module")
+def wide_unit(tmp_path_factory):
+    """AT-SIM-BENCH with an ADC of 28 bits: the same readings in codes a sixteenth as large."""
+    folder = tmp_path_factory.mktemp("wide") / "AT-SIM-BENCH"
+    folder.mkdir()
+    unit = (REPO / "units" / "AT-SIM-BENCH" / "unit.toml").read_text()
+    (folder / "unit.toml").write_text(unit.replace("bits = 24", "bits = 28"))
+    lines = (REPO / "units" / "AT-SIM-BENCH" / "measurements.csv").read_text().splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("position"))
+    rows = [line.split(",") for line in lines[at + 1 :]]
+    wide = [
+        [*row[:2], *(repr(16 * float(v)) for v in row[2:5]), row[5],
+         *(repr(16 * float(v)) for v in row[6:])]
+        for row in rows
+    ]  # fmt: skip
+    text = "\n".join([lines[at], *(",".join(row) for row in wide)]) + "\n"
+    (folder / "measurements.csv").write_text(text)
+    return folder
+
+
+def wide_setup(folder, unit_folder, layout):
+    setup = short_setup(folder, layout=layout)
+    return Setup(unit_folder, read_unit(unit_folder), setup.plan, setup.dbc)
+
+
+def test_codes_of_more_than_24_bits_go_over_can_fd(tmp_path, wide_unit):
+    done = firmware_in_the_loop(wide_setup(tmp_path, wide_unit, "fd"), 2000, None, 4)
+    assert done.samples == 2000
+
+
+def test_codes_of_more_than_24_bits_do_not_fit_classic_frames(tmp_path, wide_unit):
+    with pytest.raises(RefusedError, match=r'bits: found 28; expected at most 24.*layout = "fd"'):
+        firmware_in_the_loop(wide_setup(tmp_path, wide_unit, "classic"), 10, None, 4)
+
+
+@pytest.mark.parametrize("place", [0, 3, 4, 12, 35, 47])
+def test_the_node_passes_over_a_spoiled_fd_frame(node, place):
+    layout = dbc().messages["RIG_FD"]
+    data = layout.pack({s: np.array([5]) for s in layout.signals if s != "Crc"})
+    data[0, place] ^= 0x10
+    payload = data[0].tobytes().ljust(64, b"\0")
+    with node_on(node, None) as link:
+        link.send(layout.frame_id.to_bytes(4, "little") + bytes([48, 0, 0, 0]) + payload)
+        # Its answer to the next, good sample is the first there is.
+        temps, raw = np.array([0], np.int32), np.zeros((1, 3), np.int32)
+        answers = []
+
+        def routine(_, codes):
+            answers.append(len(codes))
+            raise RefusedError("here", "the good one was answered")
+
+        with pytest.raises(RefusedError, match="the good one was answered"):
+            exchange(link, dbc(), temps, raw, routine, "fd")
+    assert answers == [1]
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import pty
+import re
 import select
 import struct
 import subprocess
@@ -12,6 +13,7 @@ import sys
 import termios
 import threading
 import time
+from dataclasses import replace
 from itertools import count
 
 import numpy as np
@@ -22,8 +24,11 @@ from test_cli_rig import bench_copy, triaxcal
 from triaxcal.cli.rig import rig
 from triaxcal.errors import RefusedError
 from triaxcal.rig.candump import parse
+from triaxcal.rig.check import findings
+from triaxcal.rig.frames import empty
 from triaxcal.rig.journal import read_journal
-from triaxcal.rig.recording import JOURNAL_FILE
+from triaxcal.rig.recording import JOURNAL_FILE, Recording
+from triaxcal.rig.runner import live
 from triaxcal.rig.samples import SampleDecoder
 from triaxcal.rig.sources import BusSource, messages_of, open_bus
 
@@ -93,6 +98,7 @@ def test_the_operators_keys(tmp_path):
     assert terminal.text.rindex("\x1b[?25h") > terminal.text.rindex("\x1b[?25l")
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_a_session_like_q(tmp_path):
     unit, setup = bench_copy(tmp_path), short_setup(tmp_path, temps="[20]")
     terminal = Terminal(["rig", "run", "--bus", "virtual", "--unit", unit, "--plain",
@@ -188,3 +194,57 @@ def test_a_bus_that_breaks_is_told():
     bus.shutdown()
     with pytest.raises(RefusedError, match=f"{name}: cannot be read: .*`triaxcal rig resume`"):
         BusSource(bus, name).read()
+
+
+class Given:
+    """A source of given frames, the same second again and again."""
+
+    name = "given"
+
+    def __init__(self, frames):
+        self.frames, self.seconds = frames, 0
+
+    def read(self):
+        self.seconds += 1
+        late = self.frames.t_ns + self.seconds * 10**9
+        return replace(self.frames, t_ns=late)
+
+    def notes(self):
+        return []
+
+    def close(self):
+        pass
+
+
+def under_other_ids(frames):
+    return replace(frames, can_id=frames.can_id + np.uint32(0x40))
+
+
+def test_frames_of_another_dbc_are_told_in_a_session(tmp_path, monkeypatch):
+    monkeypatch.setattr("triaxcal.rig.runner._NOT_DECODED_S", 0.0)
+    setup = short_setup(tmp_path)
+    taken = Recording(setup, tmp_path / "001", "given")
+    source = Given(under_other_ids(rig_of(setup).advance()))
+    notes = [note for tick, _ in zip(live(taken, source, list), range(20), strict=False)
+             for note in tick.notes]  # fmt: skip
+    taken.close()
+    assert len(notes) == 1
+    assert re.fullmatch(
+        r"\d+ frames and no sample among them: wrong DBC or layout, another rig, or two nodes with "
+        r"one ID; try `triaxcal rig check`",
+        notes[0],
+    )
+
+
+def test_check_names_the_ids_of_another_dbc(tmp_path):
+    setup = short_setup(tmp_path)
+    frames = under_other_ids(rig_of(setup).advance())
+    texts = {f.text: f.good for f in findings(setup, frames, "given", [])}
+    assert texts["IDs that are not the rig's: 0x140, 0x141, 0x142, 0x143"]
+    assert not texts["the rig has not said its serial number (RIG_IDENT)"]
+    assert not texts["211 frames, 0 samples: wrong DBC, layout or rig"]
+
+
+def test_check_of_silence(tmp_path):
+    (found,) = findings(short_setup(tmp_path), empty(), "given", [])
+    assert (found.good, found.text) == (False, "given: no frames at all")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from triaxcal.errors import RefusedError
+from triaxcal.jsontext import json_bytes
 from triaxcal.verify import campaign
 from triaxcal.verify.campaign import CHECKS, exit_code, verify_files
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
@@ -82,8 +83,8 @@ def test_a_killed_tool_is_broken(tmp_path: Path) -> None:
 BASE = {"format": 1, "unit": "U", "limit": 0.1, "text": "µg", "nested": {"b": [1, 2.5e-09]}}
 
 
-def content(document: object) -> bytes:
-    return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()
+def content(document: dict[str, object]) -> bytes:
+    return json_bytes(document)
 
 
 def test_record_keeps_every_other_byte(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ static int32_t s32(uint32_t bits)
     return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits : (-1 - (int32_t)inverted);
 }
 
-#if TRIAX_ARITHMETIC != TRIAX_LIMBS
+#if TRIAX_ARITHMETIC == TRIAX_PORTABLE
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
 static int32_t high_word(int64_t value)
 {
@@ -34,13 +34,15 @@ static int32_t asr32(int32_t value, uint32_t shift)
 }
 #endif
 
-#if TRIAX_ARITHMETIC == TRIAX_LIMBS
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 /* value = high_half 2^16 + low_half, 0 <= low_half < 2^16. */
 static int32_t high_half(int32_t value)
 {
     return asr32(value, 16u);
 }
+#endif
 
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 static int32_t low_bits(int32_t value, uint32_t mask)
 {
     const uint32_t bits = (uint32_t)value & mask;
@@ -58,7 +60,7 @@ static int64_t magnitude(int32_t value)
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
-#if TRIAX_ARITHMETIC != TRIAX_LIMBS
+#if TRIAX_ARITHMETIC == TRIAX_PORTABLE
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
@@ -74,7 +76,8 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
 }
 
 /* A column at a time: the loop's overhead is shared by three functions. */
-static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                          int32_t x_q31)
 {
     uint32_t j;
     for (j = 0u; j < 4u; j++) {
@@ -83,20 +86,13 @@ static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int
         row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
     }
 }
-#else
+#endif
+
+#if TRIAX_ARITHMETIC == TRIAX_LIMBS
 /* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
 static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
 {
     return c + ((x_high * high_half(p)) + high_half(x_high * low_half(p)));
-}
-
-/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
-static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
-{
-    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
-    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
-    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
-    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
 }
 
 static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
@@ -105,6 +101,17 @@ static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
     p = short_step(c[1], x_high, p);
     p = short_step(c[0], x_high, p);
     return p;
+}
+#endif
+
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
+/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
+static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
+{
+    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
+    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
+    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
+    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
 }
 
 static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, int32_t x_low)
@@ -115,38 +122,448 @@ static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, i
     return p;
 }
 
+static void long_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                      int32_t x_high, int32_t x_low)
+{
+    uint32_t j;
+    for (j = 0u; j < 4u; j++) {
+        row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
+        row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
+        row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
+    }
+}
+#endif
+
+#if TRIAX_ARITHMETIC == TRIAX_LIMBS
 /* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
-static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                          int32_t x_q31)
 {
     const int32_t x_high = high_half(x_q31);
     const int32_t x_low = low_half(x_q31);
-    uint32_t j;
 
     if (x_low == 0) {
+        uint32_t j;
         for (j = 0u; j < 4u; j++) {
             row[0][j] = short_evaluate(segment->coefficient[j], x_high);
             row[1][j] = short_evaluate(segment->coefficient[4u + j], x_high);
             row[2][j] = short_evaluate(segment->coefficient[8u + j], x_high);
         }
     } else {
-        for (j = 0u; j < 4u; j++) {
-            row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
-            row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
-            row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
+        long_rows(row, segment, x_high, x_low);
+    }
+}
+#endif
+
+#if TRIAX_ARITHMETIC == TRIAX_THUMB2
+/* Horner's rule row by row; the offset 2^29 is what the sum of triax_apply starts from. */
+static void evaluate_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_q31)
+{
+    const int32_t *c = segment->coefficient[0];
+    int32_t *row = state->row[0];
+    uint32_t left = 3u;
+#if defined(__ARM_FEATURE_DSP)
+    __asm__ volatile(
+        "1:\n\t"
+        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smmla r12, r11, %[x], r10\n\t"
+        "smmla r4, r12, %[x], r9\n\t"
+        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smmla r12, r11, %[x], r10\n\t"
+        "smmla r5, r12, %[x], r9\n\t"
+        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smmla r12, r11, %[x], r10\n\t"
+        "smmla r6, r12, %[x], r9\n\t"
+        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smmla r12, r11, %[x], r10\n\t"
+        "smmla r9, r12, %[x], r9\n\t"
+        "lsl r8, r9, #29\n\t"
+        "asr r9, r9, #3\n\t"
+        "stmia %[row]!, {r4, r5, r6, r8, r9}\n\t"
+        "subs %[left], %[left], #1\n\t"
+        "bne 1b"
+        : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
+        : [x] "r"(x_q31)
+        : "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "cc", "memory");
+#else
+    __asm__ volatile(
+        "1:\n\t"
+        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smull r8, r12, r11, %[x]\n\t"
+        "add r12, r10, r12\n\t"
+        "smull r8, r12, r12, %[x]\n\t"
+        "add r4, r9, r12\n\t"
+        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smull r8, r12, r11, %[x]\n\t"
+        "add r12, r10, r12\n\t"
+        "smull r8, r12, r12, %[x]\n\t"
+        "add r5, r9, r12\n\t"
+        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smull r8, r12, r11, %[x]\n\t"
+        "add r12, r10, r12\n\t"
+        "smull r8, r12, r12, %[x]\n\t"
+        "add r6, r9, r12\n\t"
+        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smull r8, r12, r11, %[x]\n\t"
+        "add r12, r10, r12\n\t"
+        "smull r8, r12, r12, %[x]\n\t"
+        "add r9, r9, r12\n\t"
+        "lsl r8, r9, #29\n\t"
+        "asr r9, r9, #3\n\t"
+        "stmia %[row]!, {r4, r5, r6, r8, r9}\n\t"
+        "subs %[left], %[left], #1\n\t"
+        "bne 1b"
+        : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
+        : [x] "r"(x_q31)
+        : "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "cc", "memory");
+#endif
+}
+
+/* The sum starts from the offset. r0 to r4 are for operands, r7 for a frame pointer. */
+static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz,
+                       int32_t accel[3])
+{
+    const int32_t *row = state->row[0];
+    __asm__ volatile(
+        "ldmia %[row]!, {r5, r6, r8, r9, r10}\n\t"
+        "smlal r9, r10, r5, %[ux]\n\t"
+        "smlal r9, r10, r6, %[uy]\n\t"
+        "smlal r9, r10, r8, %[uz]\n\t"
+        "ldmia %[row]!, {r5, r6, r8, r9, r11}\n\t"
+        "smlal r9, r11, r5, %[ux]\n\t"
+        "smlal r9, r11, r6, %[uy]\n\t"
+        "smlal r9, r11, r8, %[uz]\n\t"
+        "ldmia %[row]!, {r5, r6, r8, r9, r12}\n\t"
+        "smlal r9, r12, r5, %[ux]\n\t"
+        "smlal r9, r12, r6, %[uy]\n\t"
+        "smlal r9, r12, r8, %[uz]\n\t"
+        "stmia %[accel], {r10, r11, r12}"
+        : [row] "+&r"(row)
+        : [ux] "r"(ux), [uy] "r"(uy), [uz] "r"(uz), [accel] "r"(accel)
+        : "r5", "r6", "r8", "r9", "r10", "r11", "r12", "memory");
+}
+#endif
+
+#if TRIAX_ARITHMETIC == TRIAX_THUMB1
+#if defined(__ARM_BIG_ENDIAN)
+#error "TRIAX_THUMB1 takes the lower halves of words at their first byte: use TRIAX_LIMBS"
+#endif
+
+/* The gains over 2^16, floored, so that triax_apply need not take them apart. */
+static void complete_rows(int32_t row[3][TRIAX_ROW_WORDS])
+{
+    uint32_t i;
+    for (i = 0u; i < 3u; i++) {
+        uint32_t j;
+        for (j = 0u; j < 3u; j++) {
+            row[i][4u + j] = high_half(row[i][j]);
         }
     }
+}
+
+/* Horner's rule by halves, row by row, where the lower half of x is 0. */
+static void short_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_high)
+{
+    const int32_t *const first = segment->coefficient[0];
+    int32_t *const first_row = state->row[0];
+    register const int32_t *c __asm__("r0") = first;
+    register int32_t *row __asm__("r1") = first_row;
+    register int32_t x __asm__("r2") = x_high;
+    __asm__ volatile(
+        ".syntax unified\n\t"
+        "movs r3, #3\n\t"
+        "1:\n\t"
+        "ldr r4, [r0, #8]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #4]\n\t"
+        "adds r4, r4, r5\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #0]\n\t"
+        "adds r4, r4, r5\n\t"
+        "str r4, [r1, #0]\n\t"
+        "asrs r4, r4, #16\n\t"
+        "str r4, [r1, #16]\n\t"
+        "ldr r4, [r0, #20]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #16]\n\t"
+        "adds r4, r4, r5\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #12]\n\t"
+        "adds r4, r4, r5\n\t"
+        "str r4, [r1, #4]\n\t"
+        "asrs r4, r4, #16\n\t"
+        "str r4, [r1, #20]\n\t"
+        "ldr r4, [r0, #32]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #28]\n\t"
+        "adds r4, r4, r5\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #24]\n\t"
+        "adds r4, r4, r5\n\t"
+        "str r4, [r1, #8]\n\t"
+        "asrs r4, r4, #16\n\t"
+        "str r4, [r1, #24]\n\t"
+        "ldr r4, [r0, #44]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #40]\n\t"
+        "adds r4, r4, r5\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #36]\n\t"
+        "adds r4, r4, r5\n\t"
+        "adds r0, #48\n\t"
+        "str r4, [r1, #12]\n\t"
+        "adds r1, #28\n\t"
+        "subs r3, #1\n\t"
+        "bne 1b"
+        : "+&r"(c), "+&r"(row)
+        : "r"(x)
+        : "r3", "r4", "r5", "cc", "memory");
+}
+
+static void evaluate_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_q31)
+{
+    const int32_t x_high = high_half(x_q31);
+    const int32_t x_low = low_half(x_q31);
+    if (x_low == 0) {
+        short_state(state, segment, x_high);
+    } else {
+        long_rows(state->row, segment, x_high, x_low);
+        complete_rows(state->row);
+    }
+}
+
+/*
+ * The limb form: gains in halves, codes in parts of 11 and 13 bits.
+ * Partial sums come in rising order of their weight; what is below the next is shifted out. r7 is
+ * saved by hand because it may be a frame pointer; results wait on the stack because accel may be
+ * raw_code.
+ */
+static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
+{
+    const int32_t *const first_row = state->row[0];
+    register int32_t *out __asm__("r2") = accel;
+    register const int32_t *row __asm__("r0") = first_row;
+    register int32_t x __asm__("r3") = ux;
+    register int32_t y __asm__("r4") = uy;
+    register int32_t z __asm__("r1") = uz;
+    __asm__ volatile(
+        ".syntax unified\n\t"
+        "push {r0, r1, r2, r7}\n\t"
+        "lsls r2, r3, #21\n\t"
+        "lsrs r2, r2, #21\n\t"
+        "asrs r3, r3, #11\n\t"
+        "lsls r5, r4, #21\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "asrs r4, r4, #11\n\t"
+        "lsls r7, r1, #21\n\t"
+        "lsrs r7, r7, #21\n\t"
+        "asrs r1, r1, #11\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r2, r6\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #11\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #8\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #12]\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r3, r6\n\t"
+        "mov lr, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add lr, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, lr\n\t"
+"lsls r6, r6, #3\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #3\n\t"
+        "str r6, [sp, #0]\n\t"
+        "adds r0, #28\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r2, r6\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #11\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #8\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #12]\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r3, r6\n\t"
+        "mov lr, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add lr, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, lr\n\t"
+"lsls r6, r6, #3\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #3\n\t"
+        "str r6, [sp, #4]\n\t"
+        "adds r0, #28\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r2, r6\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #11\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #8\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #12]\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r3, r6\n\t"
+        "mov lr, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add lr, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, lr\n\t"
+"lsls r6, r6, #3\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #3\n\t"
+        "pop {r0, r1, r2, r7}\n\t"
+        "stmia r2!, {r0, r1, r6}"
+        : "+&r"(row), "+&r"(x), "+&r"(y), "+&r"(z), "+&r"(out)
+        :
+        : "r5", "r6", "r12", "lr", "cc", "memory");
 }
 #endif
 
 static int32_t clamp_raw(int32_t code)
 {
     int32_t result = code;
+#if TRIAX_ARITHMETIC == TRIAX_THUMB2
+    __asm__("ssat %0, #24, %1" : "=r"(result) : "r"(code));
+#else
     if (result < TRIAX_RAW_MIN) {
         result = TRIAX_RAW_MIN;
     }
     if (result > TRIAX_RAW_MAX) {
         result = TRIAX_RAW_MAX;
     }
+#endif
     return result;
 }
 
@@ -155,6 +572,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
+    int32_t x_q31;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -164,7 +582,12 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
+    x_q31 = (code - segment->origin_code) * segment->gain;
+#if (TRIAX_ARITHMETIC == TRIAX_THUMB2) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
+    evaluate_state(state, segment, x_q31);
+#else
+    evaluate_rows(state->row, segment, x_q31);
+#endif
     return status;
 }
 
@@ -227,35 +650,6 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
         accel[i] = asr32(s32(h), 3u);
     }
 }
-#else
-/* The portable form in registers. r0 to r4 are left to the operands, r7 to a frame pointer. */
-static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
-{
-    const int32_t *row = state->row[0];
-    __asm__ volatile(
-        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
-        "smull r8, r12, r8, %[ux]\n\t"
-        "smlal r8, r12, r9, %[uy]\n\t"
-        "smlal r8, r12, r10, %[uz]\n\t"
-        "add r5, r11, r12\n\t"
-        "asr r5, r5, #3\n\t"
-        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
-        "smull r8, r12, r8, %[ux]\n\t"
-        "smlal r8, r12, r9, %[uy]\n\t"
-        "smlal r8, r12, r10, %[uz]\n\t"
-        "add r6, r11, r12\n\t"
-        "asr r6, r6, #3\n\t"
-        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
-        "smull r8, r12, r8, %[ux]\n\t"
-        "smlal r8, r12, r9, %[uy]\n\t"
-        "smlal r8, r12, r10, %[uz]\n\t"
-        "add r12, r11, r12\n\t"
-        "asr r12, r12, #3\n\t"
-        "stmia %[accel], {r5, r6, r12}"
-        : [row] "+&r"(row)
-        : [ux] "r"(ux), [uy] "r"(uy), [uz] "r"(uz), [accel] "r"(accel)
-        : "r5", "r6", "r8", "r9", "r10", "r11", "r12", "memory");
-}
 #endif
 
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3])
@@ -273,11 +667,16 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
         uz = clamp_raw(uz);
         status = TRIAX_STATUS_RAW_RANGE;
     }
-#if TRIAX_ARITHMETIC != TRIAX_LIMBS
+#if TRIAX_ARITHMETIC == TRIAX_PORTABLE
     /* Left-justified: |u| 2^8 <= 2^31. */
     ux *= 256;
     uy *= 256;
     uz *= 256;
+#elif TRIAX_ARITHMETIC == TRIAX_THUMB2
+    /* 3 bits fewer: the high word of a sum is then shifted right already. */
+    ux *= 32;
+    uy *= 32;
+    uz *= 32;
 #endif
     apply_rows(state, ux, uy, uz, accel);
     return status;

@@ -22,12 +22,13 @@ extern "C" {
 /*
  * How products are formed; every choice gives the same bits. TRIAX_PORTABLE multiplies in int64_t
  * and suits every core. TRIAX_LIMBS multiplies halves of words, for cores without a 32x32->64
- * multiplication (Cortex-M0, M0+, M1). TRIAX_THUMB2 has triax_apply in assembly for Cortex-M3, M4,
- * M7, M33 and GNU-compatible compilers. To choose, say -DTRIAX_ARITHMETIC=1.
+ * multiplication. TRIAX_THUMB2 (Cortex-M3, M4, M7, M33) and TRIAX_THUMB1 (Cortex-M0, M0+, M1) are
+ * assembly for GNU-compatible compilers. To choose, say -DTRIAX_ARITHMETIC=2 for every file.
  */
 #define TRIAX_PORTABLE 0
 #define TRIAX_LIMBS 1
 #define TRIAX_THUMB2 2
+#define TRIAX_THUMB1 3
 #ifndef TRIAX_ARITHMETIC
 #define TRIAX_ARITHMETIC TRIAX_PORTABLE
 #endif
@@ -61,9 +62,18 @@ typedef struct {
     triax_segment_t segment[TRIAX_SEGMENTS];
 } triax_calib_t;
 
+/* Words of a row of the state; those beyond 4 are the assembly's own. */
+#if TRIAX_ARITHMETIC == TRIAX_THUMB2
+#define TRIAX_ROW_WORDS 5
+#elif TRIAX_ARITHMETIC == TRIAX_THUMB1
+#define TRIAX_ROW_WORDS 7
+#else
+#define TRIAX_ROW_WORDS 4
+#endif
+
 /* Gains for raw x, y, z and offset of each axis, at the temperature last set. */
 typedef struct {
-    int32_t row[3][4];
+    int32_t row[3][TRIAX_ROW_WORDS];
 } triax_state_t;
 
 /*

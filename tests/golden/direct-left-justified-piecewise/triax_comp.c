@@ -18,11 +18,13 @@ static int32_t s32(uint32_t bits)
     return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits : (-1 - (int32_t)inverted);
 }
 
+#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_LIMBS)
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
 static int32_t high_word(int64_t value)
 {
     return (value < 0) ? (-1 - (int32_t)(~value >> 32)) : (int32_t)(value >> 32);
 }
+#endif
 
 #if TRIAX_ARITHMETIC != TRIAX_THUMB2
 /* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
@@ -32,13 +34,15 @@ static int32_t asr32(int32_t value, uint32_t shift)
 }
 #endif
 
-#if TRIAX_ARITHMETIC == TRIAX_LIMBS
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 /* value = high_half 2^16 + low_half, 0 <= low_half < 2^16. */
 static int32_t high_half(int32_t value)
 {
     return asr32(value, 16u);
 }
+#endif
 
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 static int32_t low_bits(int32_t value, uint32_t mask)
 {
     const uint32_t bits = (uint32_t)value & mask;
@@ -56,7 +60,7 @@ static int64_t magnitude(int32_t value)
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
-#if TRIAX_ARITHMETIC != TRIAX_LIMBS
+#if TRIAX_ARITHMETIC == TRIAX_PORTABLE
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
@@ -71,7 +75,8 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
 }
 
 /* A column at a time: the loop's overhead is shared by three functions. */
-static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                          int32_t x_q31)
 {
     uint32_t j;
     for (j = 0u; j < 4u; j++) {
@@ -80,13 +85,24 @@ static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int
         row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
     }
 }
-#else
+#endif
+
+#if TRIAX_ARITHMETIC == TRIAX_LIMBS
 /* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
 static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
 {
     return c + ((x_high * high_half(p)) + high_half(x_high * low_half(p)));
 }
 
+static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
+{
+    int32_t p = c[1];
+    p = short_step(c[0], x_high, p);
+    return p;
+}
+#endif
+
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 /* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
 static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
 {
@@ -96,13 +112,6 @@ static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
     return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
 }
 
-static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
-{
-    int32_t p = c[1];
-    p = short_step(c[0], x_high, p);
-    return p;
-}
-
 static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, int32_t x_low)
 {
     int32_t p = c[1];
@@ -110,26 +119,474 @@ static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, i
     return p;
 }
 
+static void long_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                      int32_t x_high, int32_t x_low)
+{
+    uint32_t j;
+    for (j = 0u; j < 4u; j++) {
+        row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
+        row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
+        row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
+    }
+}
+#endif
+
+#if TRIAX_ARITHMETIC == TRIAX_LIMBS
 /* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
-static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                          int32_t x_q31)
 {
     const int32_t x_high = high_half(x_q31);
     const int32_t x_low = low_half(x_q31);
-    uint32_t j;
 
     if (x_low == 0) {
+        uint32_t j;
         for (j = 0u; j < 4u; j++) {
             row[0][j] = short_evaluate(segment->coefficient[j], x_high);
             row[1][j] = short_evaluate(segment->coefficient[4u + j], x_high);
             row[2][j] = short_evaluate(segment->coefficient[8u + j], x_high);
         }
     } else {
-        for (j = 0u; j < 4u; j++) {
-            row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
-            row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
-            row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
+        long_rows(row, segment, x_high, x_low);
+    }
+}
+#endif
+
+#if TRIAX_ARITHMETIC == TRIAX_THUMB2
+/* Horner's rule row by row; the offset 2^32 is what the sum of triax_apply starts from. */
+static void evaluate_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_q31)
+{
+    const int32_t *c = segment->coefficient[0];
+    int32_t *row = state->row[0];
+    uint32_t left = 3u;
+#if defined(__ARM_FEATURE_DSP)
+    __asm__ volatile(
+        "1:\n\t"
+        "ldmia %[c]!, {r9, r10}\n\t"
+        "smmla r4, r10, %[x], r9\n\t"
+        "ldmia %[c]!, {r9, r10}\n\t"
+        "smmla r5, r10, %[x], r9\n\t"
+        "ldmia %[c]!, {r9, r10}\n\t"
+        "smmla r6, r10, %[x], r9\n\t"
+        "ldmia %[c]!, {r9, r10}\n\t"
+        "smmla r9, r10, %[x], r9\n\t"
+        "mov r8, #0\n\t"
+        "stmia %[row]!, {r4, r5, r6, r8, r9}\n\t"
+        "subs %[left], %[left], #1\n\t"
+        "bne 1b"
+        : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
+        : [x] "r"(x_q31)
+        : "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "cc", "memory");
+#else
+    __asm__ volatile(
+        "1:\n\t"
+        "ldmia %[c]!, {r9, r10}\n\t"
+        "smull r8, r12, r10, %[x]\n\t"
+        "add r4, r9, r12\n\t"
+        "ldmia %[c]!, {r9, r10}\n\t"
+        "smull r8, r12, r10, %[x]\n\t"
+        "add r5, r9, r12\n\t"
+        "ldmia %[c]!, {r9, r10}\n\t"
+        "smull r8, r12, r10, %[x]\n\t"
+        "add r6, r9, r12\n\t"
+        "ldmia %[c]!, {r9, r10}\n\t"
+        "smull r8, r12, r10, %[x]\n\t"
+        "add r9, r9, r12\n\t"
+        "mov r8, #0\n\t"
+        "stmia %[row]!, {r4, r5, r6, r8, r9}\n\t"
+        "subs %[left], %[left], #1\n\t"
+        "bne 1b"
+        : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
+        : [x] "r"(x_q31)
+        : "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "cc", "memory");
+#endif
+}
+
+/* The sum starts from the offset. r0 to r2 are for operands, r7 for a frame pointer. */
+static void apply_rows(const triax_state_t *state, const int32_t raw_code[3],
+                       int32_t accel[3])
+{
+    const int32_t *row = state->row[0];
+    __asm__ volatile(
+        "ldmia %[raw], {r3, r4, lr}\n\t"
+        "ldmia %[row]!, {r5, r6, r8, r9, r10}\n\t"
+        "smlal r9, r10, r5, r3\n\t"
+        "smlal r9, r10, r6, r4\n\t"
+        "smlal r9, r10, r8, lr\n\t"
+        "asr r10, r10, #3\n\t"
+        "ldmia %[row]!, {r5, r6, r8, r9, r11}\n\t"
+        "smlal r9, r11, r5, r3\n\t"
+        "smlal r9, r11, r6, r4\n\t"
+        "smlal r9, r11, r8, lr\n\t"
+        "asr r11, r11, #3\n\t"
+        "ldmia %[row]!, {r5, r6, r8, r9, r12}\n\t"
+        "smlal r9, r12, r5, r3\n\t"
+        "smlal r9, r12, r6, r4\n\t"
+        "smlal r9, r12, r8, lr\n\t"
+        "asr r12, r12, #3\n\t"
+        "stmia %[accel], {r10, r11, r12}"
+        : [row] "+&r"(row)
+        : [raw] "r"(raw_code), [accel] "r"(accel)
+        : "r3", "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "lr", "memory");
+}
+#endif
+
+#if TRIAX_ARITHMETIC == TRIAX_THUMB1
+#if defined(__ARM_BIG_ENDIAN)
+#error "TRIAX_THUMB1 takes the lower halves of words at their first byte: use TRIAX_LIMBS"
+#endif
+
+/* Gains as 11 lower, 11 middle and 10 higher bits, so that triax_apply need not take them apart. */
+static void complete_rows(int32_t row[3][TRIAX_ROW_WORDS])
+{
+    uint32_t i;
+    for (i = 0u; i < 3u; i++) {
+        uint32_t j;
+        for (j = 0u; j < 3u; j++) {
+            const int32_t gain = row[i][j];
+            const uint32_t lower = (uint32_t)gain & 0x7FFu;
+            const uint32_t middle = ((uint32_t)gain >> 11) & 0x7FFu;
+            row[i][j] = (int32_t)lower;
+            row[i][4u + j] = (int32_t)middle;
+            row[i][7u + j] = asr32(gain, 22u);
         }
     }
+}
+
+/* Horner's rule by halves, row by row, where the lower half of x is 0. */
+static void short_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_high)
+{
+    const int32_t *const first = segment->coefficient[0];
+    int32_t *const first_row = state->row[0];
+    register const int32_t *c __asm__("r0") = first;
+    register int32_t *row __asm__("r1") = first_row;
+    register int32_t x __asm__("r2") = x_high;
+    __asm__ volatile(
+        ".syntax unified\n\t"
+        "movs r3, #3\n\t"
+        "1:\n\t"
+        "ldr r4, [r0, #4]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #0]\n\t"
+        "adds r4, r4, r5\n\t"
+        "lsls r5, r4, #21\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #0]\n\t"
+        "lsls r5, r4, #10\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #16]\n\t"
+        "asrs r4, r4, #22\n\t"
+        "str r4, [r1, #28]\n\t"
+        "ldr r4, [r0, #12]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #8]\n\t"
+        "adds r4, r4, r5\n\t"
+        "lsls r5, r4, #21\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #4]\n\t"
+        "lsls r5, r4, #10\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #20]\n\t"
+        "asrs r4, r4, #22\n\t"
+        "str r4, [r1, #32]\n\t"
+        "ldr r4, [r0, #20]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #16]\n\t"
+        "adds r4, r4, r5\n\t"
+        "lsls r5, r4, #21\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #8]\n\t"
+        "lsls r5, r4, #10\n\t"
+        "lsrs r5, r5, #21\n\t"
+        "str r5, [r1, #24]\n\t"
+        "asrs r4, r4, #22\n\t"
+        "str r4, [r1, #36]\n\t"
+        "ldr r4, [r0, #28]\n\t"
+        "asrs r5, r4, #16\n\t"
+        "muls r5, r2, r5\n\t"
+        "uxth r4, r4\n\t"
+        "muls r4, r2, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "adds r4, r4, r5\n\t"
+        "ldr r5, [r0, #24]\n\t"
+        "adds r4, r4, r5\n\t"
+        "adds r0, #32\n\t"
+        "str r4, [r1, #12]\n\t"
+        "adds r1, #40\n\t"
+        "subs r3, #1\n\t"
+        "bne 1b"
+        : "+&r"(c), "+&r"(row)
+        : "r"(x)
+        : "r3", "r4", "r5", "cc", "memory");
+}
+
+static void evaluate_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_q31)
+{
+    const int32_t x_high = high_half(x_q31);
+    const int32_t x_low = low_half(x_q31);
+    if (x_low == 0) {
+        short_state(state, segment, x_high);
+    } else {
+        long_rows(state->row, segment, x_high, x_low);
+        complete_rows(state->row);
+    }
+}
+
+/*
+ * Gains in three limbs of 11, 11 and 10 bits, codes in halves: no sum of three products, with what
+ * is carried into it, leaves int32_t.
+ * Partial sums come in rising order of their weight; what is below the next is shifted out. r7 is
+ * saved by hand because it may be a frame pointer; results wait on the stack because accel may be
+ * raw_code.
+ */
+static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
+{
+    const int32_t *const first_row = state->row[0];
+    register int32_t *out __asm__("r2") = accel;
+    register const int32_t *row __asm__("r0") = first_row;
+    register int32_t x __asm__("r3") = ux;
+    register int32_t y __asm__("r4") = uy;
+    register int32_t z __asm__("r1") = uz;
+    __asm__ volatile(
+        ".syntax unified\n\t"
+        "push {r0, r1, r2, r7}\n\t"
+        "uxth r2, r3\n\t"
+        "asrs r3, r3, #16\n\t"
+        "uxth r5, r4\n\t"
+        "asrs r4, r4, #16\n\t"
+        "uxth r7, r1\n\t"
+        "asrs r1, r1, #16\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r2, r6\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #11\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #6\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #12]\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r3, r6\n\t"
+        "mov lr, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add lr, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, lr\n\t"
+"lsls r6, r6, #6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #3\n\t"
+        "str r6, [sp, #0]\n\t"
+        "adds r0, #40\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r2, r6\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #11\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #6\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #12]\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r3, r6\n\t"
+        "mov lr, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add lr, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, lr\n\t"
+"lsls r6, r6, #6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #3\n\t"
+        "str r6, [sp, #4]\n\t"
+        "adds r0, #40\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r2, r6\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #11\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldrh r6, [r0, #0]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #4]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldrh r6, [r0, #8]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #6\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r2, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r5, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r7, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #16]\n\t"
+        "muls r6, r3, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #20]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #24]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #5\n\t"
+        "mov r12, r6\n\t"
+        "ldr r6, [r0, #12]\n\t"
+        "add r12, r6\n\t"
+        "ldr r6, [r0, #28]\n\t"
+        "muls r6, r3, r6\n\t"
+        "mov lr, r6\n\t"
+        "ldr r6, [r0, #32]\n\t"
+        "muls r6, r4, r6\n\t"
+        "add lr, r6\n\t"
+        "ldr r6, [r0, #36]\n\t"
+        "muls r6, r1, r6\n\t"
+        "add r6, lr\n\t"
+"lsls r6, r6, #6\n\t"
+        "add r6, r12\n\t"
+        "asrs r6, r6, #3\n\t"
+        "pop {r0, r1, r2, r7}\n\t"
+        "stmia r2!, {r0, r1, r6}"
+        : "+&r"(row), "+&r"(x), "+&r"(y), "+&r"(z), "+&r"(out)
+        :
+        : "r5", "r6", "r12", "lr", "cc", "memory");
 }
 #endif
 
@@ -138,6 +595,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
+    int32_t x_q31;
     uint32_t i;
 
     if (code < calib->temp_min_code) {
@@ -153,11 +611,16 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
             segment = &calib->segment[i];
         }
     }
-    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
+    x_q31 = (code - segment->origin_code) * segment->gain;
+#if (TRIAX_ARITHMETIC == TRIAX_THUMB2) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
+    evaluate_state(state, segment, x_q31);
+#else
+    evaluate_rows(state->row, segment, x_q31);
+#endif
     return status;
 }
 
-#if TRIAX_ARITHMETIC != TRIAX_THUMB2
+#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_LIMBS)
 /* The offset holds half an output LSB; floor(floor(v / 2^32) / 2^3) = floor(v / 2^35). */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
 {
@@ -174,45 +637,17 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
     accel[1] = y;
     accel[2] = z;
 }
-#else
-/* The portable form in registers. r0 to r4 are left to the operands, r7 to a frame pointer. */
-static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
-{
-    const int32_t *row = state->row[0];
-    __asm__ volatile(
-        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
-        "smull r8, r12, r8, %[ux]\n\t"
-        "smlal r8, r12, r9, %[uy]\n\t"
-        "smlal r8, r12, r10, %[uz]\n\t"
-        "add r5, r11, r12\n\t"
-        "asr r5, r5, #3\n\t"
-        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
-        "smull r8, r12, r8, %[ux]\n\t"
-        "smlal r8, r12, r9, %[uy]\n\t"
-        "smlal r8, r12, r10, %[uz]\n\t"
-        "add r6, r11, r12\n\t"
-        "asr r6, r6, #3\n\t"
-        "ldmia %[row]!, {r8, r9, r10, r11}\n\t"
-        "smull r8, r12, r8, %[ux]\n\t"
-        "smlal r8, r12, r9, %[uy]\n\t"
-        "smlal r8, r12, r10, %[uz]\n\t"
-        "add r12, r11, r12\n\t"
-        "asr r12, r12, #3\n\t"
-        "stmia %[accel], {r5, r6, r12}"
-        : [row] "+&r"(row)
-        : [ux] "r"(ux), [uy] "r"(uy), [uz] "r"(uz), [accel] "r"(accel)
-        : "r5", "r6", "r8", "r9", "r10", "r11", "r12", "memory");
-}
 #endif
 
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3])
 {
     uint32_t status = TRIAX_STATUS_OK;
-    int32_t ux = raw_code[0];
-    int32_t uy = raw_code[1];
-    int32_t uz = raw_code[2];
 
-    apply_rows(state, ux, uy, uz, accel);
+#if TRIAX_ARITHMETIC == TRIAX_THUMB2
+    apply_rows(state, raw_code, accel);
+#else
+    apply_rows(state, raw_code[0], raw_code[1], raw_code[2], accel);
+#endif
     return status;
 }
 

@@ -30,13 +30,15 @@ static int32_t asr32(int32_t value, uint32_t shift)
     return (value < 0) ? (~(~value >> shift)) : (value >> shift);
 }
 
-#if TRIAX_ARITHMETIC == TRIAX_LIMBS
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 /* value = high_half 2^16 + low_half, 0 <= low_half < 2^16. */
 static int32_t high_half(int32_t value)
 {
     return asr32(value, 16u);
 }
+#endif
 
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 static int32_t low_bits(int32_t value, uint32_t mask)
 {
     const uint32_t bits = (uint32_t)value & mask;
@@ -54,7 +56,7 @@ static int64_t magnitude(int32_t value)
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
-#if TRIAX_ARITHMETIC != TRIAX_LIMBS
+#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_THUMB2)
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
@@ -70,7 +72,8 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
 }
 
 /* A column at a time: the loop's overhead is shared by three functions. */
-static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                          int32_t x_q31)
 {
     uint32_t j;
     for (j = 0u; j < 4u; j++) {
@@ -79,20 +82,13 @@ static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int
         row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
     }
 }
-#else
+#endif
+
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 /* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
 static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
 {
     return c + ((x_high * high_half(p)) + high_half(x_high * low_half(p)));
-}
-
-/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
-static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
-{
-    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
-    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
-    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
-    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
 }
 
 static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
@@ -101,6 +97,17 @@ static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
     p = short_step(c[1], x_high, p);
     p = short_step(c[0], x_high, p);
     return p;
+}
+#endif
+
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
+/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
+static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
+{
+    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
+    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
+    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
+    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
 }
 
 static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, int32_t x_low)
@@ -111,25 +118,35 @@ static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, i
     return p;
 }
 
+static void long_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                      int32_t x_high, int32_t x_low)
+{
+    uint32_t j;
+    for (j = 0u; j < 4u; j++) {
+        row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
+        row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
+        row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
+    }
+}
+#endif
+
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 /* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
-static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                          int32_t x_q31)
 {
     const int32_t x_high = high_half(x_q31);
     const int32_t x_low = low_half(x_q31);
-    uint32_t j;
 
     if (x_low == 0) {
+        uint32_t j;
         for (j = 0u; j < 4u; j++) {
             row[0][j] = short_evaluate(segment->coefficient[j], x_high);
             row[1][j] = short_evaluate(segment->coefficient[4u + j], x_high);
             row[2][j] = short_evaluate(segment->coefficient[8u + j], x_high);
         }
     } else {
-        for (j = 0u; j < 4u; j++) {
-            row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
-            row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
-            row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
-        }
+        long_rows(row, segment, x_high, x_low);
     }
 }
 #endif
@@ -137,12 +154,16 @@ static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int
 static int32_t clamp_raw(int32_t code)
 {
     int32_t result = code;
+#if TRIAX_ARITHMETIC == TRIAX_THUMB2
+    __asm__("ssat %0, #24, %1" : "=r"(result) : "r"(code));
+#else
     if (result < TRIAX_RAW_MIN) {
         result = TRIAX_RAW_MIN;
     }
     if (result > TRIAX_RAW_MAX) {
         result = TRIAX_RAW_MAX;
     }
+#endif
     return result;
 }
 
@@ -162,6 +183,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
+    int32_t x_q31;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -171,7 +193,8 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
+    x_q31 = (code - segment->origin_code) * segment->gain;
+    evaluate_rows(state->row, segment, x_q31);
     copy_terms(state, calib);
     return status;
 }

@@ -18,11 +18,19 @@ static int32_t s32(uint32_t bits)
     return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits : (-1 - (int32_t)inverted);
 }
 
-#if TRIAX_ARITHMETIC != TRIAX_LIMBS
+#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_THUMB2)
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
 static int32_t high_word(int64_t value)
 {
     return (value < 0) ? (-1 - (int32_t)(~value >> 32)) : (int32_t)(value >> 32);
+}
+#endif
+
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
+/* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
+static int32_t asr32(int32_t value, uint32_t shift)
+{
+    return (value < 0) ? (~(~value >> shift)) : (value >> shift);
 }
 #endif
 
@@ -44,19 +52,15 @@ static int32_t saturate32(int64_t value)
     return (int32_t)result;
 }
 
-#if TRIAX_ARITHMETIC == TRIAX_LIMBS
-/* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
-static int32_t asr32(int32_t value, uint32_t shift)
-{
-    return (value < 0) ? (~(~value >> shift)) : (value >> shift);
-}
-
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 /* value = high_half 2^16 + low_half, 0 <= low_half < 2^16. */
 static int32_t high_half(int32_t value)
 {
     return asr32(value, 16u);
 }
+#endif
 
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 static int32_t low_bits(int32_t value, uint32_t mask)
 {
     const uint32_t bits = (uint32_t)value & mask;
@@ -74,7 +78,7 @@ static int64_t magnitude(int32_t value)
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
-#if TRIAX_ARITHMETIC != TRIAX_LIMBS
+#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_THUMB2)
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
@@ -90,7 +94,8 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
 }
 
 /* A column at a time: the loop's overhead is shared by three functions. */
-static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                          int32_t x_q31)
 {
     uint32_t j;
     for (j = 0u; j < 4u; j++) {
@@ -99,20 +104,13 @@ static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int
         row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
     }
 }
-#else
+#endif
+
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 /* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
 static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
 {
     return c + ((x_high * high_half(p)) + high_half(x_high * low_half(p)));
-}
-
-/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
-static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
-{
-    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
-    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
-    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
-    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
 }
 
 static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
@@ -121,6 +119,17 @@ static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
     p = short_step(c[1], x_high, p);
     p = short_step(c[0], x_high, p);
     return p;
+}
+#endif
+
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
+/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
+static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
+{
+    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
+    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
+    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
+    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
 }
 
 static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, int32_t x_low)
@@ -131,25 +140,35 @@ static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, i
     return p;
 }
 
+static void long_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                      int32_t x_high, int32_t x_low)
+{
+    uint32_t j;
+    for (j = 0u; j < 4u; j++) {
+        row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
+        row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
+        row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
+    }
+}
+#endif
+
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
 /* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
-static void evaluate_rows(int32_t row[3][4], const triax_segment_t *segment, int32_t x_q31)
+static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                          int32_t x_q31)
 {
     const int32_t x_high = high_half(x_q31);
     const int32_t x_low = low_half(x_q31);
-    uint32_t j;
 
     if (x_low == 0) {
+        uint32_t j;
         for (j = 0u; j < 4u; j++) {
             row[0][j] = short_evaluate(segment->coefficient[j], x_high);
             row[1][j] = short_evaluate(segment->coefficient[4u + j], x_high);
             row[2][j] = short_evaluate(segment->coefficient[8u + j], x_high);
         }
     } else {
-        for (j = 0u; j < 4u; j++) {
-            row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
-            row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
-            row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
-        }
+        long_rows(row, segment, x_high, x_low);
     }
 }
 #endif
@@ -173,7 +192,7 @@ static int32_t reciprocal(int32_t determinant)
 }
 
 /* Turns rows of K and U0 into rows of K^-1 and -K^-1 U0. Returns 0 when a row does not fit. */
-static uint32_t invert(int32_t row[3][4])
+static uint32_t invert(int32_t row[3][TRIAX_ROW_WORDS])
 {
     const int32_t u0[3] = {row[0][3], row[1][3], row[2][3]};
     int32_t adjugate[3][3];
@@ -233,6 +252,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
+    int32_t x_q31;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -242,7 +262,8 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
+    x_q31 = (code - segment->origin_code) * segment->gain;
+    evaluate_rows(state->row, segment, x_q31);
     if (invert(state->row) == 0u) {
         uint32_t axis;
         uint32_t column;

@@ -20,19 +20,19 @@ from click.termui import progressbar
 )
 def dynamic(unit: Path, build: Path) -> None:
     """Calibrate the IMU UNIT, a folder with unit.toml and a recording on a turntable."""
-    from triaxcal.dynamic.calibrate import calibrate_unit  # noqa: PLC0415
+    from triaxcal.dynamic.unit import calibrate_unit  # noqa: PLC0415
     from triaxcal.publish import publish  # noqa: PLC0415
     from triaxcal.report.dynamic import dynamic_files, dynamic_summary  # noqa: PLC0415
 
     with progressbar(length=1000, label="pass 1", file=sys.stderr) as bar:
 
-        def progress(number: int, part: float) -> None:
-            if bar.label != f"pass {number + 1}":
-                bar.label = f"pass {number + 1}"
+        def progress(step: str, part: float) -> None:
+            if bar.label != step:
+                bar.label = step
                 bar.pos = 0
             bar.update(max(0, round(1000 * part) - bar.pos))
 
-        description, result = calibrate_unit(unit, progress)
-    target = build / description.name
-    publish(dynamic_files(description, result), target)
-    click.echo(dynamic_summary(description, result, str(target)))
+        done = calibrate_unit(unit, progress)
+    target = build / done.unit.name
+    publish(dynamic_files(done), target)
+    click.echo(dynamic_summary(done, str(target)))

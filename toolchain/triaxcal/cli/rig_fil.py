@@ -15,10 +15,8 @@ from triaxcal.delivery import deliver
 from triaxcal.errors import RefusedError
 from triaxcal.resources import shipped
 from triaxcal.rig.engine import Setup
-from triaxcal.rig.fil import NODE_SOURCES, Agreement, exchange, packing_source, vectors
+from triaxcal.rig.fil import CODE_BITS, NODE_SOURCES, Agreement, exchange, packing_source, vectors
 from triaxcal.rig.socketcan import can_socket, open_refusal
-
-_CODE_BITS = 24
 
 
 def firmware_in_the_loop(setup: Setup, samples: int, bus: str | None, seed: int) -> Agreement:
@@ -30,19 +28,21 @@ def firmware_in_the_loop(setup: Setup, samples: int, bus: str | None, seed: int)
         When the unit is refused, its codes do not fit the frames, a tool is missing, or an
         answer differs.
     """
-    if setup.unit.adc.bits > _CODE_BITS:
+    layout, bits = setup.plan.layout, setup.unit.adc.bits
+    if bits > CODE_BITS[layout]:
         raise RefusedError(
             f"{setup.unit.name}, [adc] bits",
-            f"found {setup.unit.adc.bits}",
-            expected=f"at most {_CODE_BITS}, the codes of RIG_XY and RIG_Z",
+            f"found {bits}",
+            expected=f"at most {CODE_BITS[layout]}, the codes of RIG_XY and RIG_Z",
+            remedy='a plan with layout = "fd" has 32 bits',
         )
     delivery = deliver(setup.folder)
     plan = delivery.plan
-    temps, raw = vectors(samples, (plan.temp_min_code, plan.temp_max_code), seed)
+    temps, raw = vectors(samples, (plan.temp_min_code, plan.temp_max_code), seed, bits)
     with tempfile.TemporaryDirectory() as folder:
         node = build_node(Path(folder), delivery.files, setup)
-        with node_on(node, bus) as link:
-            return exchange(link, setup.dbc, temps, raw, python_routine(plan))
+        with node_on(node, bus, fd=layout == "fd") as link:
+            return exchange(link, setup.dbc, temps, raw, python_routine(plan), layout)
 
 
 def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
@@ -75,11 +75,11 @@ def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
 
 
 @contextlib.contextmanager
-def node_on(program: Path, bus: str | None) -> Iterator[socket.socket]:
+def node_on(program: Path, bus: str | None, fd: bool = False) -> Iterator[socket.socket]:
     """Start the node; gives our end of its bus."""
     if bus is not None:
         try:
-            link = can_socket(bus, fd=False)
+            link = can_socket(bus, fd)
         except OSError as error:
             raise open_refusal(bus, error) from error
         process = subprocess.Popen([str(program), "can", bus])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from dataclasses import dataclass
 from functools import cache
@@ -119,12 +120,11 @@ def _render(name: str, context: dict[str, Any], source: str) -> str:
 
 
 _GYRO_WORDS = (
-    ("triax_", "triax_gyro_"), ("TRIAX_", "TRIAX_GYRO_"), ("accel[", "rate["), ("accel)", "rate)"),
-    (" accel ", " rate "), ("TRIAX_GYRO_ACCEL_Q", "TRIAX_GYRO_RATE_Q"),
-    ("TRIAX_GYRO_RATE_Q of the accelerometer", "TRIAX_ACCEL_Q of the accelerometer"),
-    ("TRIAX_GYRO_STATUS", "TRIAX_STATUS"), ("TRIAX_GYRO_ARITHMETIC", "TRIAX_ARITHMETIC"),
-    ("TRIAX_GYRO_PORTABLE", "TRIAX_PORTABLE"), ("TRIAX_GYRO_LIMBS", "TRIAX_LIMBS"),
-    ("TRIAX_GYRO_THUMB2", "TRIAX_THUMB2"),
+    ("triax_", "triax_gyro_"), ("TRIAX_", "TRIAX_GYRO_"),
+    ("TRIAX_GYRO_ACCEL_Q of the accelerometer", "TRIAX_ACCEL_Q of the accelerometer"),
+    ("TRIAX_GYRO_ACCEL_Q", "TRIAX_GYRO_RATE_Q"), ("TRIAX_GYRO_STATUS", "TRIAX_STATUS"),
+    ("TRIAX_GYRO_ARITHMETIC", "TRIAX_ARITHMETIC"), ("TRIAX_GYRO_PORTABLE", "TRIAX_PORTABLE"),
+    ("TRIAX_GYRO_LIMBS", "TRIAX_LIMBS"), ("TRIAX_GYRO_THUMB2", "TRIAX_THUMB2"),
 )  # fmt: skip
 
 
@@ -132,7 +132,7 @@ def gyro_text(text: str) -> str:
     """The same text with a gyro's names; status bits and TRIAX_ARITHMETIC are common to both."""
     for old, new in _GYRO_WORDS:
         text = text.replace(old, new)
-    return text
+    return re.sub(r"\baccel\b", "rate", text)
 
 
 def _routine_context(plan: Plan) -> dict[str, Any]:
@@ -150,11 +150,14 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "checked": span != 2**32 - 1,
         "raw_span": span,
         "raw_span_is_mask": span & (span + 1) == 0,
+        "raw_bits": span.bit_length(),
         "raw_min": macro_literal(shape.raw_min),
         "raw_max": macro_literal(shape.raw_max),
         "raw_scale": 1 << shape.raw_shift,
         "limb_split": limb_split(shape),
         "limb_mask": (1 << limb_split(shape)) - 1,
+        "assembly": assembly(shape),
+        "forms_using": forms_using(shape),
         "orders_down": list(range(shape.order - 1, -1, -1)),
         "lsb_micro_g": f"{1e6 / 2**shape.output_q:.4g}",
         "lsb_deg_per_h": f"{3600 / 2**shape.output_q:.4g}",
@@ -185,6 +188,78 @@ def limb_split(shape: Shape) -> int:
     spare = shape.output_shift - 32
     split = 16 + spare - shape.raw_shift
     return split if spare >= 2 and shape.raw_shift <= 16 and 1 <= split <= 13 else 0
+
+
+def assembly(shape: Shape) -> dict[str, int]:
+    """Which assembly there is for a shape, and its shifts; 0 for none.
+
+    Keys: `thumb2` and `thumb1`, whether `triax_apply` has that form (with a state of its own), for
+    `thumb1` the number of limbs of a gain; `evaluate`, whether the thermal functions have one too;
+    `in_sum`, bits of the final shift that the assembly for Thumb-2 gets for nothing, because it
+    shifts the raw codes by so many less.
+    """
+    thumb2 = int(not shape.saturates and not shape.adds_to_sums)
+    return {
+        "thumb2": thumb2,
+        "thumb1": 2 if limb_split(shape) else 3 * thumb2,
+        "evaluate": int(shape.order > 0 and shape.inverse is None and not shape.rate),
+        "in_sum": min(shape.raw_shift, shape.output_shift - 32) if thumb2 else 0,
+    }
+
+
+def forms_using(shape: Shape) -> dict[str, str]:
+    """Condition of the preprocessor under which each helper of the routine is used.
+
+    "1" stands for every form and "" for none: such a helper is left out.
+    """
+    given = assembly(shape)
+    limbs, order = limb_split(shape) > 0, shape.order > 0
+    in_asm_2 = bool(given["thumb2"]) and bool(given["evaluate"])
+    in_asm_1 = bool(given["thumb1"]) and bool(given["evaluate"])
+    plain_apply = not shape.saturates and not shape.adds_to_sums
+    in_every_high_word = bool(shape.adds_to_sums or shape.rate)
+    in_every_asr32 = bool(shape.adds_to_sums) and not shape.saturates
+    return {
+        "high_word": _condition(
+            portable=order or plain_apply or in_every_high_word,
+            limbs=(plain_apply and not limbs) or in_every_high_word,
+            thumb2=(order and not in_asm_2) or in_every_high_word,
+            thumb1=in_every_high_word,
+        ),
+        "asr32": _condition(
+            portable=plain_apply or in_every_asr32,
+            limbs=plain_apply or order or in_every_asr32,
+            thumb2=(plain_apply and not in_asm_2 and given["in_sum"] > 0) or in_every_asr32,
+            thumb1=plain_apply or order or in_every_asr32,
+        ),
+        "high_half": _condition(limbs=limbs or order, thumb1=given["thumb1"] == 2 or order),
+        "low_half": _condition(limbs=limbs or order, thumb1=order),
+        "int64_horner": _condition(portable=order, thumb2=order and not in_asm_2),
+        "limb_horner": _condition(limbs=order, thumb1=order),
+        "short_horner": _condition(limbs=order, thumb1=order and not in_asm_1),
+        "evaluate_state": _condition(thumb2=in_asm_2, thumb1=in_asm_1),
+        "int64_apply": _condition(portable=plain_apply, limbs=plain_apply and not limbs),
+        "left_justify": _condition(
+            portable=True, limbs=not limbs, thumb1=given["thumb1"] != 2, thumb2=not plain_apply
+        ),
+        "complete": _condition(thumb2=plain_apply and not in_asm_2, thumb1=plain_apply),
+    }
+
+
+def _condition(
+    *, portable: bool = False, limbs: bool = False, thumb2: bool = False, thumb1: bool = False
+) -> str:
+    """The shortest #if that holds for just these forms; "1" for all, "" for none."""
+    wanted = {"PORTABLE": portable, "LIMBS": limbs, "THUMB2": thumb2, "THUMB1": thumb1}
+    inside = [name for name, wants in wanted.items() if wants]
+    outside = [name for name, wants in wanted.items() if not wants]
+    if not outside:
+        return "1"
+    if len(outside) == 1:
+        return f"TRIAX_ARITHMETIC != TRIAX_{outside[0]}"
+    if len(inside) == 1:
+        return f"TRIAX_ARITHMETIC == TRIAX_{inside[0]}"
+    return " || ".join(f"(TRIAX_ARITHMETIC == TRIAX_{name})" for name in inside)
 
 
 def _terms_context(plan: Plan) -> dict[str, Any]:

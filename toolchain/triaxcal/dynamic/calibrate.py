@@ -5,20 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from triaxcal.dynamic.block import StateBlock
 from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.blocks.base import BASE
-from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.passdata import PassResult, Reference, Task
 from triaxcal.dynamic.preintegrate import NODES
-from triaxcal.dynamic.reading import read_recording
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.survey import Survey, survey
 from triaxcal.dynamic.window import Frame
@@ -52,6 +49,8 @@ class DynamicResult:
     heading_rad : array or None
         Of each section's level frame; None where the unit cannot see the north.
     survey : Survey
+    frame : Frame
+        Of the last pass.
     passes : tuple of PassResult
         The last one gave the result.
     """
@@ -63,6 +62,7 @@ class DynamicResult:
     stage_p: FloatArray
     heading_rad: FloatArray | None
     survey: Survey
+    frame: Frame
     passes: tuple[PassResult, ...]
 
 
@@ -117,6 +117,7 @@ def calibrate_dynamic(
                 done.stage_p,
                 start.heading_rad,
                 found,
+                frame,
                 tuple(passes),
             )
     raise RefusedError(
@@ -125,27 +126,6 @@ def calibrate_dynamic(
         expected="a recording that the model describes",
         remedy="look at units, axes, conventions and the noise that unit.toml states",
     )
-
-
-def calibrate_unit(
-    folder: Path, progress: Progress | None = None
-) -> tuple[DynamicDescription, DynamicResult]:
-    """Calibrate the unit in `folder` from the recording that its unit.toml names.
-
-    Raises
-    ------
-    RefusedError
-        As `read_dynamic`, `read_recording` and `calibrate_dynamic`.
-    """
-    unit = read_dynamic(folder)
-    result = calibrate_dynamic(
-        read_recording(unit),
-        unit.noise,
-        unit.state_blocks(),
-        reference_degc=unit.reference_degc,
-        progress=progress,
-    )
-    return unit, result
 
 
 def _block_size(recording: ImuRecording, found: Survey) -> int:

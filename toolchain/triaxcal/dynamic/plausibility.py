@@ -92,7 +92,10 @@ def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
     if order != (0, 1, 2) or min(signs) < 0:
         words = ", ".join(f"{'-' if signs[i] < 0 else ''}{'xyz'[order[i]]}" for i in range(3))
         handed = np.linalg.det(np.diag(signs)[:, list(order)])
-        kind = "exchanged axes" if handed > 0 else "a left-handed triad"
+        kind = "a left-handed triad of gyros"
+        if handed > 0:
+            # Turned axes and a mirrored accelerometer triad look the same in M.
+            kind = "exchanged axes, or a left-handed triad of accelerometers"
         raise RefusedError(
             name,
             f"the forces turn about x, y, z as the gyros' {words} say: {kind}",

@@ -141,7 +141,8 @@ def _trajectory(
     part = frame.block // NODES
     middle = slice(part // 2 - 1, None, part)
     C = window.outward(window.time[window.inside][middle]) @ matrix_of(q[middle])
-    mean_rate = window.rate[window.inside].reshape(-1, part, 3).mean(axis=1)
+    mean_rate = window.angles[window.inside] / window.step_s[window.inside, None]
+    mean_rate = mean_rate.reshape(-1, part, 3).mean(axis=1)
     degc = window.delta_degc[window.inside].reshape(-1, part).mean(axis=1)
     nodes = _points(window, mean_rate, C, degc)
     at = window.lead + frame.block * np.arange(window.blocks + 1)

@@ -132,6 +132,7 @@ def _rate_hz(unit: DynamicDescription, tables: Callable[[], Iterator[FloatArray]
     assert time is not None
     if first is None or len(first) < 3:
         raise RefusedError(str(unit.recording), "holds fewer than three samples")
+    _refuse_non_numbers(unit.recording, names, first, 0)
     step = float(np.median(np.diff(first[:, names.index(time)]))) * unit.columns.time_scale
     if not step > 0:
         raise RefusedError(

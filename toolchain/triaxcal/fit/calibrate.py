@@ -273,10 +273,11 @@ def _variance(
     if readings.variance_v2 is not None:
         allowed = np.mean(readings.variance_v2, axis=(0, 1))
         ratio = math.sqrt(float(np.mean(pooled / allowed)))
+        of_all = ", sd pooled over the dwells" if readings.pooled else ""
         return readings.variance_v2, (
-            "the dwells' own statistics, sd^2 / count; readings scatter over the positions "
-            f"{ratio:.2f} times what they allow (1 is noise alone, more is placement, which the "
-            "passport's budget adds)"
+            f"the dwells' own statistics, sd^2 / count{of_all}; readings scatter over the "
+            f"positions {ratio:.2f} times what they allow (1 is noise alone, more is placement, "
+            "which the passport's budget adds)"
         )
     without = [
         d.row

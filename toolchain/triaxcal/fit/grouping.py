@@ -8,6 +8,7 @@ temperature to a few tenths of a degree and calibration temperatures lie tens of
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,6 +21,9 @@ from triaxcal.records import Dwell, MeasurementSet
 
 GROUP_GAP_DEGC = 2.0
 """Dwells nearer than this are at one nominal temperature; also how near T0 its group must be."""
+
+FEW_READINGS = 10
+"""A dwell with fewer does not know its own standard deviation to better than a quarter."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +54,18 @@ class GroupedReadings:
     voltage_v : array, shape (G, 6, 3)
     variance_v2 : array, shape (G, 6, 3), or None
         Variances of the readings; None unless every dwell has its statistics.
+    variance_dof : float
+        Degrees of freedom of one of them.
+    pooled : bool
+        Whether each output's are one and the same, from all dwells, but for the counts.
     """
 
     temps_degc: FloatArray
     dwell_temps_degc: FloatArray
     voltage_v: FloatArray
     variance_v2: FloatArray | None
+    variance_dof: float = math.inf
+    pooled: bool = False
 
     def select(self, groups: list[int]) -> GroupedReadings:
         """Only the groups with these indices."""
@@ -65,6 +75,8 @@ class GroupedReadings:
             self.dwell_temps_degc[groups],
             self.voltage_v[groups],
             variance,
+            self.variance_dof,
+            self.pooled,
         )
 
 
@@ -128,21 +140,33 @@ def grouped_readings(
     """Arrays of the groups.
 
     The variance of a mean is sd^2 / count. Readings that scatter by less than half a code are
-    rounded alike, which no count averages out: code^2 / 12 is added whole.
+    rounded alike, which no count averages out: code^2 / 12 is added whole. With fewer than
+    `FEW_READINGS` in a dwell the sd are pooled over all dwells of an output, GUM H.3.6: three
+    readings know their own to a half, and weights that follow it make the fit worse than stated.
     """
     rounding = volts_per_code**2 / 12.0
-    variances = [
-        d.sd_v**2 / d.count + np.where(d.sd_v < 0.5 * volts_per_code, rounding, 0.0)
-        for group in groups
-        for d in group.dwells
-        if d.sd_v is not None and d.count is not None
-    ]
-    known = len(variances) == 6 * len(groups)
+    dwells = [d for group in groups for d in group.dwells]
+    recorded = [(d.sd_v, d.count) for d in dwells if d.sd_v is not None and d.count is not None]
+    known = len(recorded) == len(dwells)
+    counts = np.array([count for _, count in recorded])
+    sd_v = np.array([sd for sd, _ in recorded])
+    dof = float(counts.min() - 1) if known else math.inf
+    pooled = known and counts.max() > 1 and int(counts.min()) < FEW_READINGS
+    if pooled:
+        dof = float(np.sum(counts - 1))
+        sd_v = np.broadcast_to(np.sqrt((counts - 1) @ sd_v**2 / dof), sd_v.shape)
+    variances = (
+        sd_v**2 / counts[:, None] + np.where(sd_v < 0.5 * volts_per_code, rounding, 0.0)
+        if known
+        else None
+    )
     return GroupedReadings(
         temps_degc=np.array([group.temp_degc for group in groups]),
         dwell_temps_degc=np.array([[d.temp_degc for d in group.dwells] for group in groups]),
         voltage_v=np.array([[d.voltage_v for d in group.dwells] for group in groups]),
-        variance_v2=np.array(variances).reshape(len(groups), 6, 3) if known else None,
+        variance_v2=None if variances is None else variances.reshape(len(groups), 6, 3),
+        variance_dof=max(dof, 1.0),
+        pooled=pooled,
     )
 
 

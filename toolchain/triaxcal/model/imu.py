@@ -109,3 +109,9 @@ def compensate_imu(
     )
     gyro = compensate(model.gyro, method, range_degc, readings_max_v[1], errors_max[1])
     return ImuCompensation(accel, gyro, model.g_sensitivity)
+
+
+EXAMPLE_SENSITIVITY = np.deg2rad(0.02) * np.array(
+    [[1.0, -0.3, 0.2], [0.4, 0.9, -0.1], [0.0, 0.25, -1.2]]
+)
+"""MEMS: some hundredths of a deg/s for 1 g; what the C of a gyro is tried on."""

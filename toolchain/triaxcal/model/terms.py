@@ -96,3 +96,6 @@ EXAMPLE_TERMS = Terms(
     )
 )
 """Of the size that data sheets of capacitive sensors state: what the C with terms is tried on."""
+
+EXAMPLE_RATE = RateTerm(np.array([0.021, -0.0075, 0.0003]), (-0.05, 0.08))
+"""Some mg of hysteresis at some K/min, as recordings of MEMS sensors show."""

@@ -16,7 +16,11 @@ from triaxcal.codegen.render import environment, function_format
 from triaxcal.delivery import Delivery
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
+from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.compensation import INVERSE
+from triaxcal.model.positions import AXES
+from triaxcal.unitfile import TemperatureSensor
 
 SYMBOL = "TRIAX_CALIB"
 _WORD = 4
@@ -86,6 +90,35 @@ def calib_words(delivery: Delivery) -> list[Word]:
         for f in range(12):
             at = base + _SEGMENT_HEAD_WORDS + f * (order + 1)
             words += [_coefficient(plan, s, f, k, (at + k) * _WORD) for k in range(order + 1)]
+    return words + _terms(plan, sensor, (_HEAD_WORDS + len(plan.segments) * size) * _WORD)
+
+
+def _terms(plan: Plan, sensor: TemperatureSensor, offset: int) -> list[Word]:
+    """Words of quadratic terms and of a term in dT/dt, which stand behind the segments."""
+    words = []
+    if plan.quadratic is not None:
+        log2 = quadratic_log2(plan.shape.output_q, plan.shape.output_shift - 32)
+        method = Method("TRIAX_QUADRATIC", "quadratic term", "g/g^2", 2.0**-log2, 0.0)
+        for name in QUADRATIC_NAMES:
+            words.append(Word(f"TRIAX_{name}", f"{name}, quadratic term", offset, method))
+            offset += _WORD
+    if plan.rate is not None:
+        step = sensor.degc_per_code * 2.0**-RATE_Q
+        fraction = plan.shape.output_q + plan.shape.output_shift - 32
+        lsb = plan.rate.gain / step * 2.0 ** -(fraction + 32)
+        of_range = Method("TRIAX_RATE_RANGE", "rate of temperature", "K/s", step, 0.0)
+        of_offset = Method("TRIAX_RATE_OFFSET", "offset for dT/dt", "g/(K/s)", lsb, 0.0)
+        words += [
+            Word("TRIAX_rate_min", "lowest rate of the range", offset, of_range),
+            Word("TRIAX_rate_max", "highest rate of the range", offset + _WORD, of_range),
+        ]
+        # The gain, which fixes a format, stands between.
+        words += [
+            Word(
+                f"TRIAX_r{axis}", f"offset of {axis} for dT/dt", offset + (3 + i) * _WORD, of_offset
+            )
+            for i, axis in enumerate(AXES)
+        ]
     return words
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from triaxcal import __version__
 from triaxcal.codegen.render import environment
 from triaxcal.dynamic.calibrate import DynamicResult
-from triaxcal.dynamic.description import DynamicDescription
-from triaxcal.dynamic.observability import Observability, observability
+from triaxcal.dynamic.unit import DynamicUnit
 
 FORMAT = 1
 FILES = ("calibration.json", "dynamic.html")
@@ -21,18 +20,13 @@ BAND = 10.0
 """Panels show so many final standard deviations on each side."""
 
 
-def dynamic_files(unit: DynamicDescription, result: DynamicResult) -> dict[str, bytes]:
+def dynamic_files(done: DynamicUnit) -> dict[str, bytes]:
     """Name and content of everything that build/<UNIT>/ receives."""
-    seen = observability(result.layout, result.covariance)
-    return {
-        "calibration.json": _calibration_json(unit, result, seen),
-        "dynamic.html": _page(unit, result, seen),
-    }
+    return {"calibration.json": _calibration_json(done), "dynamic.html": _page(done)}
 
 
-def _calibration_json(
-    unit: DynamicDescription, result: DynamicResult, seen: Observability
-) -> bytes:
+def _calibration_json(done: DynamicUnit) -> bytes:
+    unit, result, seen = done.unit, done.result, done.seen
     layout, last = result.layout, result.passes[-1]
     document: dict[str, Any] = {
         "format": FORMAT,
@@ -77,6 +71,10 @@ def _calibration_json(
             "freedom": last.freedom,
             "verdict": verdict(result),
         },
+        "switched_off": [
+            {"name": e.name, "chi_square": e.chi_square, "states": e.states, "shown": e.shown}
+            for e in done.off
+        ],
         "not_seen": [list(names) for names in seen.unseen],
         "known_only_together": [list(pair) for pair in seen.together],
     }
@@ -103,10 +101,10 @@ def _digits(value: float, sd: float) -> str:
     return f"{value:.{min(places, 9)}f}"
 
 
-def dynamic_summary(unit: DynamicDescription, result: DynamicResult, target: str) -> str:
+def dynamic_summary(done: DynamicUnit, target: str) -> str:
     """Text for the screen."""
+    unit, result, seen = done.unit, done.result, done.seen
     layout = result.layout
-    seen = observability(layout, result.covariance)
     found = result.survey
     last = result.passes[-1]
     lines = [
@@ -133,6 +131,12 @@ def dynamic_summary(unit: DynamicDescription, result: DynamicResult, target: str
             value, sd = result.p[i] / state.per_unit, result.sd[i] / state.per_unit
             found_sd = f"{_digits(sd, sd):<10s} {state.unit}"
             lines.append(f"  {state.name:9s} {_digits(value, sd):>14s} +- {found_sd}")
+    if done.off:
+        lines += ["", "effects switched off, chi-square of their states in this recording:"]
+        for effect in done.off:
+            call = "  SHOWN: switch it on" if effect.shown else ""
+            size = f"{effect.chi_square:.1f} of {effect.states}"
+            lines.append(f"  {effect.name:24s} {size:>14s}{call}")
     if seen.unseen:
         lines += ["", "not seen by this motion (the values above are the prior's guess):"]
         lines += ["  " + " with ".join(names) for names in seen.unseen]
@@ -143,7 +147,8 @@ def dynamic_summary(unit: DynamicDescription, result: DynamicResult, target: str
     return "\n".join(lines)
 
 
-def _page(unit: DynamicDescription, result: DynamicResult, seen: Observability) -> bytes:
+def _page(done: DynamicUnit) -> bytes:
+    unit, result, seen = done.unit, done.result, done.seen
     layout = result.layout
     context = {
         "unit": unit,
@@ -167,6 +172,7 @@ def _page(unit: DynamicDescription, result: DynamicResult, seen: Observability) 
             for block in layout.blocks
         ],
         "innovations": _innovations(result),
+        "off": [(e.title, f"{e.chi_square:.1f}", e.states, e.name, e.shown) for e in done.off],
         "unseen": seen.unseen,
         "together": [(a, b, f"{c:+.4f}") for a, b, c in seen.together],
         "width": PANEL_WIDTH,

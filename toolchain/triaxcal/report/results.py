@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from typing import Any
 
@@ -14,6 +13,7 @@ from triaxcal.codegen.tryout import BEFORE
 from triaxcal.delivery import Delivery
 from triaxcal.fit.calibrate import Calibration
 from triaxcal.fit.thermal import relative_coefficients
+from triaxcal.jsontext import json_bytes
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.terms import PRODUCT_NAMES
 from triaxcal.model.types import FloatArray
@@ -53,6 +53,8 @@ def calibration_json(delivery: Delivery) -> bytes:
         ],
         "parameter_covariance": calibration.parameter_covariance.tolist(),
         "covariance_source": calibration.covariance_source,
+        "covariance_contains": "the noise of the calibration readings alone; rig, gravity, "
+        "thermometer and thermal model are in passport.json",
         "candidates": [
             {
                 "label": c.label,
@@ -67,7 +69,7 @@ def calibration_json(delivery: Delivery) -> bytes:
         "selection_reason": calibration.selection_reason,
         **_beyond_the_tilter(calibration),
     }
-    return _dump(document)
+    return json_bytes(document)
 
 
 def _beyond_the_tilter(calibration: Calibration) -> dict[str, Any]:
@@ -140,7 +142,7 @@ def verification_json(delivery: Delivery) -> bytes:
             name: hashlib.sha256(content).hexdigest() for name, content in delivery.files.items()
         },
     }
-    return _dump(document)
+    return json_bytes(document)
 
 
 def _header(delivery: Delivery) -> dict[str, Any]:
@@ -151,10 +153,6 @@ def _header(delivery: Delivery) -> dict[str, Any]:
         "serial": delivery.unit.serial,
         "inputs_sha256": delivery.inputs_sha256,
     }
-
-
-def _dump(document: dict[str, Any]) -> bytes:
-    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
 def _numbers(array: FloatArray) -> Any:

@@ -48,7 +48,7 @@ class Stillness:
     """
 
     reference_s: int = 120
-    moving_sigma: float = 5.2
+    moving_sigma: float = 5.6
     moving_step_micro_g: float = 1000.0
     clean_blocks: int = 5
     settle_s: int = 20

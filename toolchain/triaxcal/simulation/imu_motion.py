@@ -238,8 +238,10 @@ def _turn(move: Move, ramp_s: float) -> Pieces:
 
 
 # One round of the programme: slow, fast, both senses, uneven stops, quarter turns for the table's
-# readings. 5 to 60 deg/s, about seven minutes.
+# readings. 5 to 60 deg/s, about eight minutes.
 _ROUND = (
+    Move(360.0, 30.0, 3.0),
+    Move(-720.0, 60.0, 5.0),
     *(Move(90.0, 30.0, 12.0) for _ in range(4)),
     Move(360.0, 10.0, 3.0),
     Move(-1080.0, 60.0, 5.0),

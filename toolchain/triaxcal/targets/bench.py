@@ -14,7 +14,7 @@ from triaxcal.targets.bench_case import case_header, floating_macros, floating_t
 from triaxcal.targets.build import TargetError, Toolset, build, run
 from triaxcal.targets.cores import CORES, Core, install_advice, missing_tools
 from triaxcal.targets.counting import Counts, build_plugin, measure
-from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB2
+from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB1, THUMB2
 from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, QUADRATIC, Case
 from triaxcal.targets.sizes import Flash, flash_of
 
@@ -56,7 +56,7 @@ class Cost:
 
 def subjects(cases: Sequence[Case]) -> list[Subject]:
     """Every shape in every arithmetic, and the baselines of the cubic."""
-    result = [Subject(case, a, "") for case in cases for a in (PORTABLE, LIMBS, THUMB2)]
+    result = [Subject(case, a, "") for case in cases for a in (PORTABLE, LIMBS, THUMB2, THUMB1)]
     cubic = next(c for c in cases if c.name == CUBIC)
     return [*result, Subject(cubic, PORTABLE, DOUBLE), Subject(cubic, PORTABLE, FLOAT)]
 
@@ -86,7 +86,7 @@ def run_bench(
         plugin = build_plugin(work)
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             futures = {
-                pool.submit(_cost, subject, core, work / str(i), plugin): i
+                pool.submit(cost_of, subject, core, work / str(i), plugin): i
                 for i, (subject, core) in enumerate(plan)
             }
             costs: dict[int, Cost] = {}
@@ -97,9 +97,16 @@ def run_bench(
 
 
 def _meant_for(arithmetic: int, core: Core) -> bool:
-    if arithmetic == LIMBS:
+    if arithmetic in (LIMBS, THUMB1):
         return core.no_long_multiply
     return arithmetic != THUMB2 or core.thumb2_multiply
+
+
+def best_form(core: Core) -> int:
+    """The value of TRIAX_ARITHMETIC that is fastest on a core."""
+    if core.no_long_multiply:
+        return THUMB1
+    return THUMB2 if core.thumb2_multiply else PORTABLE
 
 
 def compiler_versions() -> list[str]:
@@ -109,7 +116,8 @@ def compiler_versions() -> list[str]:
     return [run([c, "--version"]).splitlines()[0] for c in installed]
 
 
-def _cost(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
+def cost_of(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
+    """Build, count and size a subject on a core; `work` is made for it."""
     missing = missing_tools(core.tools("gcc"))
     if missing:
         advice = f"not done: {', '.join(missing)} not found: {install_advice(missing)}"

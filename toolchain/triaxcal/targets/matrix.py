@@ -15,8 +15,8 @@ from triaxcal.targets.cores import CORES, install_advice, missing_tools
 from triaxcal.targets.shapes import CUBIC, Case
 from triaxcal.targets.vectors import case_header, expected_lines
 
-PORTABLE, LIMBS, THUMB2 = 0, 1, 2
-ARITHMETIC_NAMES = ("portable", "limbs", "thumb2")
+PORTABLE, LIMBS, THUMB2, THUMB1 = 0, 1, 2, 3
+ARITHMETIC_NAMES = ("portable", "limbs", "thumb2", "thumb1")
 """Values of TRIAX_ARITHMETIC."""
 
 COMPILERS = ("gcc", "clang")
@@ -79,6 +79,8 @@ def _builds(case: Case, ways: Sequence[tuple[str, str]]) -> Iterator[Build]:
             yield Build(case, Toolset(core, compiler, optimisation, LIMBS))
         for compiler, optimisation in ways if core.thumb2_multiply else ():
             yield Build(case, Toolset(core, compiler, optimisation, THUMB2))
+        for compiler, optimisation in ways if core.no_long_multiply else ():
+            yield Build(case, Toolset(core, compiler, optimisation, THUMB1))
 
 
 def run_builds(

@@ -27,6 +27,8 @@ def noise(p: Propagation, s: Scatter) -> Source:
     covariance = constants.reshape(-1, 12, 12)
     sd_v = math.sqrt(float(np.mean(s.variance_v2)))
     origin = "dwell statistics, sd / sqrt(count)"
+    if p.data.readings.pooled:
+        origin += ", sd pooled over the dwells: they have few readings"
     if not s.recorded:
         origin = "scatter of the residuals from temperature to temperature"
         if p.groups == 1:

@@ -70,7 +70,7 @@ def scatter(p: Propagation) -> Scatter:
     if recorded is not None:
         variance = recorded.reshape(-1, 3)
         v = float(np.mean(np.sum(p.inverse.mean(axis=0) ** 2 * variance.mean(axis=0), axis=1)))
-        noise_dof = float(min(d.count or 2 for d in p.measurements.dwells) - 1) or 1.0
+        noise_dof = p.data.readings.variance_dof
         p_r = max(0.0, 1.5 * (within / (3.0 * (G - 1)) - v)) if G > 1 else 0.0
     else:
         # One temperature cannot tell noise from placement: each is given the whole scatter.

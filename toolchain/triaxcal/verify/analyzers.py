@@ -12,6 +12,7 @@ from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
 from triaxcal.resources import shipped
 from triaxcal.verify.outcome import Outcome, judged
+from triaxcal.verify.rows import rows_of
 from triaxcal.verify.tools import Answer, MissingToolError, Tool, run
 from triaxcal.verify.workspace import FORMS, IMAGE, ROUTINE, Workspace
 
@@ -60,7 +61,7 @@ def check_gcc_analyzer(work: Workspace) -> Outcome:
     good = True
     for name, form in FORMS.items():
         flags = [*FLAGS, *form, "-fanalyzer", "-c", "-o", f"verify_analyzer_{name}.o"]
-        answer = run([GCC.find(), *flags, ROUTINE], work.folder)
+        answer = run([GCC.find(), *flags, work.named(ROUTINE)], work.folder)
         complaints += complaints_of(answer)
         good = good and answer.code == 0
     figures = {"version": GCC.version(), "findings": len(complaints)}
@@ -86,7 +87,7 @@ def check_sanitizer(work: Workspace, sanitizer: Sanitizer) -> Outcome:
     vectors = vector_sets(work.plan, RANDOM_VECTORS)
     count = sum(len(v.temp) for v in vectors)
     given = work.folder / f"verify_{sanitizer.key}.in"
-    given.write_bytes(b"".join(_bytes_of(v) for v in vectors))
+    given.write_bytes(b"".join(rows_of(work.plan, v) for v in vectors))
     expected = _expected(work, vectors)
     complaints = [
         f"{name} form: {complaint}"
@@ -114,13 +115,14 @@ def _run_form(
     command = [
         sanitizer.tool.find(), "-std=c99", "-O1", "-g", *form, *sanitizer.flags,
         f"-I{work.folder}", f"-I{batch}",
-        "-o", str(program), driver.name, ROUTINE, str(batch / "triax_batch.c"),
+        "-o", str(program), driver.name, work.named(ROUTINE),
+        str(batch / work.named("triax_batch.c")),
     ]  # fmt: skip
     built = run(command, work.folder)
     if built.code:
         return complaints_of(built) or [built.text[-200:]]
     found = given.with_suffix(".out")
-    answer = run([str(program), given.name, found.name, IMAGE], work.folder)
+    answer = run([str(program), given.name, found.name, work.named(IMAGE)], work.folder)
     complaints = complaints_of(answer)
     if not complaints and answer.code:
         return [f"exit code {answer.code}: {answer.text.strip()[-200:]}"]
@@ -146,11 +148,6 @@ def _probe(work: Workspace, sanitizer: Sanitizer) -> None:
             f"{sanitizer.tool.program} has no {sanitizer.flags[0]}; "
             f"sudo apt-get install {sanitizer.tool.package}"
         )
-
-
-def _bytes_of(vectors: VectorSet) -> bytes:
-    """Rows of temperature code and three raw codes."""
-    return np.column_stack([vectors.temp, vectors.raw]).astype(np.int32).tobytes()
 
 
 def _expected(work: Workspace, vectors: list[VectorSet]) -> bytes:

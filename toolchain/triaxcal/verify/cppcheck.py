@@ -20,7 +20,7 @@ OPTIONS = (
     "--template={file}\t{line}\t{id}\t{message}", "--error-exitcode=0",
 )  # fmt: skip
 
-FORMS = ("-DTRIAX_ARITHMETIC=0", "-DTRIAX_ARITHMETIC=1", "-DTRIAX_ARITHMETIC=2")
+FORMS = tuple(f"-DTRIAX_ARITHMETIC={form}" for form in range(4))
 """Each form by itself; without them cppcheck looks at the portable one only."""
 
 _RULE = re.compile(r"misra-c2012-(\d+\.\d+)")
@@ -91,10 +91,10 @@ def find_all(work: Workspace) -> list[Finding]:
     ------
     MissingToolError, BrokenToolError
     """
-    (work.folder / USER).write_text(f'#include "{CONSTANTS}"\n')
+    (work.folder / USER).write_text(f'#include "{work.named(CONSTANTS)}"\n')
     lines: dict[str, None] = {}
     for form in FORMS:
-        answer = run([CPPCHECK.find(), *OPTIONS, form, ROUTINE, USER], work.folder)
+        answer = run([CPPCHECK.find(), *OPTIONS, form, work.named(ROUTINE), USER], work.folder)
         if answer.code:
             raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
         lines |= dict.fromkeys(answer.text.splitlines())

@@ -65,7 +65,7 @@ def _check(work: Workspace, key: str, title: str, entry: str, form: tuple[str, .
     driver = work.render(f"{key}_{DRIVER}", "verify_eva.c.j2", {"ranges": ranges})
     report = work.folder / f"{key}.csv"
     chosen = [f"-cpp-extra-args={flag}" for flag in form]
-    command = [program, *OPTIONS, *chosen, "-main", entry, ROUTINE, driver.name]
+    command = [program, *OPTIONS, *chosen, "-main", entry, work.named(ROUTINE), driver.name]
     answer = run([*command, "-then", "-report-csv", report.name], work.folder)
     if answer.code or not report.exists():
         raise BrokenToolError(f"frama-c: {answer.text.strip()[-200:]}")

@@ -124,6 +124,7 @@ def _quadratic(work: Workspace, image: Image, linear_lsb: Sequence[float]) -> li
 def _reach(image: Image, axis: int) -> int:
     """Bound of |h| of an axis over all codes, by the size of each function's words."""
     box = max(abs(image.raw_min), abs(image.raw_max)) << image.raw_shift
+    by_rate = abs(image.rate[3 + axis]) // 2 + 1 if image.rate else 0
     reach = 0
     for segment in image.segments:
         # |p_0| <= |c_0| + |c_1| / 2 + |c_2| / 4 + ..., and less than 2 for the floors.
@@ -131,7 +132,7 @@ def _reach(image: Image, axis: int) -> int:
             sum(abs(c) >> k for k, c in enumerate(words)) + len(words) + 2
             for words in segment.coefficients[4 * axis : 4 * axis + 4]
         )
-        reach = max(reach, (n0 + n1 + n2) * box // 2**32 + 1 + b)
+        reach = max(reach, (n0 + n1 + n2) * box // 2**32 + 1 + b + by_rate)
     return reach
 
 
@@ -180,9 +181,33 @@ def script_context(work: Workspace, image: Image, axis: int, s: int) -> dict[str
             Fraction((segment.last_code - segment.origin_code) * segment.gain, 2**32)
         ),
         "x_is_a_point": segment.first_code == segment.last_code,
+        "rate": _rate(work, image, axis),
+        "sensitivity": _sensitivity(work, image, axis),
         "box": _dyadic(Fraction(box, 2**32)),
         "slices": SLICES,
     }
+
+
+def _rate(work: Workspace, image: Image, axis: int) -> dict[str, object] | None:
+    """The word of a term in dT/dt, what it stands for, and how far the rate reaches."""
+    if not image.rate or work.plan.rate is None:
+        return None
+    low, high, gain = image.rate[:3]
+    return {
+        "integer": image.rate[3 + axis],
+        "real": _dyadic(Fraction(float(work.plan.rate.real[axis]))),
+        "reach": _dyadic(Fraction(max(-low, high) * gain, 2**32)),
+    }
+
+
+def _sensitivity(work: Workspace, image: Image, axis: int) -> list[dict[str, object]]:
+    """Words of a gyro's g-sensitivity and what they stand for."""
+    if not image.sensitivity or work.plan.real_sensitivity is None:
+        return []
+    return [
+        {"integer": k, "real": _dyadic(Fraction(float(exact)))}
+        for k, exact in zip(image.sensitivity[axis], work.plan.real_sensitivity[axis], strict=True)
+    ]
 
 
 def _function(name: str, integers: Sequence[int], reals: Iterable[float]) -> dict[str, object]:

@@ -29,7 +29,10 @@ class ImageSegment:
 
 @dataclass(frozen=True)
 class Image:
-    """What an image says; shifts of the inverse form are left out."""
+    """What an image says; shifts of the inverse form are left out.
+
+    `rate` is rate_min, rate_max, rate_gain and the three words.
+    """
 
     inverse_form: bool
     order: int
@@ -39,6 +42,8 @@ class Image:
     raw_shift: int
     segments: tuple[ImageSegment, ...]
     quadratic: tuple[tuple[int, ...], ...] = ()
+    rate: tuple[int, ...] = ()
+    sensitivity: tuple[tuple[int, ...], ...] = ()
 
 
 def read_image(image: bytes) -> Image:
@@ -64,13 +69,20 @@ def read_image(image: bytes) -> Image:
     starts = [header + 2 + s * step for s in range(segments)]
     lasts = [words[start] - 1 for start in starts[1:]] + [words[header + 1]]
     at_terms = header + 2 + segments * step
-    rows = [words[at_terms + 6 * i : at_terms + 6 * i + 6] for i in range(3)] if terms & 1 else []
+    quadratic = _table(words[at_terms:], 6) if terms & 1 else ()
+    at_rate = at_terms + (18 if terms & 1 else 0)
+    rate = words[at_rate : at_rate + 6] if terms & 2 else ()
+    sensitivity = _table(words[at_terms:], 3) if terms & 4 else ()
     return Image(
         bool(form), order, output_shift, raw_min, raw_max, raw_shift,
         tuple(_segment(words[at : at + step], last, order)
               for at, last in zip(starts, lasts, strict=True)),
-        tuple(rows),
+        quadratic, rate, sensitivity,
     )  # fmt: skip
+
+
+def _table(words: tuple[int, ...], columns: int) -> tuple[tuple[int, ...], ...]:
+    return tuple(words[columns * i : columns * (i + 1)] for i in range(3))
 
 
 def _segment(words: tuple[int, ...], last_code: int, order: int) -> ImageSegment:

@@ -225,12 +225,12 @@ def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
             fate = KILLED
         elif any(e.covers(mutant, bench.shape) for e in equivalents):
             fate = EQUIVALENT
+        elif file == ROUTINE and not bench.is_seen(folder):
+            fate = ELSEWHERE
         elif not bench.survives(folder, SANITIZED):
             fate = BY_SANITIZER
         elif file == ROUTINE and not _is_clean(folder):
             fate = BY_COMPILER
-        elif file == ROUTINE and not bench.is_seen(folder):
-            fate = ELSEWHERE
         else:
             fate = SURVIVED
         for path in folder.iterdir():

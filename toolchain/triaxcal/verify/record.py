@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from triaxcal.errors import RefusedError
+from triaxcal.jsontext import json_bytes
 from triaxcal.verify.outcome import Outcome
 
 FILE = "verification.json"
@@ -49,12 +50,12 @@ def record(target: Path, outcomes: Sequence[Outcome]) -> None:
     path = target / FILE
     document = _load(path.read_bytes(), path)
     document[SECTION] = {outcome.key: outcome.json() for outcome in outcomes}
-    content = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    content = json_bytes(document)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{FILE}.", dir=target)
         try:
             with os.fdopen(handle, "wb") as file:
-                file.write(content.encode())
+                file.write(content)
             Path(name).chmod(path.stat().st_mode)
             Path(name).replace(path)
         finally:

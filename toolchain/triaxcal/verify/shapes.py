@@ -10,12 +10,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
+from triaxcal.codegen.render import (
+    CONSTANTS_FILE,
+    Provenance,
+    gyro_text,
+    render_constants,
+    render_routine,
+)
 from triaxcal.delivery import IMAGE_FILE, compensation_of, inputs_sha256
 from triaxcal.fit.calibrate import calibrate
+from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
-from triaxcal.model.terms import EXAMPLE_TERMS
+from triaxcal.model.imu import EXAMPLE_SENSITIVITY, ImuCompensation
+from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS
 from triaxcal.records import MEASUREMENTS_FILE, read_measurements
 from triaxcal.unitfile import UnitDescription, read_unit
 
@@ -54,7 +62,12 @@ SHAPES = {
 and two, raw codes of 24 bits and 32, both range tests and none, both forms, both ends of apply, and
 quadratic terms."""
 
-WITH_TERMS = {"quadratic": EXAMPLE_TERMS}
+WITH_TERMS = {"quadratic": EXAMPLE_TERMS, "rate": replace(EXAMPLE_TERMS, rate=EXAMPLE_RATE)}
+"""Terms of shapes that have them."""
+
+MORE_SHAPES = {"rate": ("AT-SIM", _as_shipped), "gyro": ("AT-SIM", _as_shipped)}
+"""Shapes that the tools look at besides, but neither mutation testing nor fuzzing: their runners do
+not vary dT/dt and the specific force yet."""
 
 
 def subject(name: str, units: Path) -> Subject:
@@ -65,15 +78,24 @@ def subject(name: str, units: Path) -> Subject:
     RefusedError
         When the unit's files are refused.
     """
-    unit_name, change = SHAPES[name]
+    unit_name, change = {**SHAPES, **MORE_SHAPES}[name]
     folder = units / unit_name
     unit = change(read_unit(folder))
     calibration = calibrate(unit, read_measurements(folder / MEASUREMENTS_FILE, unit))
     if name in WITH_TERMS:
         calibration = replace(calibration, terms=WITH_TERMS[name])
-    plan = make_plan(compensation_of(unit, calibration, unit.method), unit)
+    compensation = compensation_of(unit, calibration, unit.method)
+    plan = make_plan(compensation, unit)
+    if name == "gyro":
+        imu = ImuCompensation(compensation, compensation, EXAMPLE_SENSITIVITY)
+        # 1 rad/s in place of 1 g: the same curves, and a rate of some hundred deg/s.
+        plan = make_gyro_plan(imu, replace(unit, output_q=18), unit.output_q)
     texts = render_routine(plan)
     provenance = Provenance(unit.serial, inputs_sha256(folder), (f"shape {name}",))
-    texts[CONSTANTS_FILE] = render_constants(plan, unit.temperature_sensor, provenance)
+    constants, image = CONSTANTS_FILE, IMAGE_FILE
+    if plan.shape.gyro:
+        constants, image = gyro_text(constants), gyro_text(image)
+    texts[constants] = render_constants(plan, unit.temperature_sensor, provenance)
     files = {file: text.encode() for file, text in texts.items()}
-    return Subject(name, plan, prove(plan), {**files, IMAGE_FILE: image_bytes(plan)})
+    files[image] = image_bytes(plan)
+    return Subject(name, plan, prove(plan), files)

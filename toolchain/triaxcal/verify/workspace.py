@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from triaxcal.codegen.render import environment
+from triaxcal.codegen.render import environment, gyro_text
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
 
@@ -48,10 +48,15 @@ class Workspace:
     @property
     def image(self) -> bytes:
         """The delivered image."""
-        return (self.folder / IMAGE).read_bytes()
+        return (self.folder / self.named(IMAGE)).read_bytes()
+
+    def named(self, name: str) -> str:
+        """A text or a file's name with the names of the triad that is verified."""
+        return gyro_text(name) if self.plan.shape.gyro else name
 
     def render(self, name: str, template: str, context: dict[str, Any]) -> Path:
-        """Write a template's text under `name` and return its path."""
+        """Write a template's text under `name` and return its path; C has the triad's names."""
         path = self.folder / name
-        path.write_text(environment().get_template(template).render(**context))
+        text = environment().get_template(template).render(shape=self.plan.shape, **context)
+        path.write_text(self.named(text) if path.suffix == ".c" else text)
         return path

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from typing import Any
 
 import numpy as np
 
 from triaxcal import __version__
+from triaxcal.jsontext import json_bytes
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Passport
 from triaxcal.uncertainty.budget import Budget
@@ -68,7 +68,7 @@ def passport_json(p: Passport) -> bytes:
         "files_sha256": {n: hashlib.sha256(c).hexdigest() for n, c in d.files.items()},
         "tools": dict(p.tools),
     }
-    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    return json_bytes(document)
 
 
 def _budget(b: Budget) -> dict[str, Any]:

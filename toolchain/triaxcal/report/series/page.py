@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter, defaultdict
 from collections.abc import Sequence
@@ -24,6 +23,7 @@ from triaxcal.batch.statistics import (
     runs,
 )
 from triaxcal.codegen.render import environment
+from triaxcal.jsontext import json_bytes
 from triaxcal.report.passport.curves import ticks
 
 PAGE_FILE, JSON_FILE = "series.html", "series.json"
@@ -102,7 +102,7 @@ def _json(
         "runs": [asdict(r) for r in by_run],
         "records": series.records,
     }
-    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    return json_bytes(document)
 
 
 def _percent(part: int, whole: int) -> str:

@@ -1,0 +1,98 @@
+"""A unit whose calibration carries terms goes the whole road, whoever fitted them."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from conftest import UNITS
+from triaxcal import delivery
+from triaxcal.delivery import Delivery, deliver
+from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, Terms
+from triaxcal.records import MeasurementSet
+from triaxcal.report.a2l import calib_words
+from triaxcal.unitfile import UnitDescription
+
+assert EXAMPLE_TERMS.quadratic_per_g is not None
+SMALL = Terms(EXAMPLE_TERMS.quadratic_per_g / 100, EXAMPLE_RATE)
+"""The unit's dwells have no such terms: they must stay below its limits of | |a| - g |."""
+
+
+@pytest.fixture(scope="module")
+def made() -> Delivery:
+    """AT-CHERNIAK with terms that its readings do not have."""
+
+    def with_terms(unit: UnitDescription, measurements: MeasurementSet) -> Calibration:
+        return replace(calibrate(unit, measurements), terms=SMALL)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(delivery, "calibrate", with_terms)
+        return deliver(UNITS / "AT-CHERNIAK")
+
+
+def test_terms_reach_plan_proof_and_cross_check(made: Delivery) -> None:
+    assert made.plan.shape.quadratic
+    assert made.plan.shape.rate
+    assert made.bound.lsb <= 1.0
+    assert 0.8 * made.bound.lsb <= made.check.largest_error_lsb <= made.bound.lsb
+    assert b"triax_set_temperature_rate" in made.files["triax_comp.h"]
+    others = [m.method for m in made.methods[1:] if not m.refusal]
+    assert len(others) == 5
+
+
+def test_residuals_are_those_of_the_compensated_force(made: Delivery) -> None:
+    """| |a| - g | of l + Q p(l) at 1 g along an axis is |Q_ii| g^2 to first order."""
+    assert SMALL.quadratic_per_g is not None
+    chosen = next(m for m in made.methods if m.method == made.unit.method)
+    axis = {"TP6": (0, 1), "TP5": (0, -1), "TP4": (1, 1), "TP2": (1, -1), "TP1": (2, 1)}
+    compared = 0
+    for residual in chosen.residuals:
+        if residual.dwell.position in axis:
+            i, sign = axis[residual.dwell.position]
+            expected = sign * SMALL.quadratic_per_g[i, i] * made.unit.gravity_g**2
+            # The model error of 1 micro-g, the raw code of 0.3 micro-g, some 1e-10 of second order.
+            assert abs(residual.error_g - expected) < 1.5e-6
+            compared += 1
+    assert compared == 15
+
+
+def test_the_a2l_words_stand_where_the_compiler_puts_them(made: Delivery) -> None:
+    words = {w.name: w for w in calib_words(made)}
+    order, segments = made.plan.shape.order, made.plan.shape.segments
+
+    class Segment(ctypes.Structure):
+        _fields_ = (
+            ("head", ctypes.c_int32 * 3), ("coefficient", ctypes.c_int32 * (12 * (order + 1)))
+        )  # fmt: skip
+
+    class Calib(ctypes.Structure):
+        _fields_ = (
+            ("range", ctypes.c_int32 * 2), ("segment", Segment * segments),
+            ("quadratic", ctypes.c_int32 * 18), ("rate_min", ctypes.c_int32),
+            ("rate_max", ctypes.c_int32), ("rate_gain", ctypes.c_int32), ("r", ctypes.c_int32 * 3),
+        )  # fmt: skip
+
+    assert words["TRIAX_Qxxx"].offset == Calib.quadratic.offset
+    assert words["TRIAX_Qzyz"].offset == Calib.quadratic.offset + 17 * 4
+    assert words["TRIAX_rate_max"].offset == Calib.rate_max.offset
+    assert words["TRIAX_rz"].offset == Calib.r.offset + 8
+    plan = made.plan
+    assert plan.quadratic is not None
+    assert plan.rate is not None
+    q = words["TRIAX_Qxxx"].method.slope * int(plan.quadratic[0, 0])
+    r = words["TRIAX_rx"].method.slope * int(plan.rate.words[0])
+    # Half a word.
+    assert abs(q - SMALL.quadratic_per_g[0, 0]) <= words["TRIAX_Qxxx"].method.slope / 2
+    assert abs(r - EXAMPLE_RATE.offset_g_s_per_k[0]) <= words["TRIAX_rx"].method.slope / 2
+    fastest = words["TRIAX_rate_max"].method.slope * plan.rate.max_code
+    assert np.isclose(fastest, EXAMPLE_RATE.range_k_per_s[1], rtol=1e-4)
+
+
+def test_the_image_is_of_version_2(made: Delivery) -> None:
+    image = made.files["triax_calib.bin"]
+    assert int.from_bytes(image[4:8], "little") == 2
+    assert int.from_bytes(image[60:64], "little") == 3

@@ -1,0 +1,128 @@
+"""A unit's folder: unit.toml, the three kinds of files, the command and its results."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from dynamic_cases import COLUMNS, UNIT_TOML, mems_short, table_of, write_unit
+from triaxcal.cli.main import main
+from triaxcal.dynamic.description import read_dynamic
+from triaxcal.dynamic.reading import read_recording
+from triaxcal.errors import RefusedError
+
+
+def table() -> np.ndarray:
+    return table_of(mems_short()[1])
+
+
+def refused(folder: Path) -> str:
+    with pytest.raises(RefusedError) as refusal:
+        read_recording(read_dynamic(folder)).all()
+    assert "\n" not in str(refusal.value)
+    return str(refusal.value)
+
+
+def test_three_kinds_of_files_hold_the_same(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    pyarrow = pytest.importorskip("pyarrow")
+    rows = table()
+    folder = write_unit(tmp_path / "IMU-A", rows)
+    expected = read_recording(read_dynamic(folder)).all()
+    columns = {name: rows[:, i] for i, name in enumerate(COLUMNS)}
+    parquet.write_table(pyarrow.table(columns), folder / "recording.parquet")
+    with h5py.File(folder / "recording.h5", "w") as file:
+        for name, values in columns.items():
+            file[name] = values
+    for kind in ("parquet", "h5"):
+        text = UNIT_TOML.replace("recording.csv", f"recording.{kind}")
+        (folder / "unit.toml").write_text(text, encoding="utf-8")
+        found = read_recording(read_dynamic(folder)).all()
+        for name in ("time_s", "rate", "force"):
+            assert np.array_equal(getattr(found, name), getattr(expected, name))
+    assert np.array_equal(expected.rate, mems_short()[1].all().rate)
+
+
+def test_units_of_the_file(tmp_path: Path) -> None:
+    rows = table()[:200]
+    rows[:, 0] *= 1e3
+    rows[:, 1:4] = np.degrees(rows[:, 1:4])
+    rows[:, 4:7] /= 9.80665e-3
+    text = UNIT_TOML.replace('"rad/s"', '"deg/s"').replace('"m/s^2"', '"mg"')
+    text = text.replace("[noise]", 'time_unit = "ms"\n[noise]')
+    found = read_recording(read_dynamic(write_unit(tmp_path / "IMU-A", rows, text)))
+    samples = found.all()
+    exact = mems_short()[1].all()[:200]
+    assert abs(found.rate_hz - 50.0) < 1e-9
+    # One multiplication there and one back: two roundings.
+    np.testing.assert_allclose(samples.rate, exact.rate, rtol=1e-15 * 4)
+    np.testing.assert_allclose(samples.force, exact.force, rtol=1e-15 * 4)
+
+
+BAD_TOML = {
+    "latitude absent": ("latitude_deg = 50\n", "", "missing: [site] latitude_deg"),
+    "unknown block": ("[noise]", 'blocks = ["g-drfit"]\n[noise]', "found 'g-drfit'"),
+    "block without its column": (
+        "[noise]",
+        'blocks = ["gyro-thermal"]\n[noise]',
+        '"gyro-thermal" is switched on and no temp_column is given',
+    ),
+    "unit of increments": ('"rad/s"', '"rad"', 'expected one of "rad/s", "deg/s"'),
+    "two columns": ('"gy", ', "", "three different names"),
+    "absent column": ('"gy"', '"gyro_y"', "no column 'gyro_y'"),
+    "no such file": ("recording.csv", "other.csv", "other.csv: no such file"),
+    "kind of file": ("recording.csv", "unit.toml", "ends in '.toml'"),
+    "both rate and times": ("[noise]", "rate_hz = 50\n[noise]", "both given"),
+    "noise absent": ("gyro_arw_deg_per_sqrt_h = 0.3\n", "", "[noise] gyro_arw_deg_per_sqrt_h"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_TOML)
+def test_bad_descriptions(case: str, tmp_path: Path) -> None:
+    old, new, words = BAD_TOML[case]
+    assert old in UNIT_TOML
+    folder = write_unit(tmp_path / "IMU-A", table()[:300], UNIT_TOML.replace(old, new))
+    assert words in refused(folder)
+
+
+def test_bad_cells_and_times(tmp_path: Path) -> None:
+    rows = table()[:300]
+    folder = write_unit(tmp_path / "IMU-A", rows)
+    csv = folder / "recording.csv"
+    lines = csv.read_text(encoding="utf-8").splitlines()
+    csv.write_text("\n".join([*lines[:10], "oops" + lines[10], *lines[11:]]), encoding="utf-8")
+    assert "could not convert string" in refused(folder)
+    csv.write_text("\n".join([*lines[:10], "nan," + lines[10], *lines[11:]]), encoding="utf-8")
+    assert "row 11, time_s: found nan; expected a finite number" in refused(folder)
+    csv.write_text("\n".join([*lines[:10], lines[9], *lines[10:]]), encoding="utf-8")
+    assert "row 11: time" in refused(folder)
+    assert "does not rise" in refused(folder)
+    csv.write_text(lines[0] + "\n", encoding="utf-8")
+    assert "fewer than three samples" in refused(folder)
+    csv.write_bytes(b"\xff\xfe\x00")
+    assert "is not UTF-8 text" in refused(folder)
+
+
+def test_the_command(tmp_path: Path) -> None:
+    folder = write_unit(tmp_path / "IMU-A", table())
+    done = CliRunner().invoke(main, ["dynamic", str(folder), "--build", str(tmp_path / "build")])
+    assert done.exit_code == 0, done.output
+    assert "axis z" in done.output
+    assert "consistent" in done.output
+    made = tmp_path / "build" / "IMU-A"
+    assert sorted(path.name for path in made.iterdir()) == ["calibration.json", "dynamic.html"]
+    result = json.loads((made / "calibration.json").read_text(encoding="utf-8"))
+    assert (result["format"], result["kind"], result["serial"]) == (1, "dynamic", "IMU-TEST-001")
+    values = {state["name"]: state for state in result["states"]}
+    truth = mems_short()[0]
+    for i in range(3):
+        state = values[f"nu0_{i + 1}"]
+        error = state["value"] / state["si_per_unit"] - truth.gyro_bias_deg_per_h[i]
+        assert abs(error) < 4 * state["sd"] / state["si_per_unit"]
+    page = (made / "dynamic.html").read_text(encoding="utf-8")
+    assert page.count("<polyline") == len(result["states"])

@@ -1,0 +1,91 @@
+"""Which effects that are switched off the recording shows.
+
+The sum of squared innovations is blunt: an effect far below the noise of one block, in step with
+the motion for an hour, hardly changes it. So every extension that the recording's columns allow is
+switched on for one more pass, about the finished result. If an effect is absent the estimates of
+its k states are noise, and p^T P^-1 p is chi-square with k degrees of freedom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from triaxcal.dynamic.block import Extension
+from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.filterpass import run_pass
+from triaxcal.dynamic.layout import Layout
+from triaxcal.dynamic.noise import DataSheet
+from triaxcal.dynamic.passdata import Reference, Task
+from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.registry import extensions
+
+SIGNIFICANCE = 1e-3
+"""Some seven tests on each recording: one false alarm in a hundred and forty recordings."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An extension that is switched off.
+
+    Attributes
+    ----------
+    name, title : str
+    chi_square : float
+    states : int
+    shown : bool
+        Whether the recording shows it beyond `SIGNIFICANCE`.
+    """
+
+    name: str
+    title: str
+    chi_square: float
+    states: int
+    shown: bool
+
+
+def missing_effects(
+    recording: ImuRecording,
+    noise: DataSheet,
+    result: DynamicResult,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Effect, ...]:
+    """Test every extension that is off and whose columns are there, the strongest first."""
+    candidates = [e for e in extensions().values() if _possible(e, recording, result)]
+    if not candidates:
+        return ()
+    added = tuple(block for extension in candidates for block in extension.blocks)
+    layout = Layout((*result.layout.blocks, *added))
+    known = len(result.layout)
+    p = np.concatenate([result.p, np.zeros(len(layout) - known)])
+    resets = layout.reset_columns()
+    stage_p = np.zeros((len(result.survey.stages), len(resets)))
+    stage_p[:, np.isin(resets, result.layout.reset_columns())] = result.stage_p
+    frame = replace(result.frame, layout=layout)
+    task = Task(recording, result.survey, frame, noise)
+    start = Reference(p, stage_p, result.heading_rad)
+    done = run_pass(task, start, first=False, progress=progress)
+    covariance = done.root @ done.root.T
+    found = []
+    for extension in candidates:
+        places = [layout.place(block.name) for block in extension.blocks]
+        index = np.concatenate([np.arange(len(layout))[place] for place in places])
+        value = float(
+            done.p[index] @ np.linalg.solve(covariance[np.ix_(index, index)], done.p[index])
+        )
+        shown = bool(chi2.sf(value, len(index)) < SIGNIFICANCE)
+        found.append(Effect(extension.name, extension.title, value, len(index), shown))
+    return tuple(sorted(found, key=lambda e: -e.chi_square / e.states))
+
+
+def _possible(extension: Extension, recording: ImuRecording, result: DynamicResult) -> bool:
+    """Off, an effect of the unit or its place on the table, and with all columns recorded."""
+    first = next(iter(recording.pieces()))
+    needed = {block.needs for block in extension.blocks} - {""}
+    ready = all(getattr(first, name, None) is not None for name in needed)
+    on = any(block.name in result.layout for block in extension.blocks)
+    # A second triad or a table that is recorded is no effect: its states are its own.
+    return ready and not on and not needed & {"force2", "table_angle_rad", "table"}

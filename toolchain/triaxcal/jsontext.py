@@ -1,0 +1,26 @@
+"""JSON text of a result: a key of the document a line, and an entry of a list of tables a line.
+
+Python's encoder with `indent` is not its fast one, and puts each number of a matrix on a line.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+
+def json_bytes(document: Mapping[str, Any]) -> bytes:
+    """Document as UTF-8; NaN and infinity are refused by a ValueError."""
+    lines = [f" {_text(key)}: {_value(value)}" for key, value in document.items()]
+    return ("{\n" + ",\n".join(lines) + "\n}\n").encode()
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(f"  {_text(item)}" for item in value) + "\n ]"
+    return _text(value)
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)

@@ -1,0 +1,90 @@
+"""What a call costs on each core: counted under QEMU, and the same for every input in range."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+
+from triaxcal.targets.bench import Cost, Subject, best_form, compiler_versions, cost_of
+from triaxcal.targets.build import TargetError
+from triaxcal.targets.cores import CORES, install_advice, missing_tools
+from triaxcal.targets.counting import Span, build_plugin
+from triaxcal.targets.matrix import ARITHMETIC_NAMES
+from triaxcal.targets.shapes import Case
+from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
+from triaxcal.verify.tools import BrokenToolError
+from triaxcal.verify.workspace import CONSTANTS, ROUTINE, Workspace
+
+_KEY, _TITLE = "cost", "instructions a call"
+_FILES = (ROUTINE, "triax_comp.h", CONSTANTS)
+
+
+def check(work: Workspace) -> Outcome:
+    """Count both calls on every core in its fastest form; triax_apply may not depend on its input.
+
+    Raises
+    ------
+    BrokenToolError
+        When something does not build or run.
+    """
+    cores = [core for core in CORES if not core.hosted]
+    missing = missing_tools(["gcc", *(tool for core in cores for tool in core.tools("gcc"))])
+    if missing:
+        finding = f"{', '.join(missing)} not found; {install_advice(missing)}"
+        return Outcome(_KEY, _TITLE, NOT_DONE, finding)
+    files = {name: (work.folder / name).read_text() for name in _FILES}
+    case = Case("unit", "as delivered", work.plan, files, work.image)
+    folder = work.folder / "cost"
+    folder.mkdir(exist_ok=True)
+    try:
+        plugin = build_plugin(folder)
+    except TargetError as error:
+        raise BrokenToolError(str(error)) from error
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        costs = list(
+            pool.map(
+                lambda core: cost_of(
+                    Subject(case, best_form(core), ""), core, folder / core.name, plugin
+                ),
+                cores,
+            )
+        )
+    for cost in costs:
+        if cost.failure:
+            raise BrokenToolError(f"{cost.core.name}: {cost.failure}")
+    return outcome_of(costs)
+
+
+def outcome_of(costs: list[Cost]) -> Outcome:
+    """The outcome of what was counted: good when triax_apply costs the same for every input."""
+    told, varying, figures = [], [], {}
+    for cost in costs:
+        assert cost.counts is not None
+        assert cost.flash is not None
+        n, name = cost.counts, cost.core.name.removeprefix("Cortex-")
+        told.append(f"{name} {_span(n.set)} + {_span(n.apply)}")
+        if n.apply.least != n.apply.most:
+            varying.append(name)
+        figures[cost.core.name] = {
+            "form": ARITHMETIC_NAMES[cost.subject.arithmetic],
+            "set_temperature": [n.set.least, n.set.most],
+            "apply": [n.apply.least, n.apply.most],
+            "flash_bytes": {**asdict(cost.flash), "total": cost.flash.total},
+            "state_bytes": n.state_bytes,
+            "stack_bytes": {"set_temperature": n.stack_set, "apply": n.stack_apply},
+        }
+    finding = f"set_temperature + apply: {', '.join(told)}"
+    if varying:
+        finding += f"; apply depends on its input on {', '.join(varying)}"
+    return judged(
+        _KEY,
+        _TITLE,
+        good=not varying,
+        finding=finding,
+        figures={"compilers": compiler_versions(), "cores": figures},
+    )
+
+
+def _span(span: Span) -> str:
+    return str(span.least) if span.least == span.most else f"{span.least} to {span.most}"
