@@ -13,7 +13,7 @@ import pytest
 from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuSamples
 from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
-from triaxcal.simulation import imu
+from triaxcal.simulation import imu, imu_noise
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import AVIATION, EFFECTS, GRADES, MEMS, draw_truth
 from triaxcal.simulation.imu_kinematics import EARTH_RATE_RAD_PER_S, BodyMotion, body_motion
@@ -511,6 +511,13 @@ def test_units_drawn_differ_only_in_what_is_switched_on() -> None:
     assert draw_truth(MEMS, 12) != plain
     assert draw_truth(AVIATION, 11).accel_position_mm == ((0.0, 0.0, 0.0),) * 3
     assert draw_truth(AVIATION, 11, ("accel-positions",)).accel_position_mm[0] == (0.0, 0.0, 0.0)
+
+
+def test_noise_and_constants_have_generators_of_their_own() -> None:
+    sources = {imu_noise.GYRO, imu_noise.ACCEL, imu_noise.SECOND, imu_noise.TEMPERATURE}
+    sources |= {imu_noise.TABLE, *(source + 10 for source in list(sources))}
+    assert len(sources) == 9
+    assert min(sources) >= len(ImuTruth.__dataclass_fields__)
 
 
 def test_only_the_container_is_shared_with_the_filter() -> None:

@@ -70,11 +70,14 @@ def calib(unit: Path, build: Path) -> None:
 
 @main.command()
 @click.argument("unit", type=click.Path(path_type=Path))
-@click.option("--seed", type=int, help="Replaces the seed of truth.toml.")
+@click.option("--seed", type=int, help="Replaces the seed of truth.toml or imu_truth.toml.")
 @click.option("--series", type=int, help="Write so many units that differ from UNIT instead.")
 @click.option("--into", type=click.Path(path_type=Path), help="Folder of the series' units.")
 def simulate(unit: Path, seed: int | None, series: int | None, into: Path | None) -> None:
-    """Write measurements.csv of UNIT, a folder with unit.toml and truth.toml (or tables.toml)."""
+    """Write measurements.csv of UNIT, a folder with unit.toml and truth.toml (or tables.toml).
+
+    An IMU, with imu_truth.toml, receives recording.csv.
+    """
     from triaxcal.simulation.series import write_series  # noqa: PLC0415
     from triaxcal.simulation.unit import write_simulated_unit  # noqa: PLC0415
 

@@ -15,7 +15,7 @@ from triaxcal.dynamic.windows import WINDOW_S, Windows, read_windows
 from triaxcal.errors import RefusedError
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
-STILL_MIN_S = 10.0
+STILL_MIN_S = 5.0
 """Shortest stand-still that an alignment may start from."""
 STILL_RAD_PER_S = np.radians(0.25)
 """Change of the rate, against the stand-still before, that is no noise any more."""
@@ -25,6 +25,9 @@ AXIS_TURN_MIN_RAD = 2 * np.pi
 """An axis that turned less in all was never put on the table."""
 STAGE_TURN_RAD = np.pi
 """Less than half a turn about an axis is handling, not a stage."""
+STILL_SD = 5.0
+STILL_MAX_RAD_PER_S = np.radians(3.0)
+"""A noisy gyro is given so many deviations of a window's mean, by its first seconds."""
 GUARD_S = 2.0
 """Around handling nothing is believed: what lifts the unit starts and ends slowly."""
 
@@ -84,7 +87,7 @@ class Survey:
         Windows in which the unit stands or turns on the table; the others are handling.
     still : array, shape (w,), bool
     rate_max : float
-        Largest mean rate in a stage, rad/s.
+        Largest mean rate in a window, rad/s.
     temp_mean_degc : float
         nan where there is no temperature.
     """
@@ -116,9 +119,9 @@ def survey(recording: ImuRecording) -> Survey:
         sections.append(section)
         still[inside] = standing
     stages, use = _stages(windows, sections, still)
-    _refuse_missing_axis(recording.name, stages)
+    _refuse_missing_axis(recording.name, windows, still, sections)
     speed = np.linalg.norm(windows.rate, axis=1)
-    rate_max = float(speed[use].max())
+    rate_max = float(speed.max())
     return Survey(windows, tuple(sections), stages, use, still, rate_max, temp_mean)
 
 
@@ -129,7 +132,10 @@ def _section(
     rate, start = windows.rate[inside], windows.start_s[inside]
     few = max(2, round(2.0 / WINDOW_S))
     reference = np.median(rate[:few], axis=0)
-    standing: BoolArray = np.abs(rate - reference).max(axis=1) < STILL_RAD_PER_S
+    begin = rate[: round(STILL_MIN_S / WINDOW_S)]
+    noise = 1.4826 * np.median(np.abs(np.diff(begin, axis=0)), axis=0).max() / np.sqrt(2)
+    limit = min(max(STILL_RAD_PER_S, STILL_SD * noise), STILL_MAX_RAD_PER_S)
+    standing: BoolArray = np.abs(rate - reference).max(axis=1) < limit
     run = len(standing) if standing.all() else int(np.argmin(standing))
     length_s = float(windows.duration_s[inside][:run].sum())
     if length_s < STILL_MIN_S:
@@ -185,9 +191,12 @@ def _widened(marked: BoolArray, by: int) -> BoolArray:
     return near
 
 
-def _refuse_missing_axis(name: str, stages: tuple[Stage, ...]) -> None:
-    for axis in range(3):
-        turn = sum(stage.turned_rad for stage in stages if stage.axis == axis)
+def _refuse_missing_axis(
+    name: str, windows: Windows, still: BoolArray, sections: list[Section]
+) -> None:
+    bias = np.array([section.rate for section in sections])[windows.section]
+    turns = np.abs(windows.rate - bias) * windows.duration_s[:, None]
+    for axis, turn in enumerate(turns[~still].sum(axis=0)):
         if turn < AXIS_TURN_MIN_RAD:
             raise RefusedError(
                 name,

@@ -9,13 +9,16 @@ from triaxcal.errors import RefusedError
 from triaxcal.records import MEASUREMENTS_FILE, write_measurements
 from triaxcal.records_csv import DEVIATIONS, READINGS
 from triaxcal.simulation.dwells import simulate_codes
+from triaxcal.simulation.imu_unit import IMU_TRUTH_FILE, write_simulated_recording
 from triaxcal.simulation.published import TABLES_FILE, write_published_measurements
 from triaxcal.simulation.truth import TRUTH_FILE, check_seed, read_truth
-from triaxcal.unitfile import read_unit
+from triaxcal.unitfile import find_unit, read_unit
 
 
 def write_simulated_unit(folder: Path, seed: int | None = None) -> Path:
     """Write measurements.csv of a unit folder that has a truth.toml or a tables.toml.
+
+    A folder with an imu_truth.toml receives the recording of an IMU instead.
 
     With truth.toml the readings are simulated; `seed` replaces the one in the file. With
     tables.toml they are computed from published constants, without noise. Returns the path
@@ -26,6 +29,9 @@ def write_simulated_unit(folder: Path, seed: int | None = None) -> Path:
     RefusedError
         When a file is missing or wrong, both are there, or a seed is given with tables.toml.
     """
+    find_unit(folder)
+    if (folder / IMU_TRUTH_FILE).exists():
+        return write_simulated_recording(folder, seed)
     unit = read_unit(folder)
     has_truth, has_tables = (folder / TRUTH_FILE).exists(), (folder / TABLES_FILE).exists()
     if has_truth == has_tables:

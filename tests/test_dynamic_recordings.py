@@ -1,0 +1,65 @@
+"""Hand rotations of real MPU-9150 units (mikoff, imu-calib) against the constants in its table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from recordings import recording
+from triaxcal.dynamic.calibrate import calibrate_dynamic
+from triaxcal.dynamic.noise import DataSheet
+from triaxcal.dynamic.recording import ImuSamples, recording_of
+
+RATE_HZ = 100.0
+GYRO_SCALE_PERCENT = (
+    (0.041, 0.457, 0.826),
+    (0.007, 0.260, -0.179),
+    (-0.058, 0.277, 0.242),
+    (0.227, 0.599, 0.308),
+    (0.226, 0.570, 0.853),
+)
+GYRO_BIAS_DEG_PER_S = (
+    (1.146, -0.401, 1.261),
+    (-0.573, 1.089, 0.286),
+    (0.573, -0.344, 1.261),
+    (-1.261, 1.031, 4.813),
+    (-1.031, 0.401, 1.432),
+)
+ACCEL_BIAS = (
+    (0.103, 0.097, 0.344),
+    (0.090, 0.070, 0.338),
+    (0.096, 0.008, -0.045),
+    (0.065, 0.092, -0.009),
+    (0.070, 0.036, 0.182),
+)
+ROUNDED_DEG_PER_S = np.degrees(0.0005)
+"""Every printed gyro bias is a whole number of 0.001 rad/s."""
+
+
+@pytest.mark.parametrize(
+    "unit", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 5))]
+)
+def test_hand_rotations_give_the_published_constants(unit: int) -> None:
+    table = np.loadtxt(recording("mikoff_mpu9150") / f"imu{unit}.log")
+    samples = ImuSamples(np.arange(len(table)) / RATE_HZ, table[:, 3:].copy(), table[:, :3].copy())
+    sd = table[:600].std(axis=0)
+    noise = DataSheet(
+        float(np.degrees(sd[3:].max() / np.sqrt(RATE_HZ)) * 60),
+        float(sd[:3].max() / np.sqrt(RATE_HZ) / 9.80665e-6),
+    )
+    # Latitude and gravity of the place are not stated. The Earth's rate is a hundredth of these
+    # gyros' deviations; gravity is common to the three accelerometer scale factors, not compared.
+    about = {"rate_hz": RATE_HZ, "latitude_deg": 55.7, "gravity_m_per_s2": 9.8155}
+    result = calibrate_dynamic(recording_of(samples, f"imu{unit}", **about), noise)
+    layout = result.layout
+    assert result.heading_rad is None  # they cannot see the north, and it is not made up
+
+    def compare(name: str, places: list[int], published: np.ndarray, rounding: float) -> None:
+        place = layout.place(name)
+        found, deviation = result.p[place][places], result.sd[place][places]
+        assert np.all(np.abs(found - published) < 3 * deviation + rounding), (name, found)
+
+    compare("gyro-matrix", [0, 4, 8], np.array(GYRO_SCALE_PERCENT[unit]) / 100, 5e-6)
+    rounding = float(np.radians(ROUNDED_DEG_PER_S))
+    compare("gyro-bias", [0, 1, 2], np.radians(GYRO_BIAS_DEG_PER_S[unit]), rounding)
+    compare("accelerometer-bias", [0, 1, 2], np.array(ACCEL_BIAS[unit]), 5e-4)

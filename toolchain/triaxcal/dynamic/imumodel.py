@@ -1,0 +1,64 @@
+"""The result of a dynamic calibration as the model that the device's arithmetic is made from.
+
+P2's errors become K = E + Gamma, U0 = df0 (accelerometers, readings in g of 9.80665 m/s^2) and
+K = E + Theta, U0 = nu0 (gyros, readings in rad/s), with the temperature coefficients of (23), (24)
+as slopes. D of (13) acts on the raw rate, so that G = K^-1 D is left in the compensated one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.window import gamma_matrix
+from triaxcal.model.imu import ImuModel, constants_from_errors
+from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
+from triaxcal.model.types import FloatArray
+from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
+
+
+def imu_model(result: DynamicResult, range_degc: tuple[float, float]) -> ImuModel:
+    """Model of both triads over `range_degc`; constant where no temperature block was on.
+
+    Effects that belong to the table or to the signal's time (lever arms, delay, mounts, elastic
+    gyro axes) are not part of it.
+    """
+    layout, p = result.layout, result.p
+    reference, g = result.frame.reference_degc, STANDARD_GRAVITY_M_PER_S2
+    accel = _triad(
+        layout.part(p, "accelerometer-bias")[:3] / g,
+        gamma_matrix(layout.part(p, "accelerometer-matrix")),
+        _slopes(layout.part(p, "accelerometer-thermal"), 1 / g),
+        (reference, range_degc),
+    )
+    theta = layout.part(p, "gyro-matrix").reshape(3, 3)
+    gyro = _triad(
+        layout.part(p, "gyro-bias")[:3],
+        theta,
+        _slopes(layout.part(p, "gyro-thermal"), 1.0),
+        (reference, range_degc),
+    )
+    # D is per local g; the device's unit is the standard one.
+    drift = layout.part(p, "g-drift").reshape(3, 3) * (g / result.frame.gravity)
+    sensitivity: FloatArray = np.linalg.solve(np.eye(3) + theta, drift).astype(np.float64)
+    return ImuModel(accel, gyro, sensitivity)
+
+
+def _slopes(values: FloatArray, bias_unit: float) -> tuple[FloatArray, FloatArray]:
+    """Change of bias (3,) and matrix (3, 3) with temperature, per degC."""
+    return values[:3] * bias_unit, np.diag(values[3:6])
+
+
+def _triad(
+    bias: FloatArray,
+    matrix: FloatArray,
+    slopes: tuple[FloatArray, FloatArray],
+    temperatures: tuple[float, tuple[float, float]],
+) -> ThermalModel:
+    reference, range_degc = temperatures
+    constant = constants_from_errors(bias, matrix)
+    slope = constants_from_errors(*slopes) - constants_from_errors(np.zeros(3), np.zeros((3, 3)))
+    curves = PiecewisePolynomial(
+        range_degc, (reference,), np.stack([constant, slope], axis=-1)[None]
+    )
+    return ThermalModel("polynomial", reference, curves)
