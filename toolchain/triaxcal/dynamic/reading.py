@@ -169,13 +169,15 @@ def _csv(path: Path, names: list[str]) -> Callable[[], Iterator[FloatArray]]:
 
 def _spooled(file: TextIO, path: Path, names: list[str]) -> Path:
     """File of doubles, row by row, with the wanted columns of a CSV file."""
-    header = [cell.strip().strip('"') for cell in file.readline().rstrip("\r\n").split(",")]
+    line, row = file.readline(), 2
+    while line.startswith("#"):
+        line, row = file.readline(), row + 1
+    header = [cell.strip().strip('"') for cell in line.rstrip("\r\n").split(",")]
     _missing(path, names, header)
     chosen = [header.index(name) for name in names]
     folder = tempfile.TemporaryDirectory(prefix="triaxcal-")
     _SPOOLS.append(folder)
     spool = Path(folder.name) / "recording"
-    row = 2
     with spool.open("wb") as out:
         while True:
             try:
