@@ -6,7 +6,9 @@ others use too, only they say what a unit costs. Lines:
     cost     CPU seconds a unit, by tenths of the series: flat when it does not grow
     rate     units a minute, and a minute of CPU
     rerun    the same command with nothing changed, as share of the first, wall and CPU
-    workers  one worker against two on `--scaling` units, each worker held to a core of its own
+    workers  one worker against two on `--scaling` units, on one core and on two, after each
+             worker's first unit (which pays for its start). By CPU cost: 2 when a unit costs the
+             same with two, whatever else the machine does
 
     python bench/series.py [--units N] [--scaling N] [--folder EXISTING] [--build FOLDER]
 """
@@ -92,14 +94,16 @@ def run(folder: Path, build: Path, jobs: int, log: Path | None = None) -> dict[s
 
 
 def held_to(count: int, folder: Path, build: Path) -> tuple[float, float]:
-    """Wall and CPU seconds with `count` workers on as many cores."""
+    """Wall and CPU seconds a unit with `count` workers on as many cores, once each has made one."""
     every = os.sched_getaffinity(0)
     os.sched_setaffinity(0, sorted(every)[:count])
     try:
         rows = run(folder, build, count)
     finally:
         os.sched_setaffinity(0, every)
-    return rows["wall"][-1], rows["cpu"][-1]
+    made = len(rows["wall"]) - 2 - count
+    wall, cpu = ((rows[name][-2] - rows[name][count]) / made for name in ("wall", "cpu"))
+    return wall, cpu
 
 
 def main() -> None:
@@ -112,10 +116,10 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder, build = options.folder, options.build or Path(scratch) / "build"
-        if folder is None:
+        if folder is None and options.units:
             folder = Path(scratch) / "units"
             list(write_series(ROOT / "units" / "AT-SIM", folder, options.units))
-        if options.units:
+        if folder is not None:
             measure(folder, build)
         if options.scaling:
             small = Path(scratch) / "small"
@@ -160,6 +164,10 @@ def scaling(folder: Path, scratch: Path, rounds: int) -> None:
         one = held_to(1, folder, scratch / f"one-{k}")
         two = held_to(2, folder, scratch / f"two-{k}")
         ratios.append((one[0] / two[0], 2.0 * one[1] / two[1]))
+        print(
+            f"         one worker {one[0]:.2f} s and {one[1]:.2f} CPU s a unit, two "
+            f"{two[0]:.2f} s and {two[1]:.2f} CPU s"
+        )
     print(
         f"workers  two give {statistics.median(r[0] for r in ratios):.2f} times one, wall; "
         f"{statistics.median(r[1] for r in ratios):.2f} by CPU cost   (limit 1.8)"

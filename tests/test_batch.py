@@ -18,7 +18,7 @@ import batch_workers
 from triaxcal.batch import journal
 from triaxcal.batch.cluster import connect
 from triaxcal.batch.local import run_local
-from triaxcal.batch.order import Make, Outcome
+from triaxcal.batch.order import Make, Order, Outcome
 from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import Series, run_series
 from triaxcal.cli.batch import batch
@@ -304,3 +304,30 @@ def test_a_cluster_without_workers_is_told(bench: Path) -> None:
     assert done.returncode == 1
     assert "the scheduler has no workers; start some: dask worker" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def interrupted(orders: list[Order], after: int) -> Iterator[Outcome]:
+    """The runner's outcomes, and Ctrl-C once `after` of them have come."""
+    for count, outcome in enumerate(run_local(batch_workers.made, orders, 1), start=1):
+        yield outcome
+        if count == after:
+            raise KeyboardInterrupt
+
+
+def test_an_interrupt_is_told_and_the_next_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, build = units(tmp_path / "units", 4), tmp_path / "build"
+    arguments = [*(str(p) for p in sorted(folder.iterdir())), "--build", str(build)]
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            "triaxcal.cli.batch._local", lambda _: lambda _, orders: interrupted(orders, 2)
+        )
+        with pytest.raises(RefusedError) as stopped:
+            batch.main(arguments, standalone_mode=False)
+    assert str(stopped.value) == (
+        "batch: interrupted; 2 of 4 units are done; run it again to go on"
+    )
+    work, series, _ = run(folder, build)
+    assert len(work.done) == 2
+    assert sorted(series.entries) == ["U-1", "U-2", "U-3", "U-4"]

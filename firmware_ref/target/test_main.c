@@ -10,9 +10,19 @@
 
 #include "target_case.h"
 #include "target_io.h"
-#include "triax_calib.h"
-#include "triax_comp.h"
 #include "triax_ref.h"
+
+#ifdef CASE_GYRO
+#include "triax_gyro_calib.h"
+#define triax_calib_t triax_gyro_calib_t
+#define triax_state_t triax_gyro_state_t
+#define triax_calib_load triax_gyro_calib_load
+#define TRIAX_CALIB TRIAX_GYRO_CALIB
+#define TRIAX_IMAGE_SIZE TRIAX_GYRO_IMAGE_SIZE
+#define TRIAX_RAW_MIN TRIAX_GYRO_RAW_MIN
+#else
+#include "triax_calib.h"
+#endif
 
 static triax_ref_t ref;
 static triax_calib_t loaded;
@@ -87,18 +97,105 @@ static uint32_t crc_answer(uint32_t crc, const int32_t accel[3], uint32_t status
     return crc_word(result, status);
 }
 
+#if defined(CASE_GYRO) || defined(TRIAX_RATE_Q)
+/* As in triaxcal/codegen/forces.py, which says what these are for. */
+static uint32_t scramble(uint32_t value)
+{
+    uint32_t x = (value * 0x9E3779B9u) + 0x7F4A7C15u;
+    x = (x ^ (x >> 16)) * 0x85EBCA6Bu;
+    x = (x ^ (x >> 13)) * 0xC2B2AE35u;
+    return x ^ (x >> 16);
+}
+#endif
+
+#ifdef CASE_GYRO
+static void make_force(int32_t temp, const int32_t raw[3], int32_t force[3])
+{
+    uint32_t mixed = scramble((uint32_t)temp);
+    uint32_t j;
+    for (j = 0u; j < 3u; j++) {
+        mixed = scramble(mixed ^ (uint32_t)raw[j]);
+    }
+    for (j = 0u; j < 3u; j++) {
+        const uint32_t word = scramble(mixed + j + 1u);
+        if ((mixed & 3u) == 0u) {
+            force[j] = 0;
+        } else if ((mixed & 3u) == 1u) {
+            force[j] = ((word & 1u) != 0u) ? INT32_MAX : INT32_MIN;
+        } else {
+            force[j] = signed_of(word);
+        }
+    }
+}
+
+static uint32_t run_generated(const triax_calib_t *calib, int32_t temp, const int32_t raw[3],
+                              int32_t result[3])
+{
+    triax_state_t state;
+    int32_t force[3];
+    const uint32_t status = triax_gyro_set_temperature(&state, calib, temp);
+    make_force(temp, raw, force);
+    return status | triax_gyro_apply(&state, raw, force, result);
+}
+
+static uint32_t run_reference(int32_t temp, const int32_t raw[3], int32_t result[3])
+{
+    triax_ref_state_t state;
+    int32_t force[3];
+    const uint32_t status = triax_ref_set_temperature(&state, &ref, temp);
+    make_force(temp, raw, force);
+    return status | triax_ref_apply_gyro(&state, &ref, raw, force, result);
+}
+#else
+#ifdef TRIAX_RATE_Q
+static int32_t make_rate(int32_t temp)
+{
+    const uint32_t word = scramble((uint32_t)temp);
+    if ((word & 3u) == 0u) {
+        return 0;
+    }
+    if ((word & 3u) == 1u) {
+        return CASE_RATE[(word >> 2) % CASE_RATE_COUNT];
+    }
+    return CASE_RATE_MIN + (int32_t)((word >> 2) % CASE_RATE_SPAN);
+}
+#endif
+
+static uint32_t run_generated(const triax_calib_t *calib, int32_t temp, const int32_t raw[3],
+                              int32_t result[3])
+{
+    triax_state_t state;
+#ifdef TRIAX_RATE_Q
+    const uint32_t status = triax_set_temperature_rate(&state, calib, temp, make_rate(temp));
+#else
+    const uint32_t status = triax_set_temperature(&state, calib, temp);
+#endif
+    return status | triax_apply(&state, raw, result);
+}
+
+static uint32_t run_reference(int32_t temp, const int32_t raw[3], int32_t result[3])
+{
+    triax_ref_state_t state;
+#ifdef TRIAX_RATE_Q
+    const uint32_t status = triax_ref_set_temperature_rate(&state, &ref, temp, make_rate(temp));
+#else
+    const uint32_t status = triax_ref_set_temperature(&state, &ref, temp);
+#endif
+    return status | triax_ref_apply(&state, &ref, raw, result);
+}
+#endif
+
 /* Every second sample is compensated in place, as the header allows. */
 static uint32_t digest_generated(const triax_calib_t *calib)
 {
     uint32_t crc = 0xFFFFFFFFu;
     uint32_t i;
     for (i = 0u; i < CASE_VECTORS; i++) {
-        triax_state_t state;
         int32_t raw[3];
         int32_t accel[3];
         int32_t *const result = ((i & 1u) != 0u) ? raw : accel;
-        uint32_t status = triax_set_temperature(&state, calib, make_vector(i, raw));
-        status |= triax_apply(&state, raw, result);
+        const int32_t temp = make_vector(i, raw);
+        const uint32_t status = run_generated(calib, temp, raw, result);
         crc = crc_answer(crc, result, status);
     }
     return ~crc;
@@ -109,11 +206,10 @@ static uint32_t digest_reference(void)
     uint32_t crc = 0xFFFFFFFFu;
     uint32_t i;
     for (i = 0u; i < CASE_VECTORS; i++) {
-        triax_ref_state_t state;
         int32_t raw[3];
         int32_t accel[3];
-        uint32_t status = triax_ref_set_temperature(&state, &ref, make_vector(i, raw));
-        status |= triax_ref_apply(&state, &ref, raw, accel);
+        const int32_t temp = make_vector(i, raw);
+        const uint32_t status = run_reference(temp, raw, accel);
         crc = crc_answer(crc, accel, status);
     }
     return ~crc;

@@ -63,7 +63,8 @@ def test_mikoffs_units(tmp_path: Path, unit: int) -> None:
     differ by what the poses' scatter allows.
     """
     source = recording("mikoff_mpu9150") / f"imu{unit}.log"
-    calibration = calibrated(folder_of(tmp_path, source, "mikoff-mpu9150"))
+    linear = '[fit]\nterms = "linear"\n'
+    calibration = calibrated(folder_of(tmp_path, source, "mikoff-mpu9150", linear))
     found = calibration.recording
     assert found is not None
     assert len(found.poses.poses) == 22
@@ -81,6 +82,15 @@ def test_mikoffs_units(tmp_path: Path, unit: int) -> None:
     # Nine constants from 22 poses: the plain rms is too small by sqrt(13 / 22).
     assert found.held_out_g <= 1.5 * found.rms_free_g
     assert found.held_out_g < 0.5e-3
+
+
+def test_mikoffs_unit_2_is_better_with_quadratic_terms(tmp_path: Path) -> None:
+    source = recording("mikoff_mpu9150") / "imu1.log"
+    calibration = calibrated(folder_of(tmp_path, source, "mikoff-mpu9150"))
+    assert calibration.recording is not None
+    assert calibration.terms.quadratic_per_g is not None
+    linear = next(c for c in calibration.candidates if c.label == "linear, nine constants")
+    assert (calibration.recording.held_out_g or 1.0) < 0.6 * (linear.held_out_g or 0.0)
 
 
 def test_mikoffs_samples_of_poses_left_out_are_no_worse(tmp_path: Path) -> None:

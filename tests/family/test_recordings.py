@@ -83,6 +83,7 @@ def test_counts_in_a_mat_file_with_a_large_bias(tmp_path: Path) -> None:
     assert (unit.adc.bits, unit.adc.volts_per_code) == (17, 1.0)
     matrix, bias = found(calibration)
     assert np.abs(matrix / 415.0 - symmetric_part(K)).max() < 4e-3
+    # 0.17 mg a pose and a scale that 20 poses hold: 1e-3 m/s^2 each, four of them.
     assert np.abs((bias - 33000.0) / 415.0 - U0).max() < 4e-3
     assert calibration.gain_unit == "count/g"
 

@@ -22,6 +22,13 @@ AIR = (
 )
 
 
+def wide() -> FloatArray:
+    """Pitch of five values by roll all round, in rad: every product of the axes is seen."""
+    pitch = np.radians([-60.0, -30.0, 0.0, 30.0, 60.0])
+    roll = np.radians(np.arange(0.0, 360.0, 45.0))
+    return np.stack(np.meshgrid(pitch, roll, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
 def table(kind: str = AIRCRAFT, *, turn: bool = False) -> FloatArray:
     """Angles in rad: P0's 25 positions, or full turns of both angles."""
     if turn:
@@ -85,11 +92,34 @@ def test_the_tables_budget_stands_beside_what_is_left(tmp_path: Path) -> None:
 
 
 def test_a_quadratic_truth_is_found_where_it_is(tmp_path: Path) -> None:
-    rows = rows_of(table(turn=True), quadratic=3e-4)
+    rows = rows_of(wide(), quadratic=3e-4)
     calibration = calibrated(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
     scores = {c.label: c.held_out_g or 1.0 for c in calibration.candidates}
     assert min(scores, key=lambda label: scores[label]).startswith("quadratic")
     assert min(scores.values()) < 0.2 * scores["linear (28)"]
+
+
+def test_quadratic_terms_reach_the_compiled_c(tmp_path: Path) -> None:
+    rows = rows_of(wide(), quadratic=3e-4)
+    delivery = deliver(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
+    assert delivery.calibration.terms.quadratic_per_g is not None
+    errors = [
+        r.error_g for r in next(m for m in delivery.methods if m.method == "matrix").residuals
+    ]
+    assert delivery.calibration.recording is not None
+    # Rounding: raw codes of 2^-16 m/s^2 in three axes, the proven bound, the output.
+    rounding = 3 * 2.0**-17 / 9.8 + (delivery.bound.lsb + 1) * 2.0**-24
+    assert np.abs(errors - delivery.calibration.recording.residual_g).max() < rounding
+    assert np.abs(errors).max() < 60e-6  # the table's 4 arcsec; the linear model leaves 300
+
+
+def test_terms_that_no_pose_shows_are_not_offered(tmp_path: Path) -> None:
+    """Turns about two angles alone never have x and z together."""
+    rows = rows_of(table(turn=True), quadratic=3e-4)
+    calibration = calibrated(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
+    quadratic = [c for c in calibration.candidates if c.label.startswith("quadratic")]
+    assert [c.held_out_g for c in quadratic] == [None, None]
+    assert all((c.condition or 0.0) > 100.0 for c in quadratic)
 
 
 def test_inclinometer_angles_and_a_recording_end_in_c(tmp_path: Path) -> None:

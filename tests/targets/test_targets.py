@@ -6,17 +6,29 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
 
+from plans import COVERING, SENSOR, random_plan
 from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.render import Provenance, render_constants, render_routine
 from triaxcal.errors import RefusedError
 from triaxcal.resources import shipped
 from triaxcal.targets import bench_table, cores, counting, matrix
 from triaxcal.targets.build import TargetError, Toolset, build, emulate
 from triaxcal.targets.counting import build_plugin, measure
-from triaxcal.targets.matrix import FAILED, NOT_DONE, PASSED, Build, compare, run_builds
+from triaxcal.targets.matrix import (
+    FAILED,
+    NOT_DONE,
+    PASSED,
+    THUMB1,
+    THUMB2,
+    Build,
+    compare,
+    run_builds,
+)
 from triaxcal.targets.shapes import CUBIC, Case, shipped_cases, unit_case
 from triaxcal.targets.table import counts, matrix_table
 from triaxcal.targets.vectors import VECTORS, draw, expected_lines, raw_boundaries, vectors
@@ -234,3 +246,18 @@ def test_example_firmware(tmp_path: Path) -> None:
     done = subprocess.run(make, capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert "calibration refused" in done.stderr + done.stdout or "refused" in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [n for n, s in COVERING.items() if not s.saturates])
+def test_assembly_at_the_limits_of_every_shape(name: str) -> None:
+    """Constants that spend step R's limits to the last unit, where a limb's sum could overflow."""
+    need("arm-none-eabi-gcc", "qemu-system-arm")
+    plan = random_plan(Random(name), COVERING[name], full=COVERING[name].inverse is None)
+    files = render_routine(plan)
+    files["triax_calib.h"] = render_constants(plan, SENSOR, Provenance("S", "0" * 64, ("limits",)))
+    case = Case(name, "", plan, files, image_bytes(plan))
+    by_name = {core.name: core for core in cores.CORES}
+    ways = (("Cortex-M0", THUMB1), ("Cortex-M3", THUMB2), ("Cortex-M4F", THUMB2))
+    builds = [Build(case, Toolset(by_name[core], "gcc", "-O2", form)) for core, form in ways]
+    assert [o.detail for o in run_builds(builds)] == ["", "", ""]

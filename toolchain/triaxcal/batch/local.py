@@ -32,7 +32,7 @@ def cores() -> int:
 def run_local(make: Make, orders: list[Order], jobs: int) -> Iterator[Outcome]:
     """Outcomes of all orders as they come, on `jobs` processes.
 
-    An interrupt is left to the caller: units under way are finished first.
+    At an interrupt the units under way are finished and given before it is raised.
     """
     waiting, suspects = deque(orders), deque[Order]()
     with tempfile.TemporaryDirectory(prefix="triaxcal-batch-") as scratch:
@@ -68,6 +68,11 @@ def _together(
                     outcome = future.result()
                     del under_way[future]
                     yield outcome
+        except KeyboardInterrupt:
+            # Seconds of waiting keep what is nearly done; a second interrupt does not wait.
+            for future in list(under_way):
+                yield future.result()
+            raise
         except BrokenProcessPool:
             for future, order in under_way.items():
                 if future.done() and not future.cancelled() and future.exception() is None:

@@ -30,6 +30,13 @@ def forces_of(temp: npt.NDArray[np.integer], raw: npt.NDArray[np.integer]) -> In
     return np.where(kind == 0, 0, np.where(kind == 1, _ENDS[words & np.uint32(1)], anything))
 
 
+def rate_edges(rate: RatePlan) -> list[int]:
+    """Around both ends of the range of rates and zero, and the ends of int32."""
+    low, high = rate.min_code, rate.max_code
+    ends = [-(2**31), low - 1, low, low + 1, -1, 1, high - 1, high, high + 1, 2**31 - 1]
+    return [min(max(end, -(2**31)), 2**31 - 1) for end in ends]
+
+
 def rates_of(rate: RatePlan, temp: npt.NDArray[np.integer]) -> IntArray:
     """Rates (n,) for a term in dT/dt, of temperature codes (n,).
 
@@ -38,8 +45,8 @@ def rates_of(rate: RatePlan, temp: npt.NDArray[np.integer]) -> IntArray:
     """
     word = _scramble(temp.astype(np.int64).astype(np.uint32)).astype(np.int64)
     low, high = rate.min_code, rate.max_code
-    ends = [-(2**31), low - 1, low, low + 1, -1, 1, high - 1, high, high + 1, 2**31 - 1]
-    edge = np.array(ends, dtype=np.int64).clip(-(2**31), 2**31 - 1)[(word >> 2) % len(ends)]
+    ends = np.array(rate_edges(rate), dtype=np.int64)
+    edge = ends[(word >> 2) % len(ends)]
     between = low + (word >> 2) % (high - low + 1)
     kind = word & 3
     return np.where(kind == 0, 0, np.where(kind == 1, edge, between))

@@ -11,9 +11,11 @@ from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.render import shape_id
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.delivery import Delivery
+from triaxcal.fit.calibrate import Calibration
 from triaxcal.fit.thermal import relative_coefficients
 from triaxcal.jsontext import json_bytes
 from triaxcal.model.metrological import CONSTANT_NAMES
+from triaxcal.model.terms import PRODUCT_NAMES
 from triaxcal.model.types import FloatArray
 
 FORMAT = 1
@@ -65,8 +67,32 @@ def calibration_json(delivery: Delivery) -> bytes:
             for c in calibration.candidates
         ],
         "selection_reason": calibration.selection_reason,
+        **_beyond_the_tilter(calibration),
     }
     return json_bytes(document)
+
+
+def _beyond_the_tilter(calibration: Calibration) -> dict[str, Any]:
+    """Quadratic terms, and what a recording's poses say; nothing where there are none."""
+    found: dict[str, Any] = {}
+    if calibration.terms.quadratic_per_g is not None:
+        found["quadratic_terms"] = {
+            "products": list(PRODUCT_NAMES),
+            "per_g": calibration.terms.quadratic_per_g.tolist(),
+        }
+    recording = calibration.recording
+    if recording is not None:
+        found["recording"] = {
+            "poses": len(recording.poses.poses),
+            "refused": [{"line": r.line, "reason": r.reason} for r in recording.poses.refused],
+            "route": recording.route,
+            "rms_g": recording.rms_g,
+            "rms_per_degree_of_freedom_g": recording.rms_free_g,
+            "held_out_g": recording.held_out_g,
+            "condition_number": recording.condition,
+            "findings": list(recording.findings),
+        }
+    return found
 
 
 def verification_json(delivery: Delivery) -> bytes:

@@ -123,7 +123,7 @@ def _outcome(planned: Build, folder: Path, expected: dict[str, int], place: Path
         return Outcome(planned, NOT_DONE, detail)
     firmware = shipped("firmware_ref")
     sources = [
-        folder / "triax_comp.c",
+        folder / planned.case.routine,
         firmware / "triax_ref.c",
         firmware / "triax_ref_image.c",
         firmware / "target" / "test_main.c",

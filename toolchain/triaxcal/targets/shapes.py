@@ -8,12 +8,20 @@ from functools import cache
 from pathlib import Path
 
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
+from triaxcal.codegen.render import (
+    CONSTANTS_FILE,
+    Provenance,
+    gyro_text,
+    render_constants,
+    render_routine,
+)
 from triaxcal.delivery import compensation_of, inputs_sha256
 from triaxcal.errors import RefusedError
 from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan
-from triaxcal.model.terms import EXAMPLE_TERMS
+from triaxcal.model.imu import EXAMPLE_SENSITIVITY, ImuCompensation
+from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS
 from triaxcal.records import MEASUREMENTS_FILE, read_measurements
 from triaxcal.unitfile import UnitDescription, read_unit
 
@@ -38,11 +46,17 @@ class Case:
     files: dict[str, str]
     image: bytes
 
+    @property
+    def routine(self) -> str:
+        """Name of the routine's file."""
+        return next(name for name in self.files if name.endswith("_comp.c"))
+
 
 Change = Callable[[UnitDescription], UnitDescription]
 CUBIC = "cubic"
 CUBIC_LEFT = "cubic, left-justified"
-QUADRATIC = "quadratic terms"
+QUADRATIC, RATE, GYRO = "quadratic terms", "dT/dt", "gyro"
+_TERMS = {QUADRATIC: EXAMPLE_TERMS, RATE: replace(EXAMPLE_TERMS, rate=EXAMPLE_RATE)}
 
 
 def _order_3(unit: UnitDescription) -> UnitDescription:
@@ -67,6 +81,9 @@ _SHAPES: tuple[tuple[str, str, str, Change], ...] = (
     ("no spare bit", "AT-SIM", "output_q 27", lambda u: replace(u, output_q=27)),
     ("odd range", "AT-SIM", "raw codes -8000000 to 8000000", _odd_range),
     (QUADRATIC, "AT-SIM", "18 quadratic terms, order 3", _order_3),
+    (RATE, "AT-SIM", "a term in dT/dt and quadratic terms, inverse", lambda u: replace(
+        u, method="inverse")),
+    (GYRO, "AT-SIM", "a gyro with g-sensitivity, order 3", _order_3),
     ("16 bits", "AT-SIM", "16-bit raw codes", lambda u: replace(u, adc=replace(
         u.adc, bits=16, code_min=-(2**15), code_max=2**15 - 1))),
     ("fine thermometer", "AT-SIM", "110000 temperature codes", lambda u: replace(
@@ -108,10 +125,15 @@ def _calibrated(folder: Path) -> tuple[UnitDescription, Calibration]:
 def _case(folder: Path, name: str, note: str, change: Change) -> Case:
     described, calibration = _calibrated(folder)
     unit = change(described)
-    if name == QUADRATIC:
-        calibration = replace(calibration, terms=EXAMPLE_TERMS)
-    plan = make_plan(compensation_of(unit, calibration, unit.method), unit)
+    calibration = replace(calibration, terms=_TERMS.get(name, NO_TERMS))
+    compensation = compensation_of(unit, calibration, unit.method)
+    plan = make_plan(compensation, unit)
+    if name == GYRO:
+        # The curves of the accelerometer with rad/s for g: a rate of some hundred deg/s.
+        imu = ImuCompensation(compensation, compensation, EXAMPLE_SENSITIVITY)
+        plan = make_gyro_plan(imu, replace(unit, output_q=18), unit.output_q)
     files = render_routine(plan)
     provenance = Provenance(unit.serial, inputs_sha256(folder), (f"shape {name}: {note}",))
-    files[CONSTANTS_FILE] = render_constants(plan, unit.temperature_sensor, provenance)
+    constants = gyro_text(CONSTANTS_FILE) if plan.shape.gyro else CONSTANTS_FILE
+    files[constants] = render_constants(plan, unit.temperature_sensor, provenance)
     return Case(name, note, plan, files, image_bytes(plan))

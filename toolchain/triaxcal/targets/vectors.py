@@ -11,6 +11,7 @@ import zlib
 import numpy as np
 
 from triaxcal.codegen.crosscheck import python_routine
+from triaxcal.codegen.forces import rate_edges
 from triaxcal.codegen.render import int32_literal
 from triaxcal.codegen.routines import Int32Array, UInt32Array
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
@@ -94,9 +95,23 @@ def case_header(case: Case) -> str:
         f"#define CASE_RAW_SPAN {raw_span % 2**32}u /* 0 means 2^32 */",
         *_table("CASE_TEMP", temp_boundaries(plan)),
         *_table("CASE_RAW", raw_boundaries(plan)),
+        *_terms(plan),
         "static const uint8_t CASE_IMAGE[] = {" + ", ".join(map(str, case.image)) + "};",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _terms(plan: Plan) -> list[str]:
+    """What the rates and the forces of test_main.c need."""
+    lines = ["#define CASE_GYRO 1"] if plan.shape.gyro else []
+    if plan.rate is not None:
+        low, high = plan.rate.min_code, plan.rate.max_code
+        lines += [
+            f"#define CASE_RATE_MIN {int32_literal(low)}",
+            f"#define CASE_RATE_SPAN {high - low + 1}u",
+            *_table("CASE_RATE", rate_edges(plan.rate)),
+        ]
+    return lines
 
 
 def _table(name: str, values: list[int]) -> list[str]:

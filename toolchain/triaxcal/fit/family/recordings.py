@@ -36,8 +36,7 @@ ESTIMATOR = "|a| = g"
 THERMAL_SPREAD_DEGC = 5.0
 """Poses over less than this are at one temperature: an order is not asked of them."""
 ORDER_MAX = 3
-QUADRATIC_IN_C = False
-"""Whether the firmware evaluates quadratic terms yet; until then they are shown and not chosen."""
+BEYOND_1_G = "quadratic terms were seen at 1 g; beyond it they grow with the square, unchecked"
 _OUTLIER = 6.0
 """Robust deviations: a pose that stands out by more is told."""
 
@@ -69,10 +68,9 @@ def calibrate_poses(
         refuse_unseen(poses, largest.fit.condition, largest.fit.unseen())
         refuse_few(poses, len(orientations), rows[0].trial.parameters + 1)
     values = sum(int(mask.sum()) for mask in left_out)
-    deliverable = [row for row in rows if QUADRATIC_IN_C or not len(row.trial.model.quadratic)]
-    best = choose(deliverable, values)
-    why = reason(deliverable, best, turns, values)
-    findings += _outlier(best, poses) + _passed_over(rows, best)
+    best = choose(rows)
+    why = reason(rows, best, turns, values)
+    findings += _outlier(best, poses) + ([BEYOND_1_G] if len(best.fit.model.quadratic) else [])
     measurements = MeasurementSet(poses.source, pose_dwells(poses, temps))
     made = _Made(unit, layout, poses, temps, rows, best, why, findings)
     return measurements, made.calibration()
@@ -197,15 +195,6 @@ def _outlier(best: Judged, poses: PoseSet) -> list[str]:
         f'others have {usual * 1e3:.2g}; look at it, or set [fit] loss = "huber"'
     )
     return [told]
-
-
-def _passed_over(rows: list[Judged], best: Judged) -> list[str]:
-    """A quadratic candidate that is better at what it has not seen, and cannot be delivered."""
-    rivals = [(r.held_out_g, r) for r in rows if r.held_out_g is not None and r.able]
-    score, rival = min(rivals, key=lambda pair: pair[0], default=(None, best))
-    if QUADRATIC_IN_C or score is None or not len(rival.trial.model.quadratic):
-        return []
-    return [f"{rival.trial.label} would have {score * 1e3:.3g} mg held out; the firmware is linear"]
 
 
 def pose_dwells(poses: PoseSet, temps: FloatArray) -> tuple[Dwell, ...]:

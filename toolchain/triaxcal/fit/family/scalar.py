@@ -194,7 +194,7 @@ class ScalarFit:
         m, P = self.gain_functions, self.data.basis.shape[1]
         names = [_thermal_name(n, p) for n in self.model.gain_names for p in range(m)]
         names += [_thermal_name(f"U0{axis}", p) for axis in "xyz" for p in range(P)]
-        return (*names, *(f"quadratic {k + 1}" for k in range(len(self.model.quadratic))))
+        return (*names, *(f"quadratic pattern {k + 1}" for k in range(len(self.model.quadratic))))
 
     @property
     def rms_g(self) -> float:
@@ -204,8 +204,9 @@ class ScalarFit:
     @cached_property
     def singular(self) -> tuple[FloatArray, FloatArray]:
         """Singular values of the Jacobian with columns of length 1, and right vectors as rows."""
-        length = np.linalg.norm(self.jacobian, axis=0)
-        scaled = self.jacobian / np.where(length > 0.0, length, 1.0)
+        # An effect below 0.01 g for a constant of 1 is not brought to length 1: it is not seen.
+        floor = 0.01 * np.sqrt(len(self.jacobian))
+        scaled = self.jacobian / np.maximum(np.linalg.norm(self.jacobian, axis=0), floor)
         _, singular, vt = np.linalg.svd(scaled, full_matrices=True)
         padded = np.zeros(vt.shape[0])
         padded[: len(singular)] = singular

@@ -21,9 +21,10 @@ from triaxcal.fit.family.oriented import (
     inverse_quadratic,
     table_error_g,
 )
-from triaxcal.fit.family.recordings import QUADRATIC_IN_C, pose_dwells, recording_range
+from triaxcal.fit.family.recordings import BEYOND_1_G, pose_dwells, recording_range
 from triaxcal.fit.family.result import RecordingFit
 from triaxcal.fit.family.scalar import NINE, fit_scalar, scalar_data
+from triaxcal.fit.family.trials import beats
 from triaxcal.fit.grouping import GROUP_GAP_DEGC
 from triaxcal.fit.selection import Candidate
 from triaxcal.fit.thermal import polynomial_shape
@@ -83,6 +84,7 @@ class _Row:
     fit: OrientedFit
     fitted_g: float
     held_out_g: float | None
+    errors_g: FloatArray | None = None
 
 
 def calibrate_table(
@@ -118,11 +120,10 @@ def calibrate_table(
             expected=f"{CONDITION_MAX:g} at most, with each pose left out in turn",
             remedy="add poses over both angles",
         )
-    deliverable = [r for r in able if QUADRATIC_IN_C or r.fit.quadratic is None] or able
-    best, why = _choose(deliverable, 3 * len(readings))
+    best, why = _choose(able)
     findings = [
         *poses.findings,
-        *_passed_over(able, best),
+        *([] if best.fit.quadratic is None else [BEYOND_1_G]),
         *table_findings(angles, table, readings, sign * best.fit.force_g(readings), unit.gravity_g),
         _angle_residuals(angles, table, sign * best.fit.force_g(readings)),
         *_budget(unit, angles, table, best),
@@ -253,27 +254,19 @@ def _judge(
         if part.condition > 10.0 * CONDITION_MAX:
             return _Row(label, way, parameters, fit, fitted, None)
         errors.append(part.force_g(readings[~kept]) - force[~kept])
-    return _Row(label, way, parameters, fit, fitted, float(np.sqrt(np.mean(np.square(errors)))))
+    every = np.concatenate(errors)
+    score = float(np.sqrt(np.mean(every**2)))
+    return _Row(label, way, parameters, fit, fitted, score, every)
 
 
-def _choose(rows: Sequence[_Row], values: int) -> tuple[_Row, str]:
-    scores = [r.held_out_g or 0.0 for r in rows]
-    limit = min(scores) * (1.0 + 1.0 / math.sqrt(2.0 * values))
-    within = [r for r, score in zip(rows, scores, strict=True) if score <= limit]
-    best = min(within, key=lambda r: r.parameters)
+def _choose(rows: Sequence[_Row]) -> tuple[_Row, str]:
+    unbeaten = [r for r in rows if not any(beats(o.errors_g, r.errors_g) for o in rows)]
+    best = min(unbeaten, key=lambda r: r.parameters)
     return best, (
         f"{best.label}, {best.way}: held-out error {(best.held_out_g or 0.0) * 1e3:.3g} mg a "
-        f"component, each pose left out in turn; of {len(rows)} candidates the simplest within one "
-        f"standard error ({100.0 / math.sqrt(2.0 * values):.0f} %) of the best"
+        f"component, each pose left out in turn; of {len(rows)} candidates the simplest that none "
+        "is told to beat"
     )
-
-
-def _passed_over(rows: Sequence[_Row], best: _Row) -> list[str]:
-    rival = min(rows, key=lambda r: r.held_out_g or 0.0)
-    if rival.fit.quadratic is None or best.fit.quadratic is not None or QUADRATIC_IN_C:
-        return []
-    score = (rival.held_out_g or 0.0) * 1e3
-    return [f"{rival.label} would have {score:.3g} mg held out; the firmware is linear"]
 
 
 def _angle_residuals(angles: Angles, table: FloatArray, force: FloatArray) -> str:

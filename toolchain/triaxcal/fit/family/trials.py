@@ -69,12 +69,15 @@ class Judged:
         Rms |a| - g of what was left out; None when not scored.
     able : bool
         Whether all poses together determine it.
+    errors_g : array or None
+        |a| - g of everything left out, in the order of the turns.
     """
 
     trial: Trial
     fit: ScalarFit
     held_out_g: float | None
     able: bool
+    errors_g: FloatArray | None = None
 
     def candidate(self, estimator: str, *, chosen: bool) -> Candidate:
         """Row of the table."""
@@ -124,7 +127,8 @@ def judge(
         errors.append(part.errors_g(own.select(mask)))
     if not errors:
         return Judged(trial, fit, None, able=True)
-    return Judged(trial, fit, float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), able=True)
+    every = np.concatenate(errors)
+    return Judged(trial, fit, float(np.sqrt(np.mean(every**2))), able=True, errors_g=every)
 
 
 def unscored(rows: Sequence[Judged]) -> list[Judged]:
@@ -139,19 +143,35 @@ def unscored(rows: Sequence[Judged]) -> list[Judged]:
     ]
 
 
-def choose(rows: Sequence[Judged], values: int) -> Judged:
-    """The best by held-out error, or the simplest within one standard error of it.
+def choose(rows: Sequence[Judged]) -> Judged:
+    """The simplest candidate that no other beats on what was left out (`beats`).
 
-    An rms of n values is known to 1 / sqrt(2 n) of itself (fit.selection). Where nothing could be
-    left out, the model with the most constants that has as many poses as constants.
+    Where linear candidates could not be scored, the one of them with the most constants.
     """
-    able = [row for row in rows if row.able]
-    scored = [(row.held_out_g, row) for row in able if row.held_out_g is not None]
     if unscored(rows):
         return max(unscored(rows), key=lambda row: row.trial.parameters)
-    limit = min(score for score, _ in scored) * (1.0 + 1.0 / np.sqrt(2.0 * values))
-    within = [row for score, row in scored if score <= limit]
-    return min(within, key=lambda row: (row.trial.parameters, row.held_out_g))
+    scored = [row for row in rows if row.able and row.errors_g is not None]
+    unbeaten = [
+        row for row in scored if not any(beats(other.errors_g, row.errors_g) for other in scored)
+    ]
+    return min(unbeaten, key=lambda row: (row.trial.parameters, row.held_out_g))
+
+
+def beats(errors: FloatArray | None, rival: FloatArray | None) -> bool:
+    """Whether held-out errors are told to be smaller than a rival's on the same values.
+
+    An rms of n values is known to 1 / sqrt(2 n) of itself (fit.selection), so it must be smaller by
+    that much; and the squares, value by value, must differ by two standard errors of their mean, or
+    the rms must be below half, an F of 4, where few values make a standard error of no use.
+    """
+    if errors is None or rival is None:
+        return False
+    own, other = (float(np.sqrt(np.mean(e**2))) for e in (errors, rival))
+    if own * (1.0 + 1.0 / np.sqrt(2.0 * errors.size)) >= other:
+        return False
+    difference = (rival**2 - errors**2).ravel()
+    sd = float(difference.std(ddof=1)) / np.sqrt(difference.size) if difference.size > 1 else 0.0
+    return own < 0.5 * other or float(difference.mean()) > 2.0 * sd
 
 
 def reason(rows: Sequence[Judged], best: Judged, turns: str, values: int) -> str:
@@ -162,15 +182,13 @@ def reason(rows: Sequence[Judged], best: Judged, turns: str, values: int) -> str
             f"{label}: no pose can be spared to check on, so this is what the poses determine; "
             "record more, in other orientations"
         )
-    resolution = 100.0 / np.sqrt(2.0 * values)
     scored = [row for row in rows if row.held_out_g is not None]
     text = (
         f"{label}: held-out error {_mg(best)} over {values} values ({turns} left out in turn), "
-        f"of {len(scored)} candidates the simplest within one "
-        f"standard error ({resolution:.0f} %) of the best"
+        f"of {len(scored)} candidates the simplest that none is told to beat"
     )
     top = min(scored, key=lambda row: row.held_out_g or 0.0)
-    return text if top is best else f"{text}, {_mg(top)} of {top.trial.label}"
+    return text if top is best else f"{text}; {_mg(top)} of {top.trial.label}"
 
 
 def _mg(row: Judged) -> str:
