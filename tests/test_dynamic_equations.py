@@ -52,7 +52,7 @@ def made(convention: str, p: np.ndarray) -> BlockEquations:
     samples = found.all()
     frame = Frame(LAYOUT, convention, convention, found.gravity_m_per_s2, BLOCK, 1 / RATE_HZ, 20.0)
     C = table_axes(short_motion(1).turntable()).T  # at rest, at angle zero
-    blocks = (len(samples) - 2) // BLOCK
+    blocks = 120  # 24 s: rest, a whole turn at 60 deg/s, rest, and the start of another
     return equations(Window(samples, 0, blocks, About(C, p, EARTH), frame))
 
 

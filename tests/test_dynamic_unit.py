@@ -77,6 +77,11 @@ BAD_TOML = {
     "absent column": ('"gy"', '"gyro_y"', "no column 'gyro_y'"),
     "no such file": ("recording.csv", "other.csv", "other.csv: no such file"),
     "kind of file": ("recording.csv", "unit.toml", "ends in '.toml'"),
+    "beyond the gyros' range": (
+        "[noise]",
+        "rate_max = 0.05\n[noise]",
+        "it is saturated; expected rates within its range, 0.05 deg/s",
+    ),
     "both rate and times": ("[noise]", "rate_hz = 50\n[noise]", "both given"),
     "noise absent": ("gyro_arw_deg_per_sqrt_h = 0.3\n", "", "[noise] gyro_arw_deg_per_sqrt_h"),
 }

@@ -9,8 +9,9 @@ value psi_0): L = exp(hat(psi)) L''. With L = L' (1 + hat(beta)), the vector of 
 
     L' L''^T exp(-hat(psi_0)) = 1 + hat(y)    is    y = psi - psi_0 - L' beta,
 
-which is (18), (19). The table's axis is fixed in the instrument, e + kappa_3 e_2 - kappa_2 e_3 with
-e, e_2, e_3 the nominal instrument vectors along the table's axes, and on the Earth, n = t_1, so
+which is (18), (19); exp(hat(psi)) is exp(hat(d f/g)) exp(hat(theta)). The table's axis is fixed in
+the instrument, e + kappa_3 e_2 - kappa_2 e_3 with e, e_2, e_3 the nominal instrument vectors along
+the table's axes, and on the Earth, n = t_1, so
 
     t (L'^T e - n) = -t (beta x n) - t L'^T (kappa_3 e_2 - kappa_2 e_3),    t = t_2, t_3.
 """
@@ -107,9 +108,13 @@ def _table_rows(
     zero = np.zeros_like(load)
     signals = Signals(zero, zero, load * at.gravity, zero[:, 0], at.gravity)
     own = layout.rows("table", signals)
-    psi = own @ p
+    # The mounts turn the unit after it was put on the plate: theta first, then d f/g.
+    theta = layout.place(TABLE)
+    placed = own[:, :, theta] @ p[theta]
+    bent = own @ p - placed
     inward = np.swapaxes(at.C, 1, 2)
-    y = _vector(inward @ np.swapaxes(nominal, 1, 2) @ rotation_of(psi))
+    back = rotation_of(placed) @ rotation_of(bent)
+    y = _vector(inward @ np.swapaxes(nominal, 1, 2) @ back)
     rows = _rows(len(y), 3, len(layout))
     rows[:, :, 3:6] = -inward
     rows[:, :, 6:-1] = own

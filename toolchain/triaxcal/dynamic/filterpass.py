@@ -33,6 +33,8 @@ FIRST_SEGMENT_S = 1.0
 FEEDBACK_RAD = 0.01
 """A larger tilt shortens the segments: its square is what the filter leaves out."""
 RELEVEL_S = 1.0
+MARGIN = 6
+"""Samples around a segment, for what looks at neighbours."""
 CHECKPOINT_S = 30.0
 LEVEL_SD_RAD = 0.1
 HEADING_SD_RAD = math.pi / math.sqrt(3)
@@ -130,7 +132,7 @@ class _Pass:
         pieces = section_samples(self.recording, section)
         ended = False
         while True:
-            wanted = lead + 1 + self.blocks * size + 1
+            wanted = lead + 1 + self.blocks * size + MARGIN
             while not ended and (pool is None or len(pool) < wanted):
                 piece = next(pieces, None)
                 ended = piece is None
@@ -142,9 +144,9 @@ class _Pass:
             if blocks == 0:
                 return
             end = lead + blocks * size
-            yield pool[: end + 3], lead, blocks
+            yield pool[: end + 1 + MARGIN], lead, blocks
             self._done += blocks * size
-            keep = max(0, end - 2)
+            keep = max(0, end - MARGIN)
             pool, lead = pool[keep:], end - keep
 
     def _until_next_stage(self, time_s: float, blocks: int) -> int:

@@ -147,14 +147,15 @@ def _trajectory(
     nodes = _points(window, mean_rate, C, degc)
     at = window.lead + frame.block * np.arange(window.blocks + 1)
     after = np.minimum(at + 1, len(window.rate) - 1)
-    between = (window.rate[at] + window.rate[after]) / 2
+    smooth = window.smooth_rate
+    between = (smooth[at] + smooth[after]) / 2
     if frame.force_is_increment:
         q = quaternion_product(q, quaternion_of(-0.5 * turns))
-        edge_rate = between if frame.rate_is_increment else window.rate[at]
+        edge_rate = between if frame.rate_is_increment else smooth[at]
         edges = _points(window, edge_rate, C_ends, window.delta_degc[at])
         return _Trajectory(q, nodes, nodes, edges)
     half_s = frame.interval_s / 2
-    edge_rate = window.rate[after] if frame.rate_is_increment else between
+    edge_rate = smooth[after] if frame.rate_is_increment else between
     later = C_ends @ rotation_of(edge_rate * half_s)
     edges = _points(window, edge_rate, later, window.delta_degc[at])
     force_nodes = _points(window, mean_rate, C @ rotation_of(mean_rate * half_s), degc)

@@ -16,12 +16,14 @@ from typing import Any, TextIO
 import numpy as np
 
 from triaxcal.dynamic.description import DynamicDescription
-from triaxcal.dynamic.recording import ImuRecording, ImuSamples
+from triaxcal.dynamic.recording import INCREMENT, ImuRecording, ImuSamples
 from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
 from triaxcal.tomltable import did_you_mean
 
 PIECE = 1 << 16
+FULL_SCALE = 0.999
+"""Of the stated range: scale factors have errors too."""
 _KINDS = ".csv, .parquet, .h5 or .hdf5"
 _SPOOLS: list[tempfile.TemporaryDirectory[str]] = []
 """Kept until the interpreter ends: a recording is read more than once."""
@@ -101,6 +103,7 @@ def _pieces(
                 f"time {time_s[row]:g} s does not rise",
                 expected="times that rise from row to row",
             )
+        _refuse_full_scale(unit, time_s, columns(table, c.rate) * c.rate_scale, 1 / rate_hz)
         yield ImuSamples(
             time_s,
             columns(table, c.rate) * c.rate_scale,
@@ -112,6 +115,25 @@ def _pieces(
         count, last_s = count + len(table), float(time_s[-1])
     if count == 0:
         raise RefusedError(str(unit.recording), "holds no samples")
+
+
+def _refuse_full_scale(
+    unit: DynamicDescription, time_s: FloatArray, rate: FloatArray, interval_s: float
+) -> None:
+    """Refuse rates beyond the range that unit.toml states, where it states one."""
+    if unit.rate_max is None:
+        return
+    if unit.rate_convention == INCREMENT:
+        rate = rate / np.diff(time_s, prepend=time_s[0] - interval_s)[:, None]
+    beyond = np.argwhere(np.abs(rate) >= FULL_SCALE * unit.rate_max)
+    if len(beyond):
+        row, axis = beyond[0]
+        raise RefusedError(
+            f"{unit.recording}, {time_s[row]:.2f} s",
+            f"gyro {'xyz'[axis]} reads {np.degrees(rate[row, axis]):.4g} deg/s: it is saturated",
+            expected=f"rates within its range, {np.degrees(unit.rate_max):.4g} deg/s",
+            remedy="turn more slowly, or correct rate_max in [dynamic]",
+        )
 
 
 def _refuse_non_numbers(path: Path, names: list[str], table: FloatArray, before: int) -> None:
@@ -169,13 +191,15 @@ def _csv(path: Path, names: list[str]) -> Callable[[], Iterator[FloatArray]]:
 
 def _spooled(file: TextIO, path: Path, names: list[str]) -> Path:
     """File of doubles, row by row, with the wanted columns of a CSV file."""
-    header = [cell.strip().strip('"') for cell in file.readline().rstrip("\r\n").split(",")]
+    line, row = file.readline(), 2
+    while line.startswith("#"):
+        line, row = file.readline(), row + 1
+    header = [cell.strip().strip('"') for cell in line.rstrip("\r\n").split(",")]
     _missing(path, names, header)
     chosen = [header.index(name) for name in names]
     folder = tempfile.TemporaryDirectory(prefix="triaxcal-")
     _SPOOLS.append(folder)
     spool = Path(folder.name) / "recording"
-    row = 2
     with spool.open("wb") as out:
         while True:
             try:
