@@ -153,7 +153,7 @@ def test_forces_hold_none_ends_and_anything() -> None:
 # ---- the C ----
 
 
-@pytest.fixture(scope="module", params=["matrix", "inverse"])
+@pytest.fixture(scope="module", params=["matrix", pytest.param("inverse", marks=pytest.mark.slow)])
 def built_imu(request: pytest.FixtureRequest) -> ImuBuild:
     """Both triads, the accelerometer with quadratic terms."""
     imu = imu_of(request.param, terms=EXAMPLE_TERMS)

@@ -181,7 +181,7 @@ def test_no_quadratic_terms_change_nothing_but_their_room() -> None:
 # ---- the C ----
 
 
-@pytest.mark.parametrize("method", ["matrix", "inverse"])
+@pytest.mark.parametrize("method", ["matrix", pytest.param("inverse", marks=pytest.mark.slow)])
 def test_three_implementations_agree_on_a_planned_unit(
     reference: Reference, tmp_path: Path, method: str
 ) -> None:

@@ -149,7 +149,7 @@ def test_terms_that_do_not_fit_are_refused(term: RateTerm, text: str) -> None:
     ("method", "output_q", "terms"),
     [
         ("matrix", 24, replace(EXAMPLE_TERMS, rate=TERM)),
-        ("inverse", 28, Terms(rate=TERM)),
+        pytest.param("inverse", 28, Terms(rate=TERM), marks=pytest.mark.slow),
         pytest.param("matrix", 28, Terms(rate=TERM), marks=pytest.mark.slow),
         pytest.param("inverse", 24, replace(EXAMPLE_TERMS, rate=TERM), marks=pytest.mark.slow),
     ],

@@ -296,6 +296,11 @@ REFUSED = {
         {"header": "t,ax,ay,a_z"},
         "no column 'az' ([recording] acceleration) (did you mean \"a_z\"?)",
     ),
+    "doubled-column": (
+        log(directions(12)),
+        {"header": "t,ax,ax,az"},
+        "2 columns 'ax' ([recording] acceleration); expected one of that name; give its number",
+    ),
     "all-moving": (
         log(directions(12), 0.4),
         {},

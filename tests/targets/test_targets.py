@@ -11,7 +11,15 @@ from random import Random
 import numpy as np
 import pytest
 
-from plans import COVERING, SENSOR, random_plan
+from plans import (
+    COVERING,
+    SENSOR,
+    integer_plan,
+    random_matrix_rows,
+    random_quadratic,
+    random_rows,
+    with_quadratic,
+)
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import Provenance, render_constants, render_routine
 from triaxcal.errors import RefusedError
@@ -253,7 +261,16 @@ def test_example_firmware(tmp_path: Path) -> None:
 def test_assembly_at_the_limits_of_every_shape(name: str) -> None:
     """Constants that spend step R's limits to the last unit, where a limb's sum could overflow."""
     need("arm-none-eabi-gcc", "qemu-system-arm")
-    plan = random_plan(Random(name), COVERING[name], full=COVERING[name].inverse is None)
+    shape, rng = COVERING[name], Random(name)
+    rows = [
+        random_rows(rng, shape.order, full=True, limit=shape.row_limit)
+        if shape.inverse is None
+        else random_matrix_rows(rng, shape.order)
+        for _ in range(shape.segments)
+    ]
+    plan = integer_plan(shape, rows)
+    if shape.quadratic:
+        plan = with_quadratic(plan, random_quadratic(rng, full=True))
     files = render_routine(plan)
     files["triax_calib.h"] = render_constants(plan, SENSOR, Provenance("S", "0" * 64, ("limits",)))
     case = Case(name, "", plan, files, image_bytes(plan))

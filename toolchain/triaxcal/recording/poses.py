@@ -201,7 +201,8 @@ def _reason(
     reading = samples.reading[run[0] : run[1]]
     deviation = reading.std(axis=0)
     for axis in range(3):
-        stuck = deviation[axis] == 0.0 and (np.delete(deviation, axis) > 0.0).any()
+        moves = scale.low[axis] < scale.high[axis]
+        stuck = moves and deviation[axis] == 0.0 and (np.delete(deviation, axis) > 0.0).any()
         if stuck and reading[0, axis] in (scale.low[axis], scale.high[axis]):
             return (
                 f"axis {AXES[axis]} is clipped: it stays at {reading[0, axis]:g}, the end of what "

@@ -63,6 +63,13 @@ class TextTable:
         for names, wanted in ((list(self.names), column), (lowered, column.lower())):
             if names.count(wanted) == 1:
                 return names.index(wanted)
+        if column in self.names:
+            raise RefusedError(
+                self.source,
+                f"{self.names.count(column)} columns {shown(column)} ([recording] {key})",
+                expected="one of that name",
+                remedy="give its number from 1",
+            )
         if not self.names:
             raise RefusedError(
                 self.source,

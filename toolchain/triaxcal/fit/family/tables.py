@@ -16,7 +16,6 @@ from triaxcal.fit.family.harmonics import table_findings
 from triaxcal.fit.family.oriented import (
     OrientedFit,
     SerialGrid,
-    design_condition,
     inverse_linear,
     inverse_quadratic,
     table_error_g,
@@ -24,13 +23,18 @@ from triaxcal.fit.family.oriented import (
 from triaxcal.fit.family.recordings import BEYOND_1_G, pose_dwells, recording_range
 from triaxcal.fit.family.result import RecordingFit
 from triaxcal.fit.family.scalar import NINE, fit_scalar, scalar_data
+from triaxcal.fit.family.table_checks import (
+    known_force,
+    one_temperature,
+    refuse_degrees,
+    refuse_few_poses,
+    refuse_open,
+)
 from triaxcal.fit.family.trials import beats
-from triaxcal.fit.grouping import GROUP_GAP_DEGC
 from triaxcal.fit.selection import Candidate
 from triaxcal.fit.thermal import polynomial_shape
 from triaxcal.model.metrological import pack_constants
 from triaxcal.model.orientation import angles_from_force, gravity_direction
-from triaxcal.model.positions import AXES
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.poses import PoseSet, find_poses
@@ -101,11 +105,11 @@ def calibrate_table(
     poses = find_poses(samples, layout)
     readings, table = poses.readings, np.array([p.angles_rad for p in poses.poses])
     refuse_wrong_unit(poses.source, readings, layout)
-    _refuse_few(poses)
-    _refuse_degrees(poses.source, angles, readings, table, unit.gravity_g)
-    _refuse_open(poses, gravity_direction(angles.kind, table))
-    temps = _one_temperature(unit, poses)
-    force, sign = _force(poses.source, angles, readings, table, unit.gravity_g)
+    refuse_few_poses(poses)
+    refuse_degrees(poses.source, angles, readings, table, unit.gravity_g)
+    refuse_open(poses, gravity_direction(angles.kind, table))
+    temps = one_temperature(unit, poses)
+    force, sign = known_force(poses.source, angles, readings, table, unit.gravity_g)
     rows = [
         _judge(*candidate, readings=readings, force=force)
         for candidate in _CANDIDATES
@@ -131,105 +135,6 @@ def calibrate_table(
     dwells = MeasurementSet(poses.source, pose_dwells(poses, temps))
     return dwells, _calibration(
         unit, layout, poses, temps, rows=rows, best=best, why=why, findings=findings, force=force
-    )
-
-
-def _refuse_few(poses: PoseSet) -> None:
-    if len(poses.poses) < 6:
-        raise RefusedError(
-            poses.source,
-            f"{len(poses.poses)} pose{'s' * (len(poses.poses) != 1)} with angles",
-            expected="6 at least: four constants an output, and some to check on",
-            remedy="measure more positions",
-        )
-
-
-def _refuse_open(poses: PoseSet, direction: FloatArray) -> None:
-    condition = design_condition(direction)
-    if condition > CONDITION_MAX:
-        raise RefusedError(
-            poses.source,
-            f"the angles of the {len(poses.poses)} poses leave constants open (condition number "
-            f"{condition:.3g})",
-            expected=f"{CONDITION_MAX:g} at most",
-            remedy="add poses over both angles",
-        )
-
-
-def _one_temperature(unit: UnitDescription, poses: PoseSet) -> FloatArray:
-    recorded = poses.temps_degc
-    temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
-    if np.ptp(temps) > GROUP_GAP_DEGC:
-        raise RefusedError(
-            poses.source,
-            f"poses with angles at {temps.min():.4g} to {temps.max():.4g} degC",
-            expected=f"one temperature, within {GROUP_GAP_DEGC:g} degC",
-            remedy="make a unit of each temperature, or leave out the angles: the poses are then "
-            "fitted over temperature by |a| = g alone",
-        )
-    if unit.thermal.order:
-        raise RefusedError(
-            f"{unit.name}/unit.toml, [thermal] order",
-            f"order {unit.thermal.order}, but all poses are at one temperature",
-            expected="0",
-        )
-    return temps
-
-
-def _linear_residual(readings: FloatArray, force: FloatArray) -> float:
-    centred = readings - readings.mean(axis=0)
-    design = np.concatenate([np.ones((len(centred), 1)), centred], axis=1)
-    left = force - design @ np.linalg.lstsq(design, force, rcond=None)[0]
-    return float(np.sqrt(np.mean(left**2)))
-
-
-def _refuse_degrees(
-    source: str,
-    angles: Angles,
-    readings: FloatArray,
-    table: FloatArray,
-    gravity_g: float,
-) -> None:
-    """Refuse angles that fit at least ten times better in the other unit."""
-    other = math.pi / 180.0 if angles.unit == "rad" else 180.0 / math.pi
-    own = _linear_residual(readings, gravity_g * gravity_direction(angles.kind, table))
-    rival = _linear_residual(readings, gravity_g * gravity_direction(angles.kind, table * other))
-    if own <= 10.0 * rival or own < 1e-3:
-        return
-    right = "deg" if angles.unit == "rad" else "rad"
-    words = {"deg": "degrees", "rad": "radians"}
-    raise RefusedError(
-        source,
-        f"the readings fit the angles within {own * 1e3:.3g} mg in {words[angles.unit]}, within "
-        f"{rival * 1e3:.3g} mg in {words[right]}",
-        expected=f"angles in {words[angles.unit]}",
-        remedy=f'{words[right]} taken for {words[angles.unit]}? then angle_unit = "{right}"',
-    )
-
-
-def _force(
-    source: str, angles: Angles, readings: FloatArray, table: FloatArray, gravity_g: float
-) -> tuple[FloatArray, float]:
-    """Known forces, (n, 3), with the sign of the readings; refuses exchanged or turned axes."""
-    force = gravity_g * gravity_direction(angles.kind, table)
-    K = inverse_linear(readings, force).K
-    scaled = K / np.linalg.norm(K, axis=1, keepdims=True)
-    along = np.abs(scaled).argmax(axis=1)
-    signs = np.sign(scaled[np.arange(3), along])
-    if (along == np.arange(3)).all() and abs(signs.sum()) == 3.0:
-        return force * signs[0], float(signs[0])
-    told = ", ".join(
-        f"{AXES[i]} along {'+' if signs[i] > 0 else '-'}{AXES[along[i]]}" for i in range(3)
-    )
-    turned = np.zeros((3, 3))
-    turned[np.arange(3), along] = signs * (np.sign(signs.sum()) or 1.0)
-    handed = "left-handed axes? " if np.linalg.det(turned) < 0.0 else ""
-    raise RefusedError(
-        source,
-        f"the outputs look {told} of the table",
-        expected="x along x, y along y, z along z, of one sign",
-        remedy=f"{handed}exchange columns or turn signs in [recording] acceleration, as "
-        '["ay", "-ax", "az"]',
     )
 
 
