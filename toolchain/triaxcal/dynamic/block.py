@@ -59,6 +59,8 @@ class Signals:
         Temperature less the reference temperature; zero where none was recorded.
     gravity : float
         m/s^2.
+    acceleration : array, shape (n, 3), or None
+        Rate of change of the angular rate, rad/s^2, where it is known.
     """
 
     rate: FloatArray
@@ -66,6 +68,7 @@ class Signals:
     force: FloatArray
     delta_degc: FloatArray
     gravity: float
+    acceleration: FloatArray | None = None
 
     @property
     def load(self) -> FloatArray:

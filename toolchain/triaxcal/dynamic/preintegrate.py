@@ -23,7 +23,7 @@ information of terms at twice the turning rate. It biases nothing: the rows are 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -144,6 +144,8 @@ def _trajectory(
     mean_rate = window.angles[window.inside] / window.step_s[window.inside, None]
     mean_rate = mean_rate.reshape(-1, part, 3).mean(axis=1)
     degc = window.delta_degc[window.inside].reshape(-1, part).mean(axis=1)
+    spacing_s = part * frame.interval_s
+    acceleration = np.gradient(mean_rate, spacing_s, axis=0)
     nodes = _points(window, mean_rate, C, degc)
     at = window.lead + frame.block * np.arange(window.blocks + 1)
     after = np.minimum(at + 1, len(window.rate) - 1)
@@ -153,13 +155,13 @@ def _trajectory(
         q = quaternion_product(q, quaternion_of(-0.5 * turns))
         edge_rate = between if frame.rate_is_increment else smooth[at]
         edges = _points(window, edge_rate, C_ends, window.delta_degc[at])
-        return _Trajectory(q, nodes, nodes, edges)
+        return _Trajectory(q, nodes, _changing(nodes, acceleration), edges)
     half_s = frame.interval_s / 2
     edge_rate = smooth[after] if frame.rate_is_increment else between
     later = C_ends @ rotation_of(edge_rate * half_s)
     edges = _points(window, edge_rate, later, window.delta_degc[at])
-    force_nodes = _points(window, mean_rate, C @ rotation_of(mean_rate * half_s), degc)
-    return _Trajectory(q, nodes, force_nodes, edges)
+    later_nodes = _points(window, mean_rate, C @ rotation_of(mean_rate * half_s), degc)
+    return _Trajectory(q, nodes, _changing(later_nodes, acceleration), edges)
 
 
 def _points(window: Window, rate: FloatArray, C: FloatArray, degc: FloatArray) -> _Points:
@@ -167,6 +169,10 @@ def _points(window: Window, rate: FloatArray, C: FloatArray, degc: FloatArray) -
     g = window.frame.gravity
     turn = rate - np.einsum("nji,j->ni", C, window.about.earth)
     return _Points(Signals(rate, turn, C[:, 2, :] * g, degc, g), C)
+
+
+def _changing(points: _Points, acceleration: FloatArray) -> _Points:
+    return _Points(replace(points.signals, acceleration=acceleration), points.C)
 
 
 def _drift_rows(

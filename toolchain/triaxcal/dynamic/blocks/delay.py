@@ -21,8 +21,11 @@ def rows(signals: Signals) -> FloatArray:
 
 
 def curve(signals: Signals, p: FloatArray) -> FloatArray:
-    """Exact for a rate that is constant over tau."""
-    turned = rotation_of(signals.turn * p[0])
+    """Exact for a rate that changes evenly over tau."""
+    angle = signals.turn * p[0]
+    if signals.acceleration is not None:
+        angle = angle - signals.acceleration * (p[0] ** 2 / 2)
+    turned = rotation_of(angle)
     later: FloatArray = np.einsum("nij,nj->ni", turned, signals.force) - signals.force
     return later
 
