@@ -83,6 +83,13 @@ class Layout:
         """Index of c_k of a function."""
         return self.segment(s) + _COEFFICIENTS + f * (self.order + 1) + k
 
+    def reaches(self, words: list[int]) -> list[tuple[int, int, int]]:
+        """First word of each segment, and its first and last temperature code."""
+        starts = [self.segment(s) for s in range(self.segments)]
+        firsts = [words[at] for at in starts]
+        lasts = [f - 1 for f in firsts[1:]] + [words[self.temp_max]]
+        return list(zip(starts, firsts, lasts, strict=True))
+
     def is_safe(self, words: list[int]) -> bool:
         """Step R: whether no arithmetic can overflow with these constants."""
         low, high = words[self.temp_min], words[self.temp_max]
@@ -176,7 +183,7 @@ def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
     cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image, names)]
     changes = itertools.chain(
         _temperature_edges(layout, words), _coefficient_edges(layout, words),
-        _row_edges(layout), _wild(layout), _inverse_edges(layout, plan), _term_edges(layout),
+        _row_edges(layout), _wild(layout, words), _inverse_edges(layout, plan), _term_edges(layout),
         _rate_edges(layout, words),
     )  # fmt: skip
     for name, change in changes:
@@ -304,12 +311,19 @@ def sum_of_floors(order: int) -> int:
     return bound
 
 
-def _wild(layout: Layout) -> Iterator[Change]:
-    """Random constants of all sizes: nearly singular K, saturating inverses, full rows."""
+def _wild(layout: Layout, words: list[int]) -> Iterator[Change]:
+    """Random constants of all sizes: nearly singular K, saturating inverses, full rows.
+
+    Every other image has the largest gains that fit, which fill both halves of x.
+    """
     rng = Random(SEED)
+    gains = {
+        at + _GAIN: INT32_MAX // max(1, words[at + _ORIGIN] - first, last - words[at + _ORIGIN])
+        for at, first, last in layout.reaches(words)
+    }
     for number in range(WILD_IMAGES):
         size = 1 << rng.randrange(1, 31)
-        change = {}
+        change = gains.copy() if number % 2 else {}
         for s, f in itertools.product(range(layout.segments), range(12)):
             for k in range(layout.order + 1):
                 limit = max(1, (size if rng.random() < 0.8 else 2) >> (k + 1))

@@ -26,7 +26,8 @@ Samples = tuple[np.ndarray[tuple[int], np.dtype[np.int32]],
 def ties(plan: Plan) -> Samples:
     """Temperature codes (n,) and raw codes (n, 3) on borders, up to `PER_AXIS` for each axis.
 
-    For each there is the same sample one raw code lower, where the range has it.
+    For each there is the same sample one raw code lower, where the range has it, and where the raw
+    codes are not shifted one whose sum is one less than a border.
     """
     rng = Random(SEED)
     shape = plan.shape
@@ -45,6 +46,9 @@ def ties(plan: Plan) -> Samples:
                     below = list(raw)
                     below[pivot] -= 1
                     rows.append([code, *below])
+            just_below = _solve(gain, constant + 1, plan, rng)
+            if just_below is not None:
+                rows.append([code, *just_below])
     samples = np.array(rows, dtype=np.int32).reshape(-1, 4)
     return np.ascontiguousarray(samples[:, 0]), np.ascontiguousarray(samples[:, 1:])
 
