@@ -26,6 +26,7 @@ from triaxcal.errors import RefusedError
 
 ROOT = Path(__file__).resolve().parents[1]
 TESTS = Path(__file__).parent
+UNITS = Path(__file__).parents[1] / "units"
 
 
 def units(folder: Path, count: int, content: str = "rows") -> Path:
@@ -331,3 +332,18 @@ def test_an_interrupt_is_told_and_the_next_run_goes_on(
     work, series, _ = run(folder, build)
     assert len(work.done) == 2
     assert sorted(series.entries) == ["U-1", "U-2", "U-3", "U-4"]
+
+
+def test_an_imu_is_left_out(tmp_path: Path) -> None:
+    work = plan_work([UNITS / "AT-SIM", UNITS / "IMU-SIM"], tmp_path)
+    assert work.skipped == [(UNITS / "IMU-SIM", "an IMU, which triaxcal dynamic calibrates")]
+    assert [order.name for order in work.orders] == ["AT-SIM"]
+
+
+def test_a_unit_of_a_recording_brings_its_recording(tmp_path: Path) -> None:
+    folder = tmp_path / "units" / "HAND"
+    folder.mkdir(parents=True)
+    (folder / "unit.toml").write_text('serial = "H-1"\n[recording]\nfile = "poses.csv"\n')
+    (folder / "poses.csv").write_text("ax,ay,az\n")
+    (order,) = plan_work([folder], tmp_path / "build").orders
+    assert set(order.inputs) == {"unit.toml", "poses.csv"}

@@ -112,7 +112,8 @@ def test_format_1_stays_readable() -> None:
 
 
 def test_every_shipped_unit_is_readable() -> None:
-    names = list_units(REPO / "units")
+    imus = {"IMU-SIM"}  # the unit.toml of a turntable: dynamic/unit.py reads it
+    names = sorted(set(list_units(REPO / "units")) - imus)
     assert {"AT-CHERNIAK", "AT-SIM"} <= set(names)
     assert [read_unit(REPO / "units" / name).name for name in names] == names
 

@@ -30,14 +30,14 @@ class Work:
         Journal entries of units made before from the same inputs by the same toolchain.
     refused : list of Outcome
         Units that cannot be read, and those that share a name or serial.
-    skipped : list of Path
-        What was named and is no folder.
+    skipped : list of (Path, str)
+        What was named and is no unit of a series, and why.
     """
 
     orders: list[Order]
     done: dict[str, dict[str, Any]]
     refused: list[Outcome]
-    skipped: list[Path]
+    skipped: list[tuple[Path, str]]
 
     @property
     def total(self) -> int:
@@ -54,8 +54,9 @@ def plan_work(folders: Iterable[Path], build: Path) -> Work:
         When no unit is named, or the journal cannot be read.
     """
     named = sorted(dict.fromkeys(folders))
-    skipped = [path for path in named if path.is_file()]
-    units = [path for path in named if path not in set(skipped)]
+    reasons = {path: _not_of_a_series(path) for path in named}
+    units = [path for path, reason in reasons.items() if not reason]
+    skipped = [(path, reason) for path, reason in reasons.items() if reason]
     if not units:
         raise RefusedError("batch", "no units named", remedy="say triaxcal batch units/*")
     before, by = journal.read_journal(build), toolchain()
@@ -76,21 +77,37 @@ def plan_work(folders: Iterable[Path], build: Path) -> Work:
     return Work([o for o in orders if o.name not in done], done, failed, skipped)
 
 
+def _not_of_a_series(path: Path) -> str:
+    if path.is_file():
+        return "a file, not a unit's folder"
+    description = path / UNIT_FILE
+    if description.is_file() and b"[dynamic]" in description.read_bytes():
+        return "an IMU, which triaxcal dynamic calibrates"
+    return ""
+
+
 def _order(folder: Path, by: str) -> Order:
-    find_unit(folder)
-    inputs = {}
-    for name in (UNIT_FILE, MEASUREMENTS_FILE):
-        try:
-            inputs[name] = (folder / name).read_bytes()
-        except OSError as error:
-            raise RefusedError(
-                str(folder / name), f"cannot be read: {(error.strerror or str(error)).lower()}"
-            ) from error
+    path = find_unit(folder)
+    inputs = {UNIT_FILE: _content(path)}
+    recorded = MEASUREMENTS_FILE
+    if b"[recording]" in inputs[UNIT_FILE]:
+        recording = read_toml(path).get("recording")
+        recorded = str(recording.get("file")) if isinstance(recording, dict) else recorded
+    inputs[recorded] = _content(folder / recorded)
     digest = hashlib.sha256(by.encode())
     digest.update(folder.absolute().name.encode())
     for content in inputs.values():
         digest.update(hashlib.sha256(content).digest())
     return Order(folder.absolute().name, str(folder), digest.hexdigest(), by, inputs)
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RefusedError(
+            str(path), f"cannot be read: {(error.strerror or str(error)).lower()}"
+        ) from error
 
 
 def _clashes(orders: list[Order], before: dict[str, dict[str, Any]]) -> dict[str, RefusedError]:

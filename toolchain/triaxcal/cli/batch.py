@@ -47,8 +47,8 @@ def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str
     if scheduler is not None and jobs is not None:
         raise click.UsageError("--jobs is for this machine; a cluster has its own workers")
     work = plan_work(units, build)
-    for path in work.skipped:
-        click.echo(f"{path}: a file, not a unit's folder; left out", err=True)
+    for path, reason in work.skipped:
+        click.echo(f"{path}: {reason}; left out", err=True)
     start = time.monotonic()
     if scheduler is None:
         width = jobs or cores()
