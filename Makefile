@@ -17,7 +17,7 @@ NAMED = case "$$UNIT" in \
     */*) echo "make: UNIT=$$UNIT is a path; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; esac
 
 .DEFAULT_GOAL := help
-.PHONY: help series test-verify rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
+.PHONY: help series test-long test-verify rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -46,7 +46,10 @@ simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated un
 	@$(BIN)/triaxcal simulate "units/$$UNIT"
 
 test: $(DEVELOPER)  ## Tests (under 3 minutes)
-	@$(PYTEST) -m "not slow" --ignore tests/verify
+	@$(PYTEST) -m "not slow and not long" --ignore tests/verify
+
+test-long: $(DEVELOPER)  ## The longer ones: whole sessions, series, cores, coverage (2 minutes)
+	@$(PYTEST) -m "long and not slow" --ignore tests/verify
 
 test-verify: $(DEVELOPER)  ## That every check of `make verify` passes, and can fail (2 minutes)
 	@$(PYTEST) -m "not slow" tests/verify

@@ -27,6 +27,30 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+LONG = {
+    "family/test_over_temperature.py",
+    "rig/test_cli_rig.py",
+    "rig/test_firmware.py",
+    "rig/test_live.py",
+    "rig/test_recording.py",
+    "rig/test_session.py",
+    "targets/test_targets.py",
+    "test_batch.py",
+    "test_uncertainty.py",
+    "test_uncertainty_coverage.py",
+}
+"""Files of ten seconds of CPU and more that `make test` leaves to `make test-long`."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks what is long."""
+    here = Path(__file__).parent
+    for item in items:
+        if item.path.is_relative_to(here) and item.path.relative_to(here).as_posix() in LONG:
+            item.add_marker(pytest.mark.long)
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """A test that did not run for want of a recording is told where everyone looks."""
     skipped = terminalreporter.stats.get("skipped", [])
