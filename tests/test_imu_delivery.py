@@ -18,7 +18,7 @@ from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.imumodel import imu_model
 from triaxcal.errors import RefusedError
 from triaxcal.imudelivery import ImuC, ImuDelivery, deliver_imu
-from triaxcal.model.imu import ImuModel
+from triaxcal.model.imu import ImuModel, compensate_imu
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
 from triaxcal.report.imuc import C_FILES
@@ -220,6 +220,25 @@ def test_a_wrong_device_is_refused(tmp_path: Path, old: str, new: str, text: str
         read_dynamic(unit)
     assert str(refusal.value).startswith(f"{unit / 'unit.toml'}")
     assert str(refusal.value).endswith(text)
+
+
+def test_functions_too_far_from_the_model_are_refused(ran: Ran) -> None:
+    """A scale factor of 40 % at one end and 165 % at the other: no N(T) of order 9 follows."""
+    device, model, unit = ran.c.device, ran.c.model, ran.made.done.unit
+    coefficients = model.accel.curves.coefficients.copy()
+    coefficients[0, [0, 4, 8], 1] = 0.01
+    curves = replace(model.accel.curves, coefficients=coefficients)
+    steep = replace(model, accel=replace(model.accel, curves=curves))
+    functions = compensate_imu(steep, "matrix", device.range_degc, (10.5, 8.8), (1e-6, 1e-8))
+    errors = imudelivery._model_errors(steep, functions, device, ran.c.build.accel)
+    with pytest.raises(RefusedError) as refusal:
+        imudelivery._refuse_model_errors(unit, errors)
+    assert str(refusal.value) == (
+        f"{unit.path}, [device] range_degc: N(T) of the accelerometer is {errors[0] * 1e6:.4g} "
+        "micro-g off the fitted model; expected at most 1 micro-g; narrow the range, or check the "
+        "temperature coefficients"
+    )
+    imudelivery._refuse_model_errors(unit, (1e-6, 0.01))
 
 
 def test_without_a_device_no_c_is_written_and_it_is_said(ran: Ran) -> None:
