@@ -25,6 +25,7 @@ ROOM_OF_MODULE = {
     "__init__": "ground",
     "__main__": "cli",
     "delivery": "delivery",
+    "imudelivery": "delivery",
     "publish": "publish",
 }
 """Modules beside the rooms. `ground` is below every room."""
@@ -40,7 +41,7 @@ MAY_IMPORT = {
     "fixedpoint": {"ground", "model", "records"},
     "codegen": {"ground", "model", "records", "fixedpoint"},
     "publish": {"ground"},
-    "delivery": {"ground", "model", "records", "fit", "fixedpoint", "codegen"},
+    "delivery": {"ground", "model", "records", "fit", "dynamic", "fixedpoint", "codegen"},
     "design": {"ground", "model", "records"},
     "targets": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
     "uncertainty": {"ground", "model", "records", "fit", "fixedpoint"},

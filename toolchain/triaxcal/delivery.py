@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -158,15 +158,23 @@ def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:
     recorded = MEASUREMENTS_FILE
     if unit is not None and unit.recording is not None:
         recorded = unit.recording.file
+    return files_sha256(
+        (folder / UNIT_FILE, folder / recorded), "put it there, or correct [recording] file"
+    )
+
+
+def files_sha256(paths: Iterable[Path], remedy: str) -> str:
+    """Hash of the hashes of files; `remedy` is what to do where one cannot be read."""
     digest = hashlib.sha256()
-    for path in (folder / UNIT_FILE, folder / recorded):
+    for path in paths:
         try:
-            digest.update(hashlib.sha256(path.read_bytes()).digest())
+            with path.open("rb") as file:
+                digest.update(hashlib.file_digest(file, "sha256").digest())
         except OSError as error:
             raise RefusedError(
                 str(path),
                 f"cannot be read: {(error.strerror or str(error)).lower()}",
-                remedy="put it there, or correct [recording] file",
+                remedy=remedy,
             ) from error
     return digest.hexdigest()
 

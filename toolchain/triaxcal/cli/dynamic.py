@@ -20,9 +20,15 @@ from click.termui import progressbar
 )
 def dynamic(unit: Path, build: Path) -> None:
     """Calibrate the IMU UNIT, a folder with unit.toml and a recording on a turntable."""
-    from triaxcal.dynamic.unit import calibrate_unit  # noqa: PLC0415
+    calibrate_imu(unit, build)
+
+
+def calibrate_imu(unit: Path, build: Path) -> None:
+    """Do the work of `triaxcal dynamic`, and of `triaxcal calib` for a unit with [dynamic]."""
+    from triaxcal.imudelivery import deliver_imu  # noqa: PLC0415
     from triaxcal.publish import publish  # noqa: PLC0415
     from triaxcal.report.dynamic import dynamic_files, dynamic_summary  # noqa: PLC0415
+    from triaxcal.report.imuc import C_FILES  # noqa: PLC0415
 
     with progressbar(length=1000, label="pass 1", file=sys.stderr) as bar:
 
@@ -32,7 +38,8 @@ def dynamic(unit: Path, build: Path) -> None:
                 bar.pos = 0
             bar.update(max(0, round(1000 * part) - bar.pos))
 
-        done = calibrate_unit(unit, progress)
-    target = build / done.unit.name
-    publish(dynamic_files(done), target)
-    click.echo(dynamic_summary(done, str(target)))
+        made = deliver_imu(unit, progress)
+    files = dynamic_files(made)
+    target = build / made.done.unit.name
+    publish(files, target, C_FILES)
+    click.echo(dynamic_summary(made, files, str(target)))

@@ -49,7 +49,18 @@ def main() -> None:
     help="Folder that receives a folder of the unit's name.",
 )
 def calib(unit: Path, build: Path) -> None:
-    """Calibrate UNIT, a folder with unit.toml and measurements.csv, and write its C."""
+    """Calibrate UNIT, a folder with unit.toml and measurements.csv, and write its C.
+
+    A unit whose unit.toml has [dynamic] is an IMU: the same as `triaxcal dynamic`.
+    """
+    from triaxcal.tomltable import read_toml  # noqa: PLC0415
+    from triaxcal.unitfile import find_unit  # noqa: PLC0415
+
+    if "dynamic" in read_toml(find_unit(unit)):
+        from triaxcal.cli.dynamic import calibrate_imu  # noqa: PLC0415
+
+        calibrate_imu(unit, build)
+        return
     from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.publish import publish  # noqa: PLC0415
     from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415

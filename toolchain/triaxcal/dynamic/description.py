@@ -1,4 +1,4 @@
-"""unit.toml of a unit that is calibrated on a turntable: [site], [dynamic], [noise], [table]."""
+"""unit.toml of a unit on a turntable: [site], [dynamic], [noise], [table], [device]."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.dynamic.block import StateBlock
+from triaxcal.dynamic.device import DEVICE_KEYS, Device, device_of
 from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT, Turntable
 from triaxcal.dynamic.registry import extensions
@@ -47,6 +48,7 @@ _LAYOUT: Layout = {
         "axis_wobble_arcsec": False,
     },
     "table": {"azimuth_deg": False, "elevation_deg": False, "mountings": False},
+    "device": dict.fromkeys(DEVICE_KEYS, False),
 }
 _RATE_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180, "deg/h": math.pi / 648000}
 _ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "arcsec": math.pi / 648000}
@@ -95,6 +97,8 @@ class DynamicDescription:
         Where there is no column of times.
     rate_max : float or None
         Full scale of the gyros, rad/s.
+    device : Device or None
+        What the firmware's codes are; without it there is no C.
     """
 
     name: str
@@ -112,6 +116,7 @@ class DynamicDescription:
     blocks: tuple[str, ...]
     noise: DataSheet
     table: Turntable | None
+    device: Device | None = None
 
     def state_blocks(self) -> tuple[StateBlock, ...]:
         """Blocks of the extensions that are switched on."""
@@ -159,6 +164,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         blocks=blocks,
         noise=_noise(tables["noise"]),
         table=_table(tables["table"]),
+        device=device_of(tables["device"]),
     )
 
 

@@ -16,6 +16,22 @@ from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
 
+IN_MODEL = (
+    "accelerometer-bias",
+    "accelerometer-matrix",
+    "accelerometer-thermal",
+    "gyro-bias",
+    "gyro-matrix",
+    "gyro-thermal",
+    "g-drift",
+)
+"""Blocks that the device corrects."""
+
+
+def left_out(result: DynamicResult) -> tuple[str, ...]:
+    """Titles of the blocks that were estimated and that the device does not correct."""
+    return tuple(b.title for b in result.layout.blocks if b.name not in IN_MODEL)
+
 
 def imu_model(result: DynamicResult, range_degc: tuple[float, float]) -> ImuModel:
     """Model of both triads over `range_degc`; constant where no temperature block was on.

@@ -44,7 +44,8 @@ def read_recording(unit: DynamicDescription) -> ImuRecording:
             str(path),
             "no such file",
             expected="the recording that unit.toml names",
-            remedy="put it there; of a simulated unit, `triaxcal simulate` makes it",
+            remedy="put it there; of a simulated unit, "
+            f"`triaxcal simulate {unit.path.parent}` makes it",
         )
     names = _names(unit)
     tables: Callable[[], Iterator[FloatArray]]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import textwrap
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -12,17 +14,22 @@ from triaxcal import __version__
 from triaxcal.codegen.render import environment
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.unit import DynamicUnit
+from triaxcal.imudelivery import ImuDelivery
+from triaxcal.report.imuc import imu_c_files, imu_c_lines
 
 FORMAT = 1
-FILES = ("calibration.json", "dynamic.html")
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
 BAND = 10.0
 """Panels show so many final standard deviations on each side."""
 
 
-def dynamic_files(done: DynamicUnit) -> dict[str, bytes]:
+def dynamic_files(made: ImuDelivery) -> dict[str, bytes]:
     """Name and content of everything that build/<UNIT>/ receives."""
-    return {"calibration.json": _calibration_json(done), "dynamic.html": _page(done)}
+    return {
+        "calibration.json": _calibration_json(made.done),
+        "dynamic.html": _page(made.done),
+        **imu_c_files(made),
+    }
 
 
 def _calibration_json(done: DynamicUnit) -> bytes:
@@ -101,8 +108,9 @@ def _digits(value: float, sd: float) -> str:
     return f"{value:.{min(places, 9)}f}"
 
 
-def dynamic_summary(done: DynamicUnit, target: str) -> str:
-    """Text for the screen."""
+def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str:
+    """Text for the screen; `files` lie in the folder `target`."""
+    done = made.done
     unit, result, seen = done.unit, done.result, done.seen
     layout = result.layout
     found = result.survey
@@ -143,7 +151,10 @@ def dynamic_summary(done: DynamicUnit, target: str) -> str:
     if seen.together:
         lines += ["", "known only together:"]
         lines += [f"  {a} and {b}, correlation {c:+.4f}" for a, b, c in seen.together]
-    lines += ["", f"files           {target}/", "                " + " ".join(FILES)]
+    lines += ["", *imu_c_lines(made), "", f"files           {target}/"]
+    lines += textwrap.wrap(
+        "  ".join(files), 80, initial_indent=" " * 16, subsequent_indent=" " * 16
+    )
     return "\n".join(lines)
 
 

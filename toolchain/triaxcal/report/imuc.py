@@ -1,0 +1,115 @@
+"""What is said of the C of an IMU: verification.json and the lines of the summary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from triaxcal import __version__
+from triaxcal.codegen.compiler import FLAGS
+from triaxcal.codegen.crosscheck import CrossCheck
+from triaxcal.codegen.render import shape_id
+from triaxcal.dynamic.device import REQUIRED
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.proof import Bound
+from triaxcal.imudelivery import METHOD, ImuC, ImuDelivery
+from triaxcal.jsontext import json_bytes
+
+VERIFICATION_FILE = "verification.json"
+C_FILES = (
+    "triax_comp.h", "triax_comp.c", "triax_calib.h", "triax_gyro_comp.h", "triax_gyro_comp.c",
+    "triax_gyro_calib.h", "triax_imu.h", "triax_imu.c", "triax_imu.bin", VERIFICATION_FILE,
+)  # fmt: skip
+"""What a unit with [device] receives besides."""
+NO_C = "none: unit.toml has no [device]; add it with " + ", ".join(REQUIRED)
+FORMAT = 1
+
+
+def imu_c_files(made: ImuDelivery) -> dict[str, bytes]:
+    """Name and content of `C_FILES`; nothing where there is no C."""
+    if made.c is None:
+        return {}
+    return {**made.c.build.files, VERIFICATION_FILE: _verification_json(made, made.c)}
+
+
+def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:
+    build, unit = c.build, made.done.unit
+    document: dict[str, Any] = {
+        "format": FORMAT,
+        "kind": "imu",
+        "triaxcal": __version__,
+        "unit": unit.name,
+        "serial": unit.serial,
+        "inputs_sha256": made.inputs_sha256,
+        "compiler_flags": list(FLAGS),
+        "method": METHOD,
+        "range_degc": list(c.device.range_degc),
+        "not_corrected": list(c.left_out),
+        "accelerometer": {
+            **_triad(build.accel, build.accel_bound, build.accel_check),
+            "bound_g": build.accel_bound.lsb * 2.0**-build.accel.shape.output_q,
+            "model_error_g": c.accel_model_error_g,
+        },
+        "gyro": {
+            **_triad(build.gyro, build.gyro_bound, build.gyro_check),
+            "with_accelerometer_lsb": list(build.rate_bound_lsb),
+            "with_accelerometer_deg_per_h": _deg_per_h(build.gyro, max(build.rate_bound_lsb)),
+            "model_error_deg_per_h": c.gyro_model_error_deg_per_h,
+        },
+        "both_together_vectors": build.vectors,
+        "mismatches": 0,
+    }
+    return json_bytes(document)
+
+
+def _triad(plan: Plan, bound: Bound, check: CrossCheck) -> dict[str, Any]:
+    return {
+        "shape": shape_id(plan),
+        "output_q": plan.shape.output_q,
+        "bound_lsb": bound.lsb,
+        "per_axis_lsb": list(bound.per_axis_lsb),
+        "largest_seen_lsb": check.largest_error_lsb,
+        "temp_codes_visited": bound.codes,
+        "vectors": check.vectors,
+        "images": check.images,
+    }
+
+
+def _deg_per_h(gyro: Plan, lsb: float) -> float:
+    return lsb * 2.0**-gyro.shape.output_q * 3600
+
+
+def imu_c_lines(made: ImuDelivery) -> list[str]:
+    """Lines of the summary."""
+    if made.c is None:
+        return [f"C               {NO_C}"]
+    c, build = made.c, made.c.build
+    low, high = c.device.range_degc
+    accel_q, gyro_q = c.device.accel_q, c.device.gyro_rate_q
+    accel, gyro = build.accel_bound.lsb, max(build.rate_bound_lsb)
+    checked = build.accel_check.total + build.gyro_check.total + build.vectors
+    codes = _thousands(build.accel_bound.codes)
+    proven = (
+        f"{accel:.3f} LSB, {accel * 2.0**-accel_q * 1e6:.3g} micro-g",
+        f"{gyro:.3f} LSB, {_deg_per_h(build.gyro, gyro):.3g} deg/h",
+    )
+    agree = f"{_thousands(checked)} vectors: Python, reference C and generated C agree"
+    lines = [
+        f"C               both triads, {low:g} to {high:g} degC, {codes} temperature codes",
+        f"  accelerometer LSB 2^-{accel_q} g; proven within {proven[0]},",
+        f"                and {c.accel_model_error_g * 1e6:.2g} micro-g of the fitted model",
+        f"  gyro          LSB 2^-{gyro_q} deg/s; proven within {proven[1]},",
+        f"                and {c.gyro_model_error_deg_per_h:.2g} deg/h of the fitted model",
+        f"  checked       {agree}",
+    ]
+    lines += [f"  not corrected {title}" for title in c.left_out]
+    names = {block.name for block in made.done.result.layout.blocks}
+    for what in ("accelerometer", "gyro"):
+        if f"{what}-thermal" not in names:
+            lines.append(
+                f'  constant      {what} over temperature: [dynamic] blocks has no "{what}-thermal"'
+            )
+    return lines
+
+
+def _thousands(number: int) -> str:
+    return f"{number:,}".replace(",", " ")
