@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,7 @@ from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import Series, run_series
 from triaxcal.cli.batch import batch
 from triaxcal.errors import RefusedError
+from triaxcal.report.series.unit import make_unit
 
 ROOT = Path(__file__).resolve().parents[1]
 TESTS = Path(__file__).parent
@@ -347,3 +349,37 @@ def test_a_unit_of_a_recording_brings_its_recording(tmp_path: Path) -> None:
     (folder / "poses.csv").write_text("ax,ay,az\n")
     (order,) = plan_work([folder], tmp_path / "build").orders
     assert set(order.inputs) == {"unit.toml", "poses.csv"}
+
+
+def test_a_recording_outside_of_the_unit_s_folder_is_not_sent(tmp_path: Path) -> None:
+    folder = tmp_path / "units" / "HAND"
+    folder.mkdir(parents=True)
+    (tmp_path / "poses.csv").write_text("mine\n")
+    (folder / "unit.toml").write_text(
+        f'serial = "H-1"\n[recording]\nfile = "{tmp_path / "poses.csv"}"\n'
+    )
+    (order,) = plan_work([folder], tmp_path / "build").orders
+    assert set(order.inputs) == {"unit.toml"}
+    outcome = make_unit(replace(order, inputs={**order.inputs, "../poses.csv": b"other"}))
+    assert "lies outside of the unit's folder" in outcome.refusal
+    assert (tmp_path / "poses.csv").read_text() == "mine\n"
+
+
+def test_a_recording_in_a_subfolder_goes_with_its_unit(tmp_path: Path) -> None:
+    folder = tmp_path / "units" / "HAND"
+    (folder / "data").mkdir(parents=True)
+    (folder / "unit.toml").write_text('serial = "H-1"\n[ recording ]\nfile = "data/x.csv"\n')
+    (folder / "data" / "x.csv").write_text("ax,ay,az\n")
+    (order,) = plan_work([folder], tmp_path / "build").orders
+    outcome = make_unit(order)
+    assert "unit.toml" in outcome.refusal  # of the keys that this unit lacks
+    assert "fault" not in outcome.refusal
+
+
+def test_a_word_in_a_comment_makes_no_imu(tmp_path: Path) -> None:
+    folder = units(tmp_path / "units", 1)
+    (unit,) = folder.iterdir()
+    with (unit / "unit.toml").open("a") as file:
+        file.write("# no [dynamic] here\n")
+    work = plan_work([unit], tmp_path / "build")
+    assert (len(work.orders), work.skipped) == (1, [])

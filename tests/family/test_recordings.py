@@ -326,3 +326,21 @@ def test_bad_input_is_named_with_what_to_do(tmp_path: Path, name: str) -> None:
     with pytest.raises(RefusedError) as refusal:
         calibrated(folder)
     assert told in str(refusal.value)
+
+
+def test_quadratic_terms_that_cannot_be_scored_do_not_end_in_a_fault(tmp_path: Path) -> None:
+    random = np.random.default_rng(3).standard_normal((12, 3))
+    poses = random / np.linalg.norm(random, axis=1, keepdims=True)
+    folder = write_unit(tmp_path / "U", log(poses), more='[fit]\nterms = "quadratic"\n')
+    told = calibrated(folder).selection_reason
+    assert "nine constants and squares: no pose can be spared to check on" in told
+
+
+def test_a_stray_quotation_mark_is_refused_with_its_line(tmp_path: Path) -> None:
+    folder = write_unit(tmp_path / "U", log(directions(12)))
+    path = folder / "log.csv"
+    lines = path.read_text().splitlines()
+    lines[40] = '"' + lines[40]
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(RefusedError, match="line 41"):
+        calibrated(folder)

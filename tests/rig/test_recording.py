@@ -7,7 +7,7 @@ import os
 import resource
 import subprocess
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from rig_cases import play, rig_of, short_setup
 from triaxcal.errors import RefusedError
 from triaxcal.records import read_measurements
 from triaxcal.rig.events import Redo
+from triaxcal.rig.frames import Frames
 from triaxcal.rig.journal import Journal, read_journal
 from triaxcal.rig.rawlog import RawLog
 from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, Recording, durable_events, replay
@@ -268,3 +269,17 @@ def test_a_full_disk_ends_the_session_with_an_intact_prefix(tmp_path, limit):
     found = read_journal(tmp_path / "001" / JOURNAL_FILE)
     assert not found.torn
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != limit
+
+
+def test_a_clock_set_back_does_not_hold_up_decisions(tmp_path, monkeypatch):
+    setup = short_setup(tmp_path, temps="[20]")
+    frames = rig_of(setup).advance()
+    few = Frames(*(column[:4] for column in vars(frames).values()))
+    taken = Recording(setup, tmp_path / "001", "test")
+    decided = []
+    monkeypatch.setattr(taken.engine, "feed", lambda frames: decided.append(len(frames)) or [])
+    taken.feed(few)
+    assert decided == []  # too little time to decide anything
+    taken.feed(replace(few, t_ns=few.t_ns - 3600 * 10**9))
+    assert decided == [8]
+    taken.close()

@@ -38,12 +38,15 @@ def test_both_sides_of_every_limit(subjects: dict[str, Subject], shape: str) -> 
     for kind in ("c_0", "gain", "temp_max_code", "temp_min_code"):
         verdicts = {c.accepted for c in cases if c.name.startswith(kind)}
         assert verdicts == {True, False}, kind
-    assert all(c.accepted for c in cases if c.name.startswith("wild"))
+    wild = [c.accepted for c in cases if c.name.startswith("wild")]
+    # Quadratic terms leave the rows less room: there the wildest are refused.
+    assert all(wild) or (made.plan.quadratic is not None and sum(wild) > len(wild) / 2)
     assert not any(c.accepted for c in cases if c.name.startswith(("bit of", "cut to")))
     rows = [(c.name, c.accepted) for c in cases if c.name.startswith("row")]
     if made.plan.shape.inverse is None:
-        assert {str(ROW_LIMIT - 1) in name for name, accepted in rows if accepted} == {True}
-        assert {str(ROW_LIMIT) in name for name, accepted in rows if not accepted} == {True}
+        limit = made.plan.shape.row_limit
+        assert {str(limit - 1) in name for name, accepted in rows if accepted} == {True}
+        assert {str(limit) in name for name, accepted in rows if not accepted} == {True}
     else:
         # There a row depends on the temperature: the image is accepted, the state refused.
         names = [c.name for c in cases]

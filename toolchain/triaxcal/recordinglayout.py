@@ -244,9 +244,16 @@ def _word(table: Table, key: str, words: tuple[str, ...]) -> str:
     return table.choice(key, words) if key in table else words[0]
 
 
+def is_in_folder(name: str) -> bool:
+    """Whether the name of a recording stays in the unit's folder."""
+    return (
+        bool(name) and not name.startswith("/") and ".." not in name.replace("\\", "/").split("/")
+    )
+
+
 def _file(table: Table) -> str:
     name = table.text("file")
-    if not name or name.startswith("/") or ".." in name.replace("\\", "/").split("/"):
+    if not is_in_folder(name):
         raise table.refuse("file", "a file in the unit's folder", "copy it there")
     return name
 

@@ -13,6 +13,7 @@ from triaxcal.batch import journal
 from triaxcal.batch.order import Order, Outcome, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.errors import RefusedError
+from triaxcal.recordinglayout import is_in_folder
 from triaxcal.records import MEASUREMENTS_FILE
 from triaxcal.tomltable import read_toml
 from triaxcal.unitfile import UNIT_FILE, find_unit, list_units
@@ -81,7 +82,7 @@ def _not_of_a_series(path: Path) -> str:
     if path.is_file():
         return "a file, not a unit's folder"
     description = path / UNIT_FILE
-    if description.is_file() and b"[dynamic]" in description.read_bytes():
+    if description.is_file() and _has_table(description, "dynamic"):
         return "an IMU, which triaxcal dynamic calibrates"
     return ""
 
@@ -89,16 +90,27 @@ def _not_of_a_series(path: Path) -> str:
 def _order(folder: Path, by: str) -> Order:
     path = find_unit(folder)
     inputs = {UNIT_FILE: _content(path)}
-    recorded = MEASUREMENTS_FILE
-    if b"[recording]" in inputs[UNIT_FILE]:
-        recording = read_toml(path).get("recording")
-        recorded = str(recording.get("file")) if isinstance(recording, dict) else recorded
-    inputs[recorded] = _content(folder / recorded)
+    recorded = _recorded(path)
+    if is_in_folder(recorded):  # another is refused when the unit is made
+        inputs[recorded] = _content(folder / recorded)
     digest = hashlib.sha256(by.encode())
     digest.update(folder.absolute().name.encode())
     for content in inputs.values():
         digest.update(hashlib.sha256(content).digest())
     return Order(folder.absolute().name, str(folder), digest.hexdigest(), by, inputs)
+
+
+def _recorded(path: Path) -> str:
+    """Name of what was measured: measurements.csv, or the file of [recording]."""
+    if not _has_table(path, "recording"):
+        return MEASUREMENTS_FILE
+    recording = read_toml(path)["recording"]
+    return str(recording.get("file", "")) if isinstance(recording, dict) else ""
+
+
+def _has_table(path: Path, name: str) -> bool:
+    # Most units have none of these tables: a thousand parses are saved.
+    return name.encode() in _content(path) and name in read_toml(path)
 
 
 def _content(path: Path) -> bytes:

@@ -24,6 +24,7 @@ from triaxcal.rig import recording, runner, store
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.events import Agree, Command, Redo
 from triaxcal.rig.plan import SessionPlan
+from triaxcal.rig.rawlog import LogState
 from triaxcal.rig.screen import BusView, plain_status, screen
 from triaxcal.rig.simulator import SimulatedRig
 from triaxcal.rig.socketcan import SocketSource
@@ -97,18 +98,20 @@ def guide(setup: Setup, source: Source, folder: Path, plain: bool) -> None:
                 _plainly(ticks, taken)
             else:
                 _on_screen(ticks, taken, source)
+        taken.log.flush(sync=True)
+        log = taken.log.state  # reads the log: while it is open
     except (_Stop, KeyboardInterrupt):
         click.echo(f"stopped; go on with: triaxcal rig resume --unit {setup.folder}", err=True)
         sys.exit(1)
     finally:
         source.close()
         taken.close()
-    _write(setup, taken)
+    _write(setup, taken, log)
 
 
-def _write(setup: Setup, taken: recording.Recording) -> None:
+def _write(setup: Setup, taken: recording.Recording, log: LogState) -> None:
     """Records of the session; a resumed one is put together from its log."""
-    session, log = taken.engine.session, taken.log.state
+    session = taken.engine.session
     if taken.resumed:
         path = taken.folder / recording.LOG_FILE
         played = recording.replay(setup, path, taken.folder / recording.JOURNAL_FILE)

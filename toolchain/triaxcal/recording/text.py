@@ -197,7 +197,12 @@ def _delimiter(line: str, decimal: str) -> str:
 def _split(lines: Sequence[str], delimiter: str) -> list[list[str]]:
     if delimiter == " ":
         return [_SPACES.split(line.strip()) for line in lines]
-    return [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=delimiter)]
+    # Line by line: a stray quotation mark must not join lines.
+    return [
+        [cell.strip() for cell in row]
+        for line in lines
+        for row in csv.reader([line], delimiter=delimiter)
+    ]
 
 
 def _refuse_ragged(

@@ -81,7 +81,7 @@ class Recording:
         self.log.append(frames)
         if len(frames):
             self._waiting.append(frames)
-        if not self._waiting or frames_ns(self._waiting) < _DECIDE_NS:
+        if not self._waiting or 0 <= frames_ns(self._waiting) < _DECIDE_NS:
             return []
         return self._decide()
 
@@ -133,7 +133,10 @@ class Recording:
 
 
 def frames_ns(parts: list[Frames]) -> int:
-    """Time from the first frame of the first part to the last of the last."""
+    """Time from the first frame of the first part to the last of the last.
+
+    Negative where the computer's clock was set back in between.
+    """
     return int(parts[-1].t_ns[-1]) - int(parts[0].t_ns[0])
 
 

@@ -151,6 +151,8 @@ def choose(rows: Sequence[Judged]) -> Judged:
     if unscored(rows):
         return max(unscored(rows), key=lambda row: row.trial.parameters)
     scored = [row for row in rows if row.able and row.errors_g is not None]
+    if not scored:
+        return max((row for row in rows if row.able), key=lambda row: row.trial.parameters)
     unbeaten = [
         row for row in scored if not any(beats(other.errors_g, row.errors_g) for other in scored)
     ]

@@ -18,6 +18,7 @@ from triaxcal.delivery import Delivery, deliver
 from triaxcal.errors import RefusedError
 from triaxcal.model.thermal import ThermalModel
 from triaxcal.model.types import FloatArray
+from triaxcal.recordinglayout import is_in_folder
 from triaxcal.report.files import all_files
 from triaxcal.report.passport.content import Passport, passport
 
@@ -34,10 +35,12 @@ def make_unit(order: Order) -> Outcome:
         )
     with tempfile.TemporaryDirectory(prefix="triaxcal-") as scratch:
         folder = Path(scratch) / order.name
-        folder.mkdir()
-        for name, content in order.inputs.items():
-            (folder / name).write_bytes(content)
         try:
+            for name, content in order.inputs.items():
+                if not is_in_folder(name):
+                    raise RefusedError(str(folder / name), "lies outside of the unit's folder")
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                (folder / name).write_bytes(content)
             delivery = deliver(folder, _reference())
             made = passport(delivery, {})
             return Outcome(order.name, order.key, "", all_files(delivery, made), unit_record(made))
