@@ -29,7 +29,6 @@ from triaxcal.codegen.tryout import MethodResult, model_error_g, run_on_dwells
 from triaxcal.errors import RefusedError
 from triaxcal.fit.acceptance import dwells_in_range, refuse_unacceptable
 from triaxcal.fit.calibrate import Calibration, calibrate
-from triaxcal.fit.family.route import calibrate_recording
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.compensation import Compensation, compensate
@@ -146,6 +145,9 @@ def _calibrated(
 ) -> tuple[UnitDescription, MeasurementSet, Calibration]:
     """Unit, readings and calibration, by the route that unit.toml states."""
     if unit.recording is not None:
+        # SciPy's optimizers take as long to import as a whole tilter's calibration does.
+        from triaxcal.fit.family.route import calibrate_recording  # noqa: PLC0415
+
         return calibrate_recording(unit, unit.recording, folder)
     measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
     calibration = calibrate(unit, measurements)

@@ -46,9 +46,10 @@ def ties(plan: Plan) -> Samples:
                     below = list(raw)
                     below[pivot] -= 1
                     rows.append([code, *below])
-            just_below = _solve(gain, constant + 1, plan, rng)
-            if just_below is not None:
-                rows.append([code, *just_below])
+            if shape.raw_shift == 0:  # else every sum is even
+                just_below = _solve(gain, constant + 1, plan, rng)
+                if just_below is not None:
+                    rows.append([code, *just_below])
     samples = np.array(rows, dtype=np.int32).reshape(-1, 4)
     return np.ascontiguousarray(samples[:, 0]), np.ascontiguousarray(samples[:, 1:])
 
