@@ -383,3 +383,12 @@ def test_a_word_in_a_comment_makes_no_imu(tmp_path: Path) -> None:
         file.write("# no [dynamic] here\n")
     work = plan_work([unit], tmp_path / "build")
     assert (len(work.orders), work.skipped) == (1, [])
+
+
+@pytest.mark.parametrize("table", ["dynamic", "recording"])
+def test_a_file_that_is_not_toml_is_refused_and_the_others_made(tmp_path: Path, table: str) -> None:
+    folder, build = units(tmp_path / "units", 3), tmp_path / "build"
+    (folder / "U-2" / "unit.toml").write_text(f"[{table}\n", encoding="utf-8")
+    _, series, _ = run(folder, build)
+    assert sorted(series.entries) == ["U-1", "U-3"]
+    assert series.refused["U-2"].startswith(f"{folder}/U-2/unit.toml: not TOML: ")

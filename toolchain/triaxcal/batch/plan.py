@@ -15,7 +15,7 @@ from triaxcal.batch.toolchain import toolchain
 from triaxcal.errors import RefusedError
 from triaxcal.recordinglayout import is_in_folder
 from triaxcal.records import MEASUREMENTS_FILE
-from triaxcal.tomltable import read_toml
+from triaxcal.tomltable import has_table, read_toml
 from triaxcal.unitfile import UNIT_FILE, find_unit, list_units
 
 
@@ -55,18 +55,19 @@ def plan_work(folders: Iterable[Path], build: Path) -> Work:
         When no unit is named, or the journal cannot be read.
     """
     named = sorted(dict.fromkeys(folders))
-    reasons = {path: _not_of_a_series(path) for path in named}
-    units = [path for path, reason in reasons.items() if not reason]
-    skipped = [(path, reason) for path, reason in reasons.items() if reason]
-    if not units:
-        raise RefusedError("batch", "no units named", remedy="say triaxcal batch units/*")
     before, by = journal.read_journal(build), toolchain()
-    orders, failed = [], []
-    for folder in units:
+    orders, failed, skipped = [], [], []
+    for path in named:
         try:
-            orders.append(_order(folder, by))
+            reason = _not_of_a_series(path)
+            if reason:
+                skipped.append((path, reason))
+            else:
+                orders.append(_order(path, by))
         except RefusedError as refusal:
-            failed.append(Outcome(folder.absolute().name, "", str(refusal)))
+            failed.append(Outcome(path.absolute().name, "", str(refusal)))
+    if not orders and not failed:
+        raise RefusedError("batch", "no units named", remedy="say triaxcal batch units/*")
     clashes = _clashes(orders, before)
     failed += [refused(o, clashes[o.folder]) for o in orders if o.folder in clashes]
     orders = [o for o in orders if o.folder not in clashes]
@@ -82,7 +83,7 @@ def _not_of_a_series(path: Path) -> str:
     if path.is_file():
         return "a file, not a unit's folder"
     description = path / UNIT_FILE
-    if description.is_file() and _has_table(description, "dynamic"):
+    if description.is_file() and has_table(description, "dynamic"):
         return "an IMU, which triaxcal dynamic calibrates"
     return ""
 
@@ -102,15 +103,10 @@ def _order(folder: Path, by: str) -> Order:
 
 def _recorded(path: Path) -> str:
     """Name of what was measured: measurements.csv, or the file of [recording]."""
-    if not _has_table(path, "recording"):
+    if not has_table(path, "recording"):
         return MEASUREMENTS_FILE
     recording = read_toml(path)["recording"]
     return str(recording.get("file", "")) if isinstance(recording, dict) else ""
-
-
-def _has_table(path: Path, name: str) -> bool:
-    # Most units have none of these tables: a thousand parses are saved.
-    return name.encode() in _content(path) and name in read_toml(path)
 
 
 def _content(path: Path) -> bytes:

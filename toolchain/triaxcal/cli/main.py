@@ -53,10 +53,10 @@ def calib(unit: Path, build: Path) -> None:
 
     A unit whose unit.toml has [dynamic] is an IMU: the same as `triaxcal dynamic`.
     """
-    from triaxcal.tomltable import read_toml  # noqa: PLC0415
+    from triaxcal.tomltable import has_table  # noqa: PLC0415
     from triaxcal.unitfile import find_unit  # noqa: PLC0415
 
-    if "dynamic" in read_toml(find_unit(unit)):
+    if has_table(find_unit(unit), "dynamic"):
         from triaxcal.cli.dynamic import calibrate_imu  # noqa: PLC0415
 
         calibrate_imu(unit, build)
