@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -334,6 +335,43 @@ def test_an_interrupt_is_told_and_the_next_run_goes_on(
     work, series, _ = run(folder, build)
     assert len(work.done) == 2
     assert sorted(series.entries) == ["U-1", "U-2", "U-3", "U-4"]
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_ctrl_c_while_workers_start_is_one_line(bench: Path, tmp_path: Path, times: int) -> None:
+    """A terminal interrupts all of its processes, those as well that do not ignore it yet."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "triaxcal", "batch", "units/AT-CHERNIAK", "--build", str(tmp_path)],
+        cwd=bench, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    while process.poll() is None and not is_worker_of(process.pid):
+        pass
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.stderr is not None
+    lines = [process.stderr.readline()]
+    if times == 2:
+        os.killpg(process.pid, signal.SIGINT)
+    lines += process.communicate(timeout=120)[1].splitlines()
+    assert process.returncode == 1
+    assert lines == [
+        "interrupted: finishing 1 unit under way; once more to leave at once\n",
+        f"triaxcal: batch: interrupted; {2 - times} of 1 units are done; run it again to go on",
+    ]
+    assert (tmp_path / "AT-CHERNIAK").exists() == (times == 1)
+
+
+def is_worker_of(parent: int) -> bool:
+    """Whether a worker of that process has been started; it may have done nothing yet."""
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            status = (entry / "stat").read_text(encoding="utf-8")
+            command = (entry / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if status[status.rindex(")") + 2 :].split()[1] == str(parent) and b"spawn_main" in command:
+            return True
+    return False
 
 
 def test_an_imu_is_left_out(tmp_path: Path) -> None:
