@@ -20,7 +20,7 @@ import batch_workers
 from triaxcal.batch import journal
 from triaxcal.batch.cluster import connect
 from triaxcal.batch.local import run_local
-from triaxcal.batch.order import Make, Order, Outcome
+from triaxcal.batch.order import Make, Order, Outcome, filled
 from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import Series, run_series
 from triaxcal.cli.batch import batch
@@ -386,7 +386,8 @@ def test_a_unit_of_a_recording_brings_its_recording(tmp_path: Path) -> None:
     (folder / "unit.toml").write_text('serial = "H-1"\n[recording]\nfile = "poses.csv"\n')
     (folder / "poses.csv").write_text("ax,ay,az\n")
     (order,) = plan_work([folder], tmp_path / "build").orders
-    assert set(order.inputs) == {"unit.toml", "poses.csv"}
+    assert order.files == ("unit.toml", "poses.csv")
+    assert set(filled(order).inputs) == {"unit.toml", "poses.csv"}
 
 
 def test_a_recording_outside_of_the_unit_s_folder_is_not_sent(tmp_path: Path) -> None:
@@ -397,8 +398,8 @@ def test_a_recording_outside_of_the_unit_s_folder_is_not_sent(tmp_path: Path) ->
         f'serial = "H-1"\n[recording]\nfile = "{tmp_path / "poses.csv"}"\n'
     )
     (order,) = plan_work([folder], tmp_path / "build").orders
-    assert set(order.inputs) == {"unit.toml"}
-    outcome = make_unit(replace(order, inputs={**order.inputs, "../poses.csv": b"other"}))
+    assert order.files == ("unit.toml",)
+    outcome = make_unit(replace(order, inputs={**filled(order).inputs, "../poses.csv": b"other"}))
     assert "lies outside of the unit's folder" in outcome.refusal
     assert (tmp_path / "poses.csv").read_text() == "mine\n"
 
@@ -409,7 +410,7 @@ def test_a_recording_in_a_subfolder_goes_with_its_unit(tmp_path: Path) -> None:
     (folder / "unit.toml").write_text('serial = "H-1"\n[ recording ]\nfile = "data/x.csv"\n')
     (folder / "data" / "x.csv").write_text("ax,ay,az\n")
     (order,) = plan_work([folder], tmp_path / "build").orders
-    outcome = make_unit(order)
+    outcome = make_unit(filled(order))
     assert "unit.toml" in outcome.refusal  # of the keys that this unit lacks
     assert "fault" not in outcome.refusal
 
@@ -430,3 +431,18 @@ def test_a_file_that_is_not_toml_is_refused_and_the_others_made(tmp_path: Path, 
     _, series, _ = run(folder, build)
     assert sorted(series.entries) == ["U-1", "U-3"]
     assert series.refused["U-2"].startswith(f"{folder}/U-2/unit.toml: not TOML: ")
+
+
+def test_a_unit_that_changes_while_the_series_runs_is_refused(tmp_path: Path) -> None:
+    folder, build = units(tmp_path / "units", 3), tmp_path / "build"
+    work = plan_work(folder.iterdir(), build)
+    # Planned without their contents: a thousand recordings are not held in memory.
+    assert not any(order.inputs for order in work.orders)
+    (folder / "U-2" / "measurements.csv").write_text("new rows", encoding="utf-8")
+    (folder / "U-3" / "measurements.csv").unlink()
+    told = {o.name: o for o in run_local(batch_workers.made, work.orders, 1)}
+    assert not told["U-1"].refusal
+    assert told["U-2"].refusal == (
+        f"{folder}/U-2: its files changed while the series ran; run again"
+    )
+    assert "U-3/measurements.csv: cannot be read: no such file" in told["U-3"].refusal

@@ -19,7 +19,8 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context
 
-from triaxcal.batch.order import Make, Order, Outcome, refused
+from triaxcal.batch.order import Make, Order, Outcome, filled, refused
+from triaxcal.errors import RefusedError
 
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """A worker is a core's worth: libraries that would start threads of their own are told so."""
@@ -81,7 +82,7 @@ def _together(
             while waiting or under_way:
                 while waiting and len(under_way) < jobs:
                     with _uninterrupted():
-                        under_way[pool.submit(make, waiting[0])] = waiting[0]
+                        under_way[_sent(pool, make, waiting[0])] = waiting[0]
                     waiting.popleft()
                 done, _ = wait(under_way, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -114,7 +115,7 @@ def _alone(make: Make, suspects: deque[Order], scratch: str) -> Iterator[Outcome
     with _pool(1, scratch) as pool:
         try:
             with _uninterrupted():
-                future = pool.submit(make, order)
+                future = _sent(pool, make, order)
             yield future.result()
         except BrokenProcessPool:
             yield refused(
@@ -122,6 +123,15 @@ def _alone(make: Make, suspects: deque[Order], scratch: str) -> Iterator[Outcome
                 f"{order.folder}: the worker process died on it twice; is there memory enough? "
                 "run again with fewer --jobs",
             )
+
+
+def _sent(pool: ProcessPoolExecutor, make: Make, order: Order) -> Future[Outcome]:
+    try:
+        return pool.submit(make, filled(order))
+    except RefusedError as refusal:
+        future: Future[Outcome] = Future()
+        future.set_result(refused(order, refusal))
+        return future
 
 
 def _pool(jobs: int, scratch: str) -> ProcessPoolExecutor:
@@ -133,12 +143,19 @@ def _pool(jobs: int, scratch: str) -> ProcessPoolExecutor:
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Interrupts wait; for a worker that starts meanwhile, until `_start` ignores them."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _OF_THE_TERMINAL)
+    """Interrupts wait; in a worker that starts meanwhile, until `_start` ignores them."""
+    came: list[int] = []
+    # The mask is what a worker inherits; here, threads of libraries take signals in spite of it.
+    handlers = {n: signal.signal(n, lambda n, _: came.append(n)) for n in _OF_THE_TERMINAL}
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _OF_THE_TERMINAL)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for name, handler in handlers.items():
+            signal.signal(name, handler)
+        if came:
+            raise KeyboardInterrupt
 
 
 def _start(scratch: str) -> None:

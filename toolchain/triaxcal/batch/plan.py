@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from triaxcal.batch import journal
-from triaxcal.batch.order import Order, Outcome, refused
+from triaxcal.batch.order import Order, Outcome, planned, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.errors import RefusedError
 from triaxcal.recordinglayout import is_in_folder
@@ -89,16 +88,10 @@ def _not_of_a_series(path: Path) -> str:
 
 
 def _order(folder: Path, by: str) -> Order:
-    path = find_unit(folder)
-    inputs = {UNIT_FILE: _content(path)}
-    recorded = _recorded(path)
-    if is_in_folder(recorded):  # another is refused when the unit is made
-        inputs[recorded] = _content(folder / recorded)
-    digest = hashlib.sha256(by.encode())
-    digest.update(folder.absolute().name.encode())
-    for content in inputs.values():
-        digest.update(hashlib.sha256(content).digest())
-    return Order(folder.absolute().name, str(folder), digest.hexdigest(), by, inputs)
+    recorded = _recorded(find_unit(folder))
+    # A recording that lies elsewhere is refused when the unit is made.
+    files = (UNIT_FILE, recorded) if is_in_folder(recorded) else (UNIT_FILE,)
+    return planned(folder, by, files)
 
 
 def _recorded(path: Path) -> str:
@@ -107,15 +100,6 @@ def _recorded(path: Path) -> str:
         return MEASUREMENTS_FILE
     recording = read_toml(path)["recording"]
     return str(recording.get("file", "")) if isinstance(recording, dict) else ""
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise RefusedError(
-            str(path), f"cannot be read: {(error.strerror or str(error)).lower()}"
-        ) from error
 
 
 def _clashes(orders: list[Order], before: dict[str, dict[str, Any]]) -> dict[str, RefusedError]:
