@@ -68,15 +68,18 @@ def calib(unit: Path, build: Path) -> None:
     from triaxcal.report.summary import summary  # noqa: PLC0415
 
     delivery = deliver(unit)
+    warning = ""
+    if (unit / "history").is_dir():
+        from triaxcal.cli.history import warning_of_contradiction  # noqa: PLC0415
+
+        warning = warning_of_contradiction(unit, delivery)
     made = passport(delivery, {})
     files = all_files(delivery, made)
     target = build / delivery.unit.name
     publish(files, target, SOMETIMES)
     click.echo(summary(made, files, str(target)))
-    if (unit / "history").is_dir():
-        from triaxcal.cli.history import warn_of_contradiction  # noqa: PLC0415
-
-        warn_of_contradiction(unit, delivery)
+    if warning:
+        click.echo(warning, err=True)
 
 
 @main.command()
