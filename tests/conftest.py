@@ -23,6 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 LONG = {
     "family/test_over_temperature.py",
+    "family/test_real_recordings.py",
     "rig/test_cli_rig.py",
     "rig/test_firmware.py",
     "rig/test_live.py",
@@ -30,6 +31,8 @@ LONG = {
     "rig/test_session.py",
     "targets/test_targets.py",
     "test_batch.py",
+    "test_dynamic_calibrate.py",
+    "test_dynamic_equations.py",
     "test_uncertainty.py",
     "test_uncertainty_coverage.py",
 }
