@@ -14,21 +14,19 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import can
+from at_sim_bench import setup_at
 
 from triaxcal.rig.candump import format_frames, parse
 from triaxcal.rig.dbc import default_dbc, load_database, read_dbc
 from triaxcal.rig.engine import Setup
-from triaxcal.rig.plan import read_plan
 from triaxcal.rig.recording import replay
 from triaxcal.rig.samples import SampleDecoder
 from triaxcal.rig.simulator import RigSettings, SimulatedRig
 from triaxcal.simulation.truth import read_truth
-from triaxcal.unitfile import read_unit
 
 FRAMES = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
 PEER = 50_000
 RATE = 1000
-REPO = Path(__file__).parents[1]
 CHUNK = 4 << 20
 
 
@@ -42,15 +40,6 @@ def make_log(path: Path, setup: Setup) -> None:
             frames = rig.advance()
             file.write(format_frames(frames, "can0"))
             count += len(frames)
-
-
-def about(folder: Path) -> Setup:
-    bench = REPO / "units" / "AT-SIM-BENCH"
-    unit = read_unit(bench)
-    plan = folder / "plan.toml"
-    text = (REPO / "rig" / "plans" / "five-temperatures.toml").read_text(encoding="utf-8")
-    plan.write_text(text.replace("rate_hz = 100", f"rate_hz = {RATE}"), encoding="utf-8")
-    return Setup(bench, unit, read_plan(plan, unit), read_dbc(default_dbc()))
 
 
 def chunks(path: Path) -> list[bytes]:
@@ -123,7 +112,7 @@ def command_line(path: Path) -> int:
 
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
-        path, setup = Path(folder) / "frames.log", about(Path(folder))
+        path, setup = Path(folder) / "frames.log", setup_at(RATE, Path(folder))
         make_log(path, setup)
         mine = timed(lambda: ours(path))
         whole = timed(lambda: replayed(setup, path))

@@ -14,32 +14,20 @@ import tempfile
 import time
 from pathlib import Path
 
+from at_sim_bench import setup_at
 from can.interfaces.socketcan.socketcan import capture_message
 
-from triaxcal.rig.dbc import default_dbc, load_database, read_dbc
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.plan import read_plan
+from triaxcal.rig.dbc import default_dbc, load_database
 from triaxcal.rig.recording import Recording
 from triaxcal.rig.simulator import RigSettings, SimulatedRig
 from triaxcal.rig.socketcan import SocketSource, packed
 from triaxcal.rig.sources import PACE_S
 from triaxcal.simulation.truth import read_truth
-from triaxcal.unitfile import read_unit
 
 SECONDS = int(sys.argv[1]) if len(sys.argv) > 1 else 8
-REPO = Path(__file__).parents[1]
 RATE = 4000
 BUSY = 9000  # frames a second of a full bus at 1 Mbit/s
 BURST = round(BUSY * PACE_S)  # what one read of the receiver finds there
-
-
-def setup(folder: Path) -> Setup:
-    bench = REPO / "units" / "AT-SIM-BENCH"
-    unit = read_unit(bench)
-    plan = folder / "plan.toml"
-    text = (REPO / "rig" / "plans" / "five-temperatures.toml").read_text(encoding="utf-8")
-    plan.write_text(text.replace("rate_hz = 100", f"rate_hz = {RATE}"), encoding="utf-8")
-    return Setup(bench, unit, read_plan(plan, unit), read_dbc(default_dbc()))
 
 
 def spent(seconds, receive) -> float:
@@ -99,7 +87,7 @@ def python_can_and_cantools(link):
 def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        about = setup(folder)
+        about = setup_at(RATE, folder)
         truth, _ = read_truth(about.folder)
         rig = SimulatedRig(about.unit, truth, about.plan, about.dbc, RigSettings())
         seconds = [rig.advance() for _ in range(SECONDS)]

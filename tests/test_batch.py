@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -299,6 +301,33 @@ def test_a_real_cluster(bench: Path, tmp_path: Path) -> None:
         )  # fmt: skip
         assert (tmp_path / "mark").exists(), killed.stderr
         assert killed.stdout.strip() == "['U-1', 'U-2', 'U-3', 'U-4', 'U-5'] {}", killed.stderr
+
+
+def test_a_cluster_that_is_lost_is_told_in_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    for k in range(1, 9):
+        unit = tmp_path / "units" / f"U-{k}"
+        shutil.copytree(ROOT / "units" / "AT-CHERNIAK", unit)
+        text = (unit / "unit.toml").read_text(encoding="utf-8")
+        (unit / "unit.toml").write_text(text.replace('"AT-CHERNIAK"', f'"U-{k}"'), "utf-8")
+    with cluster(1) as address:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "triaxcal", "batch", *sorted((tmp_path / "units").iterdir()),
+             "--build", str(tmp_path / "b"), "--scheduler", address],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        while process.poll() is None and not (tmp_path / "b" / "series.jsonl").exists():
+            time.sleep(0.02)
+    # The cluster has ended with the block. The first unit is kept.
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 1
+    (line,) = errors.splitlines()
+    assert re.fullmatch(
+        r"triaxcal: --scheduler: the cluster was lost \(\w+\); run again when it is back: units "
+        r"that were made are kept",
+        line,
+    )
+    assert (tmp_path / "b" / "U-1" / "triax_comp.c").exists()
 
 
 def test_a_cluster_without_workers_is_told(bench: Path) -> None:

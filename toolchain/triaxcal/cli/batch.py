@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -54,6 +55,8 @@ def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str
         width = jobs or cores()
         series = _run(work, build, _local(width))
     else:
+        # A lost cluster is told in one line; distributed would log tracebacks beside it.
+        logging.disable(logging.CRITICAL)
         client = connect(scheduler)
         try:
             width = workers(client)

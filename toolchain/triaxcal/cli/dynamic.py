@@ -8,16 +8,11 @@ from pathlib import Path
 import click
 from click.termui import progressbar
 
+from triaxcal.cli.options import unit_and_build
+
 
 @click.command()
-@click.argument("unit", type=click.Path(path_type=Path))
-@click.option(
-    "--build",
-    type=click.Path(path_type=Path),
-    default=Path("build"),
-    show_default=True,
-    help="Folder that receives a folder of the unit's name.",
-)
+@unit_and_build
 def dynamic(unit: Path, build: Path) -> None:
     """Calibrate the IMU UNIT, a folder with unit.toml and a recording on a turntable."""
     calibrate_imu(unit, build)

@@ -11,6 +11,7 @@ import click
 
 from triaxcal import __version__
 from triaxcal.cli.entry import INTERRUPTED
+from triaxcal.cli.options import unit_and_build
 from triaxcal.errors import RefusedError
 
 
@@ -40,14 +41,7 @@ def main() -> None:
 
 
 @main.command()
-@click.argument("unit", type=click.Path(path_type=Path))
-@click.option(
-    "--build",
-    type=click.Path(path_type=Path),
-    default=Path("build"),
-    show_default=True,
-    help="Folder that receives a folder of the unit's name.",
-)
+@unit_and_build
 def calib(unit: Path, build: Path) -> None:
     """Calibrate UNIT, a folder with unit.toml and measurements.csv, and write its C.
 

@@ -8,16 +8,11 @@ from pathlib import Path
 
 import click
 
+from triaxcal.cli.options import unit_and_build
+
 
 @click.command()
-@click.argument("unit", type=click.Path(path_type=Path))
-@click.option(
-    "--build",
-    type=click.Path(path_type=Path),
-    default=Path("build"),
-    show_default=True,
-    help="Folder that receives a folder of the unit's name.",
-)
+@unit_and_build
 def verify(unit: Path, build: Path) -> None:
     """Verify the C of UNIT with Gappa, Frama-C, cppcheck, gcc and clang.
 

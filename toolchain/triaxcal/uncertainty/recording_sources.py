@@ -8,9 +8,8 @@ import numpy as np
 
 from triaxcal.fit.family.result import RecordingFit
 from triaxcal.uncertainty.propagation import ROWS, Curves, mapped
-from triaxcal.uncertainty.rig_sources import GRAVITY_M_PER_S2, thermometer, thermometer_drift
-from triaxcal.uncertainty.source import NORMAL, STUDENT, Source, direct, from_factor, stated_or
-from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.uncertainty.rig_sources import gravity_by, thermometer, thermometer_drift
+from triaxcal.uncertainty.source import STUDENT, Source, direct
 
 
 def recording_sources(p: Curves, recording: RecordingFit) -> list[Source]:
@@ -47,25 +46,9 @@ def _poses(p: Curves, recording: RecordingFit) -> Source:
 
 def _gravity(p: Curves) -> Source:
     """Local gravity: scales K."""
-    sd, dof, origin = stated_or(
-        p.unit.stated.gravity_m_per_s2, GRAVITY_M_PER_S2, "gravity_m_per_s2"
-    )
     rows = p.rows.copy()
     rows[:, :, 3] = 0.0
-    factor = rows.reshape(-1, 12, 1) * (sd / STANDARD_GRAVITY_M_PER_S2 / p.unit.gravity_g)
-    constants, force = from_factor(p, factor)
-    return Source(
-        key="gravity",
-        name="local gravity",
-        sd=sd,
-        unit="m/s²",
-        distribution=NORMAL,
-        dof=dof,
-        origin=origin,
-        advice="take local gravity from a survey point or measure it",
-        constants=constants,
-        force=force,
-    )
+    return gravity_by(p, rows.reshape(-1, 12, 1))
 
 
 def _unmodelled(p: Curves, recording: RecordingFit) -> Source:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.propagation import RADIANS_PER_ARCSEC, Curves, Propagation, mapped
 from triaxcal.uncertainty.scatter import Scatter
 from triaxcal.uncertainty.source import NORMAL, STUDENT, Source, from_factor, stated_or
@@ -127,12 +128,17 @@ def level(p: Propagation) -> Source:
 
 
 def gravity(p: Propagation) -> Source:
-    """Local gravity: scales K."""
+    """Local gravity: every reading's force is another."""
+    readings = np.einsum("rij,rj->ri", p.dwell_gain, p.forces_g)[:, :, None]
+    return gravity_by(p, p.constants_factor(readings))
+
+
+def gravity_by(p: Curves, effect: FloatArray) -> Source:
+    """Local gravity; `effect`, shape (n, 12, 1), is what a relative error of one does to [K U0]."""
     stated = p.unit.stated.gravity_m_per_s2
     sd, dof, origin = stated_or(stated, GRAVITY_M_PER_S2, "gravity_m_per_s2")
     relative = sd / STANDARD_GRAVITY_M_PER_S2 / p.unit.gravity_g
-    readings = np.einsum("rij,rj->ri", p.dwell_gain, p.forces_g)[:, :, None] * relative
-    constants, force = from_factor(p, p.constants_factor(readings))
+    constants, force = from_factor(p, effect * relative)
     return Source(
         key="gravity",
         name="local gravity",

@@ -1,0 +1,22 @@
+"""The unit AT-SIM-BENCH on the simulated rig, at another rate, for the benchmarks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from triaxcal.rig.dbc import default_dbc, read_dbc
+from triaxcal.rig.engine import Setup
+from triaxcal.rig.plan import read_plan
+from triaxcal.unitfile import read_unit
+
+REPO = Path(__file__).resolve().parents[1]
+
+
+def setup_at(rate_hz: int, folder: Path) -> Setup:
+    """Five temperatures at that rate; the plan is written to `folder`."""
+    bench = REPO / "units" / "AT-SIM-BENCH"
+    unit = read_unit(bench)
+    plan = folder / "plan.toml"
+    text = (REPO / "rig" / "plans" / "five-temperatures.toml").read_text(encoding="utf-8")
+    plan.write_text(text.replace("rate_hz = 100", f"rate_hz = {rate_hz}"), encoding="utf-8")
+    return Setup(bench, unit, read_plan(plan, unit), read_dbc(default_dbc()))
