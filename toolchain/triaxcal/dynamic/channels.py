@@ -78,9 +78,9 @@ def steady(angle_rad: FloatArray, sd_rad: float) -> BoolArray:
     """Blocks of readings (b, samples) in which the table's angle stays, shape (b,).
 
     The gyros call a table still that turns slower than they can tell at the start: in the last
-    tenths of a second before a stop it may turn by 90", and the reading's mean over the block is not
-    its end. The two halves of a block differ by no more than their noise where the table rests,
-    and a block beside one that moves is not believed: it may hold what the test cannot see.
+    tenths of a second before a stop it may turn by 90", and the reading's mean over the block is
+    not its end. The two halves of a block differ by no more than their noise where the table
+    rests, and a block beside one that moves is not believed: it may hold what the test cannot see.
     """
     blocks, samples = angle_rad.shape
     halves = angle_rad[:, : samples // 2 * 2].reshape(blocks, 2, -1).mean(axis=2)
