@@ -233,7 +233,7 @@ def forms_using(shape: Shape) -> dict[str, str]:
             thumb1=plain_apply or order or in_every_asr32,
         ),
         "high_half": _condition(limbs=limbs or order, thumb1=given["thumb1"] == 2 or order),
-        "low_half": _condition(limbs=limbs or order, thumb1=order),
+        "low_half": _condition(limbs=limbs or order, thumb1=given["thumb1"] == 2 or order),
         "int64_horner": _condition(portable=order, thumb2=order and not in_asm_2),
         "limb_horner": _condition(limbs=order, thumb1=order),
         "short_horner": _condition(limbs=order, thumb1=order and not in_asm_1),
