@@ -190,6 +190,14 @@ def test_program_that_does_not_build_is_a_failure() -> None:
     assert "#error broken" in outcome.detail
 
 
+def test_thumb2_on_a_core_without_it_is_refused_by_name() -> None:
+    m0 = next(core for core in cores.CORES if core.no_long_multiply)
+    need(*m0.tools("gcc"))
+    outcome = run_builds([Build(case_named(CUBIC), Toolset(m0, "gcc", "-O2", THUMB2))])[0]
+    assert outcome.status == FAILED
+    assert "TRIAX_THUMB2 needs a core with Thumb-2 (Cortex-M3, M4, M7, M33)" in outcome.detail
+
+
 def known_program(tmp_path: Path, rounds: str) -> Path:
     """The benchmark program of the cubic with other loops than `counting.LOOP_ROUNDS`."""
     from triaxcal.targets.bench import Subject, _write_subject
