@@ -56,7 +56,12 @@ Change = Callable[[UnitDescription], UnitDescription]
 CUBIC = "cubic"
 CUBIC_LEFT = "cubic, left-justified"
 QUADRATIC, RATE, GYRO = "quadratic terms", "dT/dt", "gyro"
-_TERMS = {QUADRATIC: EXAMPLE_TERMS, RATE: replace(EXAMPLE_TERMS, rate=EXAMPLE_RATE)}
+RATE_ALONE = "cubic, dT/dt"
+_TERMS = {
+    QUADRATIC: EXAMPLE_TERMS,
+    RATE: replace(EXAMPLE_TERMS, rate=EXAMPLE_RATE),
+    RATE_ALONE: replace(NO_TERMS, rate=EXAMPLE_RATE),
+}
 
 
 def _order_3(unit: UnitDescription) -> UnitDescription:
@@ -109,6 +114,12 @@ def shipped_cases(units: Path) -> tuple[Case, ...]:
                 remedy="the measurements of AT-SIM have changed: choose another error limit",
             )
     return cases
+
+
+def bench_cases(units: Path) -> tuple[Case, ...]:
+    """Those, and a term in dT/dt alone, whose cost can then be told from the cubic's."""
+    alone = _case(units / "AT-SIM", RATE_ALONE, "a term in dT/dt, order 3", _order_3)
+    return (*shipped_cases(units), alone)
 
 
 def unit_case(folder: Path) -> Case:
