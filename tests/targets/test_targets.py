@@ -43,7 +43,6 @@ from triaxcal.targets.shapes import (
     GYRO,
     RATE_ALONE,
     Case,
-    bench_cases,
     shipped_cases,
     unit_case,
 )
@@ -235,9 +234,8 @@ def test_counter_counts_known_loops_or_refuses(tmp_path: Path) -> None:
 def test_rates_and_forces_are_given_and_counted(tmp_path: Path) -> None:
     need(*M3.tools("gcc"))
     plugin = build_plugin(tmp_path)
-    cases = {c.name: c for c in bench_cases(ROOT / "units")}
     costs = {
-        name: cost_of(Subject(cases[name], 0, ""), M3, tmp_path / str(i), plugin)
+        name: cost_of(Subject(case_named(name), 0, ""), M3, tmp_path / str(i), plugin)
         for i, name in enumerate((CUBIC, RATE_ALONE, GYRO))
     }
     assert [c.failure for c in costs.values()] == ["", "", ""]

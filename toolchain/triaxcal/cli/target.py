@@ -79,14 +79,14 @@ def bench(build: Path, page: Path | None) -> None:
         markdown,
         put_between_markers,
     )
-    from triaxcal.targets.shapes import bench_cases  # noqa: PLC0415
+    from triaxcal.targets.shapes import shipped_cases  # noqa: PLC0415
 
     def progress(cost: Cost) -> None:
         click.echo(
             f"{cost.failure or 'measured'}: {cost.subject.label}, {cost.core.name}", err=True
         )
 
-    costs = run_bench(bench_cases(Path("units")), progress)
+    costs = run_bench(shipped_cases(Path("units")), progress)
     compilers = compiler_versions()
     table = markdown(costs, compilers)
     files = {"bench.json": bench_json(costs, compilers), "bench.md": table + "\n"}

@@ -88,6 +88,7 @@ _SHAPES: tuple[tuple[str, str, str, Change], ...] = (
     (QUADRATIC, "AT-SIM", "18 quadratic terms, order 3", _order_3),
     (RATE, "AT-SIM", "a term in dT/dt and quadratic terms, inverse", lambda u: replace(
         u, method="inverse")),
+    (RATE_ALONE, "AT-SIM", "a term in dT/dt, order 3", _order_3),
     (GYRO, "AT-SIM", "a gyro with g-sensitivity, order 3", _order_3),
     ("16 bits", "AT-SIM", "16-bit raw codes", lambda u: replace(u, adc=replace(
         u.adc, bits=16, code_min=-(2**15), code_max=2**15 - 1))),
@@ -114,12 +115,6 @@ def shipped_cases(units: Path) -> tuple[Case, ...]:
                 remedy="the measurements of AT-SIM have changed: choose another error limit",
             )
     return cases
-
-
-def bench_cases(units: Path) -> tuple[Case, ...]:
-    """Those, and a term in dT/dt alone, whose cost can then be told from the cubic's."""
-    alone = _case(units / "AT-SIM", RATE_ALONE, "a term in dT/dt, order 3", _order_3)
-    return (*shipped_cases(units), alone)
 
 
 def unit_case(folder: Path) -> Case:
