@@ -11,7 +11,7 @@ from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certifica
 from triaxcal.errors import RefusedError
 from triaxcal.measured import MEASURED_KEYS, Measured, measured_details
 from triaxcal.recordinglayout import DEFAULT_LSB, KEYS, RecordingLayout, recording_layout
-from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
+from triaxcal.tomltable import Layout, Table, has_table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
 OUTPUT_Q_RANGE = (8, 30)
@@ -212,7 +212,7 @@ def read_unit(folder: Path) -> UnitDescription:
         unit beside it has the same serial number.
     """
     path = find_unit(folder)
-    recorded = "recording" in read_toml(path)
+    recorded = has_table(path, "recording")
     tables = read_tables(path, _OF_RECORDING if recorded else _LAYOUT, FORMAT)
     unit = _unit_from_tables(folder.absolute().name, tables)
     _refuse_duplicate_serial(folder, unit.serial)

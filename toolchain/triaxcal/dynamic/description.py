@@ -15,7 +15,7 @@ from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT, Turntable
 from triaxcal.dynamic.registry import extensions
 from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
-from triaxcal.tomltable import Layout, Table, read_tables, read_toml
+from triaxcal.tomltable import Layout, Table, read_tables
 from triaxcal.unitfile import FORMAT, PLAUSIBLE_DEGC, check_unit_name, find_unit
 
 _LAYOUT: Layout = {
@@ -121,11 +121,6 @@ class DynamicDescription:
     def state_blocks(self) -> tuple[StateBlock, ...]:
         """Blocks of the extensions that are switched on."""
         return tuple(b for name in self.blocks for b in extensions()[name].blocks)
-
-
-def is_dynamic(folder: Path) -> bool:
-    """Whether the unit in `folder` is calibrated on a turntable: its unit.toml has [dynamic]."""
-    return "dynamic" in read_toml(find_unit(folder))
 
 
 def read_dynamic(folder: Path) -> DynamicDescription:

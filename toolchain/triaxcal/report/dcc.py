@@ -1,4 +1,4 @@
-"""certificate.dcc.xml: PTB's Digital Calibration Certificate, schema 3.2.0 with D-SI 2.1.
+"""certificate.dcc.xml: PTB's Digital Calibration Certificate, schema 3.2.1 with D-SI 2.1.0.
 
 Values are in SI units: K in V/(m/s^2), U0 in V. What only people know (laboratory, customer,
 dates, signer) stands in [certificate] of unit.toml; without it there is no certificate.
@@ -21,7 +21,7 @@ from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
-SCHEMA = "3.2.0"
+SCHEMA = "3.2.1"
 _UNITS = [r"\volt\second\tothe{2}\metre\tothe{-1}"] * 9 + [r"\volt"] * 3
 
 
