@@ -31,6 +31,8 @@ _STEPS_MAX = 60
 _STEPS_NEAR = 12
 _SETTLED = 1e-13
 """Of the scaled constants, which are about 1: rounding."""
+_RADIUS_MAX = 4.0
+"""Of the poses' spread: a cap of 20 deg about one direction has 4.2, poses all round have 1."""
 _NINE = (("Kxx", 0, 0), ("Kyy", 1, 1), ("Kzz", 2, 2), ("Kxy", 0, 1), ("Kxz", 0, 2), ("Kyz", 1, 2))
 
 
@@ -151,8 +153,12 @@ def scalar_data(
     v = (readings - middle) / spread
     # |v|^2 = 2 c.v + (r^2 - |c|^2); the minimum-norm solution where poses lie in a plane.
     design = np.concatenate([2.0 * v, np.ones((len(v), 1))], axis=1)
-    solution = np.linalg.lstsq(design, (v**2).sum(axis=1), rcond=1e-6)[0]
-    radius = float(np.sqrt(max(solution[3] + (solution[:3] ** 2).sum(), 1e-12)))
+    for cut in (1e-6, 0.1):
+        solution = np.linalg.lstsq(design, (v**2).sum(axis=1), rcond=cut)[0]
+        radius = float(np.sqrt(max(solution[3] + (solution[:3] ** 2).sum(), 1e-12)))
+        # Near a plane noise alone says where the centre is along its normal: far off.
+        if radius < _RADIUS_MAX:
+            break
     centre = middle + spread * solution[:3]
     return ScalarData(
         reading=(readings - centre) / (spread * radius),
