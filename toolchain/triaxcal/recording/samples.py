@@ -90,7 +90,7 @@ def read_samples(folder: Path, layout: RecordingLayout, sensor: TemperatureSenso
         ) * (np.pi / 180.0 if layout.angles.unit == "deg" else 1.0)
     label = columns.labels(layout.section) if layout.section is not None else None
     whole = _complete(reading, time, temp, angles)
-    findings = []
+    findings = [] if columns.table is None else list(columns.table.findings)
     if not whole.all():
         missing = np.flatnonzero(~whole)
         if len(missing) > 0.5 * len(whole):
@@ -142,8 +142,21 @@ class _Columns:
 
         if is_mat_file(path):
             mat = MatTable(path, layout.variable)
-            count = len(mat.numbers(layout.acceleration[0].column, "acceleration"))
-            return _Columns(str(path), mat.numbers, np.arange(1, count + 1), None)
+            first = layout.acceleration[0].column
+            count = len(mat.numbers(first, "acceleration"))
+
+            def numbers(column: Column, key: str) -> FloatArray:
+                found = mat.numbers(column, key)
+                if len(found) != count:
+                    raise RefusedError(
+                        str(path),
+                        f"{len(found)} values in {column} ([recording] {key}), {count} in {first}",
+                        expected="one value a sample in each",
+                        remedy="give columns that belong together, or save them at one rate",
+                    )
+                return found
+
+            return _Columns(str(path), numbers, np.arange(1, count + 1), None)
         table = read_text(path, layout)
         return _Columns(
             str(path),
