@@ -12,7 +12,7 @@ from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.poses import ALIKE_DEG, PoseSet
 from triaxcal.recording.samples import Samples
-from triaxcal.recordinglayout import POSES, RecordingLayout
+from triaxcal.recordinglayout import SAMPLES, RecordingLayout
 
 CONDITION_MAX = 100.0
 """Of the scaled Jacobian: beyond it a hundredth of a constant's effect tells it from the others."""
@@ -99,7 +99,7 @@ def refuse_left_handed(samples: Samples, layout: RecordingLayout, centre: FloatA
     A force fixed in the world, seen from the turning unit, obeys da/dt = a x w. Over slow movement
     both sides correlate for one way of naming and signing the axes: it must be theirs.
     """
-    if samples.gyro is None or layout.rows == POSES or len(samples.reading) < _MOVING_MIN:
+    if samples.gyro is None or layout.rows != SAMPLES or len(samples.reading) < _MOVING_MIN:
         return _HANDED_UNKNOWN
     window = max(1, round(0.1 / samples.step_s))
     force = _smooth(samples.reading - centre, window)

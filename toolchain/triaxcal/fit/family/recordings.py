@@ -28,6 +28,7 @@ from triaxcal.fit.family.temperatures import (
     thermal_orders,
 )
 from triaxcal.fit.family.trials import (
+    TURNS_MAX,
     Judged,
     Trial,
     choose,
@@ -161,7 +162,8 @@ def _models(unit: UnitDescription) -> tuple[ScalarModel, ...]:
 
 def _turns(orientations: list[list[int]], temperatures: list[list[int]]) -> str:
     inner = max(len(temperatures) - 2, 0) if len(temperatures) >= 4 else 0
-    words = f"{len(orientations)} orientations"
+    bundles = f" in {TURNS_MAX} bundles" if len(orientations) > TURNS_MAX else ""
+    words = f"{len(orientations)} orientations{bundles}"
     return words + (f" and {inner} temperatures" if inner else "")
 
 
