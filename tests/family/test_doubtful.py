@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from triaxcal.report.dcc import certificate_xml
 from triaxcal.report.passport.content import passport
 from triaxcal.report.passport.page import passport_html
 from triaxcal.report.summary import summary
+from triaxcal.report.temperatures import with_room
 
 
 def findings(folder: Path) -> str:
@@ -246,3 +248,16 @@ def test_a_certificate_of_what_nothing_checks_is_refused(tmp_path: Path) -> None
     assert isinstance(result.exception, RefusedError)
     assert "a certificate of constants that nothing checks" in str(result.exception)
     assert not (tmp_path / "b").exists()
+
+
+# ---- pictures ----
+
+
+def test_labels_have_room_however_many_poses() -> None:
+    labels = [f"P{n}" for n in range(1, 401)]
+    kept = with_room(labels, 2.2, 4.4)
+    shown = [n for n, label in enumerate(kept) if label]
+    assert [labels[n] for n in shown[:3]] == ["P10", "P20", "P30"]
+    widest = max(len(labels[n]) for n in shown) * 4.4
+    assert all((b - a) * 2.2 > widest for a, b in pairwise(shown))
+    assert with_room(labels[:6], 17.0, 4.4) == labels[:6]
