@@ -132,6 +132,13 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         When there is no such unit or its file breaks a rule of docs/file-formats.md.
     """
     path = find_unit(folder)
+    if "dynamic" not in read_toml(path):
+        raise RefusedError(
+            str(path),
+            "no table [dynamic]",
+            expected="a whole IMU on a turntable",
+            remedy=f"`triaxcal calib {folder}` calibrates this unit; see docs/dynamic.md",
+        )
     tables = read_tables(path, _LAYOUT, FORMAT)
     top, site, dynamic = tables[""], tables["site"], tables["dynamic"]
     check_unit_name(top.text("serial"), top.where("serial"))
