@@ -285,13 +285,6 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
     )
     gravity_m_per_s2 = site.number("local_gravity_m_per_s2", 9.7, 9.9)
     recording = recording_layout(tables["recording"])
-    if recording is not None and tables["certificate"].values:
-        raise RefusedError(
-            f"{tables[''].file}, certificate",
-            "given with [recording]",
-            expected="a certificate of a tilter's measurements only",
-            remedy="remove one of the two tables",
-        )
     limits_g = (3e-4, 10e-4) if recording is None else (RECORDING_LIMIT_G, RECORDING_LIMIT_G)
     return UnitDescription(
         name=name,
