@@ -23,6 +23,7 @@ from triaxcal.uncertainty.history import (
     EN_MAX,
     Calibrated,
     changes,
+    latest_change,
     read_history,
     repeatability,
 )
@@ -194,3 +195,25 @@ def test_a_broken_file_of_the_history_is_named(folder: Path) -> None:
     path.write_text(path.read_text().replace("TP3", "TP4", 1), encoding="utf-8")
     with pytest.raises(RefusedError, match=r"history/2024-03-30.csv, rows .*TP4 twice"):
         read_history(folder, read_unit(folder))
+
+
+def test_a_recording_has_no_history(unit: UnitDescription, tmp_path: Path) -> None:
+    """The file of its history is no measurements.csv: that is told, and calib goes on without."""
+    folder = tmp_path / "units" / "R-1"
+    (folder / "history").mkdir(parents=True)
+    (folder / "history" / "2025-03-30.csv").write_text("t,ax,ay,az\n", encoding="utf-8")
+    (folder / "unit.toml").write_text(
+        'format = 1\nserial = "R-1"\n[site]\nlocal_gravity_m_per_s2 = 9.80665\n'
+        '[recording]\nfile = "log.csv"\nacceleration = ["ax", "ay", "az"]\n'
+        'acceleration_unit = "m/s^2"\ntime = "t"\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(RefusedError) as refusal:
+        command.main([str(folder)], standalone_mode=False)
+    assert str(refusal.value) == (
+        f"{folder}: its readings are a recording; expected a unit with measurements.csv from a "
+        "tilter; compare the uncertainties in the passports by hand"
+    )
+    truth, _ = read_truth(AT_SIM)
+    (newest,) = calibrations(unit, [truth], 1)
+    assert latest_change(folder, read_unit(folder), newest) is None

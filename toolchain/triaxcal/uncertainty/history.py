@@ -100,8 +100,15 @@ def read_history(folder: Path, unit: UnitDescription) -> list[Calibrated]:
     Raises
     ------
     RefusedError
-        When there is no earlier one, or one of them is refused.
+        When the unit's readings are a recording, there is no earlier one, or one is refused.
     """
+    if unit.recording is not None:
+        raise RefusedError(
+            str(folder),
+            "its readings are a recording",
+            expected="a unit with measurements.csv from a tilter",
+            remedy="compare the uncertainties in the passports by hand",
+        )
     older = older_files(folder)
     if not older:
         raise RefusedError(
@@ -136,9 +143,12 @@ def changes(unit: UnitDescription, history: list[Calibrated]) -> list[Change]:
 
 
 def latest_change(folder: Path, unit: UnitDescription, newest: Calibrated) -> Change | None:
-    """From the last earlier calibration to the newest; None when there is no earlier one."""
+    """From the last earlier calibration to the newest; None when there is no earlier one.
+
+    None of a recording either: `read_history` says why.
+    """
     older = older_files(folder)
-    if not older:
+    if not older or unit.recording is not None:
         return None
     last = calibrated(older[-1], unit, older[-1].stem, _day(older[-1].stem))
     return _change(unit, last, newest)
