@@ -29,6 +29,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 LONG = {
     "family/test_over_temperature.py",
+    "family/test_rate_term.py",
+    "family/test_unchecked.py",
     "rig/test_cli_rig.py",
     "rig/test_firmware.py",
     "rig/test_live.py",

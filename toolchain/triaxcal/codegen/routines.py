@@ -111,16 +111,17 @@ class Generated:
 
 @dataclass(frozen=True)
 class RateReference(Reference):
-    """The handwritten reference with the rates of temperature of `rates_of`."""
+    """The handwritten reference with the rates of temperature of `rates_of`, or those given."""
 
     rate: RatePlan
+    given: Int32Array | None = None
 
     def routine(self, image: bytes) -> Routine:
         """Bind an image."""
 
         def run(temp: Int32Array, raw: Int32Array) -> Answers:
             accel, status = _outputs(len(temp))
-            rates = rates_of(self.rate, temp).astype(np.int32)
+            rates = _rates(self.rate, self.given, temp)
             refused = self.library.triax_ref_batch_rate(
                 image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
                 _pointer(temp), _pointer(rates), _pointer(raw), _pointer(accel), _pointer(status),
@@ -134,9 +135,10 @@ class RateReference(Reference):
 
 @dataclass(frozen=True)
 class RateGenerated(Generated):
-    """A generated routine with a term in dT/dt, with the rates of `rates_of`."""
+    """A generated routine with a term in dT/dt, with the rates of `rates_of`, or those given."""
 
     rate: RatePlan
+    given: Int32Array | None = None
 
     def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
         """Answers with the compiled-in constants."""
@@ -148,7 +150,7 @@ class RateGenerated(Generated):
 
     def _run(self, image: bytes | None, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
         accel, status = _outputs(len(temp))
-        rates = rates_of(self.rate, temp).astype(np.int32)
+        rates = _rates(self.rate, self.given, temp)
         loaded = self.library.triax_batch_rate(
             image, ctypes.c_size_t(len(image or b"")), ctypes.c_size_t(len(temp)),
             _pointer(temp), _pointer(rates), _pointer(raw), _pointer(accel), _pointer(status),
@@ -223,12 +225,22 @@ class GeneratedImu:
 
 
 def routines_of(
-    rate: RatePlan | None, generated: ctypes.CDLL, reference: ctypes.CDLL
+    rate: RatePlan | None,
+    generated: ctypes.CDLL,
+    reference: ctypes.CDLL,
+    given: Int32Array | None = None,
 ) -> tuple[Generated, Reference]:
-    """Generated routine and reference as the cross-check of an accelerometer calls them."""
+    """Generated routine and reference as the cross-check of an accelerometer calls them.
+
+    `given` are rates in codes, one a vector, for vectors that have their own.
+    """
     if rate is None:
         return Generated(generated), Reference(reference)
-    return RateGenerated(generated, rate), RateReference(reference, rate)
+    return RateGenerated(generated, rate, given), RateReference(reference, rate, given)
+
+
+def _rates(rate: RatePlan, given: Int32Array | None, temp: Int32Array) -> Int32Array:
+    return rates_of(rate, temp).astype(np.int32) if given is None else given
 
 
 def _forces(temp: Int32Array, raw: Int32Array) -> Int32Array:
