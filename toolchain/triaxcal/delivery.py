@@ -39,6 +39,7 @@ from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
+from triaxcal.model.terms import Terms
 from triaxcal.records import MEASUREMENTS_FILE, Dwell, MeasurementSet, read_measurements
 from triaxcal.unitfile import METHODS, UNIT_FILE, UnitDescription, read_unit
 
@@ -159,6 +160,12 @@ def _calibrated(
     measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
     calibration = calibrate(unit, measurements)
     refuse_unacceptable(unit, calibration, measurements)
+    if unit.pair is not None:
+        from triaxcal.fit.family.cross_coupling import stated_terms  # noqa: PLC0415
+
+        known, told = stated_terms(unit, folder)
+        notes = (*calibration.notes, *told)
+        calibration = replace(calibration, terms=Terms(known), notes=notes)
     return unit, measurements, calibration
 
 
@@ -167,8 +174,10 @@ def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:
     recorded = MEASUREMENTS_FILE
     if unit is not None and unit.recording is not None:
         recorded = unit.recording.file
+    pair = () if unit is None or unit.pair is None else (folder / unit.pair.file,)
     return files_sha256(
-        (folder / UNIT_FILE, folder / recorded), "put it there, or correct [recording] file"
+        (folder / UNIT_FILE, folder / recorded, *pair),
+        "put it there, or correct its name in unit.toml",
     )
 
 

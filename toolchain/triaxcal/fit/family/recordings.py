@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -61,9 +61,9 @@ BEYOND_1_G = "quadratic terms were seen at 1 g; beyond it they grow with the squ
 
 
 def calibrate_poses(
-    unit: UnitDescription, layout: RecordingLayout, samples: Samples
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples, known: FloatArray
 ) -> tuple[MeasurementSet, Calibration]:
-    """Calibrate from poses of which only |a| = g is known.
+    """Calibrate from poses of which only |a| = g is known; `known` is a part of Q, (3, 6).
 
     Raises
     ------
@@ -77,7 +77,10 @@ def calibrate_poses(
     halves = half_cycle_turns(temps)
     climate = PoseClimate(temps, pose_rates(samples, poses, layout) if halves else None, unit.loss)
     left_out = folds(orientations, temperatures, len(temps)) + halves
-    trials = _trials(unit, climate, temperatures)
+    trials = [
+        replace(trial, model=replace(trial.model, known=known))
+        for trial in _trials(unit, climate, temperatures)
+    ]
     rows = [judge(trial, data, climate, left_out) for trial in trials]
     turns = _turns(orientations, temperatures, len(halves))
     if unscored(rows):
@@ -258,7 +261,7 @@ class _Made:
         if len(fit.residual_g) == len(fit.theta):
             covariance = np.full_like(covariance, np.nan)
             findings.insert(0, _UNCHECKED.format(count=len(fit.theta)))
-        terms = Terms(quadratic if len(fit.model.quadratic) else None, rate)
+        terms = Terms(quadratic if quadratic.any() else None, rate)
         return self._calibration(constants, terms, covariance, findings)
 
     def _rate_term(self, constants: FloatArray) -> RateTerm:

@@ -52,9 +52,13 @@ _RAD_PER_ARCSEC = math.pi / 180.0 / 3600.0
 
 
 def calibrate_table(
-    unit: UnitDescription, layout: RecordingLayout, angles: Angles, samples: Samples
+    unit: UnitDescription,
+    layout: RecordingLayout,
+    angles: Angles,
+    samples: Samples,
+    known_quadratic: FloatArray,
 ) -> tuple[MeasurementSet, Calibration]:
-    """Calibrate from poses whose angles are known.
+    """Calibrate from poses whose angles are known; `known_quadratic` is a part of Q, (3, 6).
 
     Raises
     ------
@@ -71,7 +75,7 @@ def calibrate_table(
     refuse_open(poses, gravity_direction(angles.kind, table))
     temps, temperatures = pose_temperatures(unit, poses)
     force, sign = known_force(poses.source, layout, readings, table, unit.gravity_g)
-    known = TablePoses(readings, force, temps)
+    known = TablePoses(readings, force, temps, known_quadratic)
     left_out = turns(known, temperatures)
     trials = [t for t in _trials(unit, temps, temperatures) if t.parameters <= 3 * len(temps)]
     rows = [judge_table(trial, known, left_out) for trial in trials]
@@ -92,7 +96,7 @@ def calibrate_table(
     findings = [
         *poses.findings,
         *outlier_findings(unit, angles, poses, table=table, sign=sign, best=best),
-        *([] if best.fit.quadratic is None else [BEYOND_1_G]),
+        *([BEYOND_1_G] if best.trial.parameters > 12 and best.fit.quadratic is not None else []),
         *([] if poses.temps_degc is not None else [no_temperature(unit)]),
         *table_findings(angles, table[near], readings[near], found[near], unit.gravity_g),
         _angle_residuals(angles, table, found),
