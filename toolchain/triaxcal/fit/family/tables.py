@@ -112,18 +112,21 @@ def _trials(
     unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]
 ) -> list[TableTrial]:
     orders = thermal_orders(unit, temps, temperatures)
-    trials = []
-    if 0 in orders:
-        trials += [
-            trial
-            for trial in one_temperature_trials(polynomial_shape(temps, unit.t0_degc, 0))
-            if unit.terms == "auto"
-            or (unit.terms == "quadratic") == trial.label.startswith("quadratic")
-        ]
-    for order in orders:
-        if order > 0 and unit.terms != "quadratic":
-            trials += thermal_trials(polynomial_shape(temps, unit.t0_degc, order))
-    return trials
+    shapes = [polynomial_shape(temps, unit.t0_degc, order) for order in orders]
+    if orders != (0,):
+        if unit.terms == "quadratic":
+            raise RefusedError(
+                f"{unit.name}/unit.toml, [fit] terms",
+                f'"quadratic" with angles at {len(temperatures)} temperatures',
+                expected="one temperature, or linear terms",
+                remedy="make a unit of one temperature, or leave it out",
+            )
+        return [trial for shape in shapes for trial in thermal_trials(shape)]
+    return [
+        trial
+        for trial in one_temperature_trials(shapes[0])
+        if unit.terms == "auto" or (unit.terms == "quadratic") == trial.label.startswith("quadr")
+    ]
 
 
 def _choose(rows: Sequence[TableRow], temperatures: list[list[int]]) -> tuple[TableRow, str]:
