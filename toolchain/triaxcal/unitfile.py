@@ -18,7 +18,7 @@ from triaxcal.recordinglayout import (
     is_in_folder,
     recording_layout,
 )
-from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
+from triaxcal.tomltable import Layout, Table, has_table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
 OUTPUT_Q_RANGE = (8, 30)
@@ -231,7 +231,7 @@ def read_unit(folder: Path) -> UnitDescription:
         unit beside it has the same serial number.
     """
     path = find_unit(folder)
-    recorded = "recording" in read_toml(path)
+    recorded = has_table(path, "recording")
     tables = read_tables(path, _OF_RECORDING if recorded else _LAYOUT, FORMAT)
     unit = _unit_from_tables(folder.absolute().name, tables)
     _refuse_duplicate_serial(folder, unit.serial)

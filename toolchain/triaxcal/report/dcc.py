@@ -1,4 +1,4 @@
-"""certificate.dcc.xml: PTB's Digital Calibration Certificate, schema 3.2.0 with D-SI 2.1.
+"""certificate.dcc.xml: PTB's Digital Calibration Certificate, schema 3.2.1 with D-SI 2.1.0.
 
 Values are in SI units: K in V/(m/s^2), U0 in V; of a recording in its own unit of the readings
 (counts have the unit one, g are turned into m/s^2). What only people know (laboratory, customer,
@@ -23,7 +23,7 @@ from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
-SCHEMA = "3.2.0"
+SCHEMA = "3.2.1"
 _VOLT = (r"\volt\second\tothe{2}\metre\tothe{-1}", r"\volt")
 _ACCELERATION = (r"\one", r"\metre\second\tothe{-2}")
 _COUNT = (r"\second\tothe{2}\metre\tothe{-1}", r"\one")
