@@ -10,6 +10,7 @@ from family_cases import U0, K, directions, log, write_unit
 from test_recordings import calibrated, found, symmetric_part
 from test_tables import AIR, HEADER, wide
 
+from triaxcal.batch.plan import _order
 from triaxcal.delivery import deliver
 from triaxcal.errors import RefusedError
 from triaxcal.fit.family.cross_coupling import terms_of_pair
@@ -104,3 +105,12 @@ def test_a_wrong_pair_is_refused(tmp_path: Path, more: str, told: str) -> None:
     with pytest.raises(RefusedError) as refusal:
         calibrated(folder)
     assert told in str(refusal.value)
+
+
+def test_a_series_takes_the_pair_along(tmp_path: Path) -> None:
+    """A worker elsewhere needs the file, and a pair measured anew makes the unit anew."""
+    folder = unit_with_pair(tmp_path / "U", log(directions(12)))
+    order = _order(folder, "toolchain")
+    assert set(order.files) == {"unit.toml", "log.csv", "pair.csv"}
+    (folder / "pair.csv").write_text((folder / "pair.csv").read_text() + "\n")
+    assert _order(folder, "toolchain").key != order.key

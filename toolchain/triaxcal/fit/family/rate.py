@@ -1,7 +1,8 @@
 """dT/dt at the poses of a recording, and the half-cycles on which a term in it is judged.
 
 A pose's rate is the slope of a straight line through the temperatures within `WINDOW_S` about its
-middle, reaching to the neighbouring poses where nothing was recorded between.
+middle, less at the ends of the recording, where a window to one side would have another rate, and
+reaching to the neighbouring poses where nothing was recorded between.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from triaxcal.recording.samples import Samples
 from triaxcal.recordinglayout import SAMPLES, RecordingLayout
 
 WINDOW_S = 60.0
+_HALF_MIN_S = 5.0
 HALVES_MIN = 3
 """Half-cycles: with one of two left out, the other's rate is a constant like the bias."""
 
@@ -28,8 +30,9 @@ def pose_rates(samples: Samples, poses: PoseSet, layout: RecordingLayout) -> Flo
     stops = starts + np.array([p.duration_s for p in poses.poses])
     rates = []
     for k, middle in enumerate((starts + stops) / 2.0):
-        first, last = np.searchsorted(t, (middle - WINDOW_S / 2.0, middle + WINDOW_S / 2.0))
-        if t[last - 1] - t[first] < WINDOW_S / 2.0:
+        half = max(min(WINDOW_S / 2.0, middle - t[0], t[-1] - middle), _HALF_MIN_S)
+        first, last = np.searchsorted(t, (middle - half, middle + half))
+        if t[last - 1] - t[first] < half:
             begin, end = starts[max(k - 1, 0)], stops[min(k + 1, len(stops) - 1)]
             first, last = np.searchsorted(t, (begin, end))
         x = t[first:last] - middle
