@@ -22,8 +22,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 LONG = {
+    "family/test_files.py",
     "family/test_over_temperature.py",
+    "family/test_pair_in_a_unit.py",
+    "family/test_rate_term.py",
     "family/test_real_recordings.py",
+    "family/test_unchecked.py",
     "rig/test_cli_rig.py",
     "rig/test_firmware.py",
     "rig/test_live.py",

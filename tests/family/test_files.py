@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from family_cases import csv_text, directions, log, write_unit
+from family_cases import COLUMNS, U0, K, csv_text, directions, log, write_unit
 from scipy.io import savemat
 from test_recordings import calibrated, found
 
@@ -134,3 +135,89 @@ def test_a_first_row_with_empty_cells_is_still_a_row(tmp_path: Path) -> None:
     text = f"t,ax,ay,az\n-0.02,,,\n{BODY}"
     told = calibrated(write_unit(tmp_path / "U", text)).findings
     assert "1 row without all readings left out, the first is line 2" in told
+
+
+# ---- clocks, sections, clouds ----
+
+
+@pytest.mark.parametrize(
+    ("stamp", "unit"),
+    [
+        (lambda t: f"{1680000000123456789 + round(t * 1e9)}", "ns"),
+        (lambda t: f"2026-03-30 12:{int(t // 60):02d}:{t % 60:09.6f}", "iso"),
+        (lambda t: f"2026/03/30 12:{int(t // 60):02d}:{t % 60:09.6f}", "iso"),
+        (lambda t: f"2026-03-30T12:{int(t // 60):02d}:{t % 60:06.3f}Z", "iso"),
+        (lambda t: f"9:{int(t // 60):02d}:{t % 60:06.3f}", "iso"),
+    ],
+)
+def test_clocks_of_loggers(tmp_path: Path, stamp: Callable[[float], str], unit: str) -> None:
+    rows = log(directions(10))
+    lines = [f"{stamp(row[0])},{row[1]:.9g},{row[2]:.9g},{row[3]:.9g}" for row in rows]
+    recording = f'{COLUMNS}\ntime_unit = "{unit}"'
+    text = "\n".join(["t,ax,ay,az", *lines])
+    plain = calibrated(write_unit(tmp_path / "A", TEXT))
+    other = calibrated(write_unit(tmp_path / "B", text, recording))
+    assert np.array_equal(found(plain)[0], found(other)[0])
+
+
+def test_a_clock_that_cannot_be_is_told(tmp_path: Path) -> None:
+    text = refusal(write_unit(tmp_path / "A", TEXT, COLUMNS + '\ntime_unit = "ms"'))
+    assert 'the whole recording lasts 0.039 s: check time_unit, as time_unit = "s"' in text
+    columns = COLUMNS.replace('time = "t"', "sample_rate_hz = 50000")
+    text = refusal(write_unit(tmp_path / "B", TEXT, columns))
+    assert "the whole recording lasts 0.039 s at 50000 Hz: check sample_rate_hz" in text
+    rows = log(directions(10))
+    rows[:, 0] *= 1000.0
+    told = calibrated(write_unit(tmp_path / "C", csv_text(rows, "t,ax,ay,az"))).findings
+    assert any(f.startswith('a sample every 20 s by time_unit = "s": if that') for f in told)
+
+
+SECTIONS = (
+    'rows = "sections"\nsection = "pose"\nacceleration = ["ax", "ay", "az"]\n'
+    'acceleration_unit = "m/s^2"'
+)
+
+
+def indexed(moving: int | None = None) -> str:
+    """Twelve poses of twenty rows each and rows of none between, with the pose's number."""
+    random = np.random.default_rng(8)
+    lines = ["pose,ax,ay,az"]
+    for k, pose in enumerate(directions(12)):
+        noise = 3.0 if k == moving else 0.01
+        for reading in pose @ K.T + U0 + noise * random.standard_normal((20, 3)):
+            lines.append(f"{k + 1}," + ",".join(f"{v:.6f}" for v in reading))
+        lines += [",1.0,2.0,3.0"] * 2
+    return "\n".join(lines) + "\n"
+
+
+def test_sections_are_poses_without_any_clock(tmp_path: Path) -> None:
+    calibration = calibrated(write_unit(tmp_path / "U", indexed(), SECTIONS))
+    assert calibration.recording is not None
+    assert [p.count for p in calibration.recording.poses.poses] == [20] * 12
+    # Twenty readings of 0.01 m/s^2: 0.23 mg.
+    assert calibration.recording.rms_g < 0.4e-3
+    calibration = calibrated(write_unit(tmp_path / "V", indexed(moving=4), SECTIONS))
+    assert calibration.recording is not None
+    (refused,) = calibration.recording.poses.refused
+    assert refused.number == 5
+    assert "it is not held still" in refused.reason
+    without = SECTIONS.replace('section = "pose"\n', "")
+    with pytest.raises(RefusedError, match="section: missing; expected the column that numbers"):
+        calibrated(write_unit(tmp_path / "W", indexed(), without))
+
+
+def test_hundreds_of_single_readings_all_round(tmp_path: Path) -> None:
+    """Counts without header or time, as for ellipsoid fits: neighbours must not chain into one."""
+    random = np.random.default_rng(6)
+    directions = random.standard_normal((300, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    counts = np.rint(
+        (directions @ K.T + U0) / 9.80665 * 16384 + 16 * random.standard_normal((300, 3))
+    )
+    text = "\n".join("\t".join(f"{v:.0f}" for v in row) for row in counts)
+    recording = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "count"'
+    calibration = calibrated(write_unit(tmp_path / "U", text, recording))
+    assert "in 60 bundles left out in turn" in calibration.selection_reason
+    assert calibration.recording is not None
+    # 16 counts of 16384 are 0.98 mg.
+    assert calibration.recording.left_out_length_g == pytest.approx(0.98e-3, rel=0.15)

@@ -222,3 +222,63 @@ def test_all_signs_turned_is_the_convention_of_the_sensor(tmp_path: Path) -> Non
     first, second = (c.thermal.constants_at(20.0) for c in (plain, other))
     assert np.abs(first[:9] - second[:9]).max() < 1e-12 * 10
     assert np.abs(first[9:] + second[9:]).max() < 1e-12 * 10
+
+
+TEMPS = (-20.0, 0.0, 20.0, 40.0, 60.0)
+WITH_T = AIR + '\ntemperature = "T"'
+
+
+def over_temperature(temps: tuple[float, ...], gain: float = 0.0) -> FloatArray:
+    """The wide grid at each temperature; biases and gains change with it."""
+    parts = []
+    for n, temp in enumerate(temps):
+        off = 4.0 * ARCSEC * np.random.default_rng(n).standard_normal(wide().shape)
+        d = temp - 20.0
+        force = gravity_direction(AIRCRAFT, wide() + off)
+        readings = (1.0 + gain * d) * force @ K.T + U0 + np.array([2e-3, -3e-3, 4e-3]) * d
+        angles = np.degrees(wide())
+        parts.append(np.column_stack([angles, readings, np.full(len(angles), temp)]))
+    return np.concatenate(parts)
+
+
+def test_angles_at_several_temperatures_end_in_c(tmp_path: Path) -> None:
+    rows = over_temperature(TEMPS, gain=1e-4)
+    folder = write_unit(tmp_path / "U", rows, WITH_T, header=HEADER + ",T")
+    delivery = deliver(folder)
+    calibration = delivery.calibration
+    assert calibration.range_degc == (-20.0, 60.0)
+    assert "each pose and 3 temperatures left out in turn" in calibration.selection_reason
+    assert calibration.shape.order == 1
+    d = np.array([-40.0, -10.0, 15.0, 40.0])[:, None]
+    found = calibration.thermal.constants_at(20.0 + d[:, 0])
+    bias = U0 + np.array([2e-3, -3e-3, 4e-3]) * d
+    truth = np.concatenate([(1.0 + 1e-4 * d) * K.ravel(), bias], axis=1)
+    sd = np.sqrt(np.diagonal(calibration.constants_covariance(20.0 + d[:, 0]), axis1=1, axis2=2))
+    # 48 values of 24 independent ones: beyond 4.5 once in thousands.
+    assert np.abs((found - truth) / sd).max() < 4.5
+    assert calibration.recording is not None
+    assert calibration.recording.rms_g < 25e-6  # 4 arcsec are 19 micro-g
+    assert (calibration.recording.left_out_length_g or 1.0) < 25e-6
+
+
+def test_an_order_of_tables_is_the_users(tmp_path: Path) -> None:
+    rows = over_temperature((0.0, 20.0, 40.0))
+    more = '[thermal]\nmodel = "polynomial"\norder = 1\n'
+    folder = write_unit(tmp_path / "U", rows, WITH_T, header=HEADER + ",T", more=more)
+    calibration = calibrated(folder)
+    assert {c.order for c in calibration.candidates} == {1}
+    more = more.replace("1", "3")
+    folder = write_unit(tmp_path / "V", rows, WITH_T, header=HEADER + ",T", more=more)
+    with pytest.raises(RefusedError, match="order 3 with poses at 3 temperatures; expected 2 at"):
+        calibrated(folder)
+
+
+def test_quadratic_terms_of_too_few_poses_are_refused_not_a_fault(tmp_path: Path) -> None:
+    """Seven poses are 21 values for 27 unknowns."""
+    folder = write_unit(
+        tmp_path / "U", GOOD[:22:3][:7], AIR, header=HEADER, more='[fit]\nterms = "quadratic"\n'
+    )
+    with pytest.raises(
+        RefusedError, match=r'leave constants open; .* leave out terms = "quadratic"'
+    ):
+        calibrated(folder)

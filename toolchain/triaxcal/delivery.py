@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from triaxcal.codegen.compiler import Compilation
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
@@ -19,6 +21,7 @@ from triaxcal.codegen.image_cases import check_images
 from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
 from triaxcal.codegen.routines import (
     Generated,
+    Int32Array,
     Reference,
     Routine,
     routines_of,
@@ -29,12 +32,15 @@ from triaxcal.codegen.tryout import MethodResult, model_error_g, run_on_dwells
 from triaxcal.errors import RefusedError
 from triaxcal.fit.acceptance import dwells_in_range, refuse_unacceptable
 from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.fixedpoint.arithmetic import INT32_MAX
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
+from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
-from triaxcal.records import MEASUREMENTS_FILE, MeasurementSet, read_measurements
+from triaxcal.model.terms import Terms
+from triaxcal.records import MEASUREMENTS_FILE, Dwell, MeasurementSet, read_measurements
 from triaxcal.unitfile import METHODS, UNIT_FILE, UnitDescription, read_unit
 
 IMAGE_FILE = "triax_calib.bin"
@@ -114,7 +120,9 @@ def deliver(folder: Path, reference: Reference | None = None) -> Delivery:
         check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
         check = replace(check, images=check_images(plan, image, *tried))
         _refuse_wrong_bound(unit, bound, check)
-        routines = {unit.method: generated.run, **_other_routines(unit, calibration, reference)}
+        rates = _rate_codes(unit, dwells)
+        own = routines_of(plan.rate, generated.library, reference.library, rates)[0]
+        routines = {unit.method: own.run, **_other_routines(unit, calibration, reference, rates)}
         thermal = calibration.thermal
         methods = run_on_dwells(unit, thermal, measurements.source, dwells, routines)
         compiler = generated.compiler
@@ -152,6 +160,12 @@ def _calibrated(
     measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
     calibration = calibrate(unit, measurements)
     refuse_unacceptable(unit, calibration, measurements)
+    if unit.pair is not None:
+        from triaxcal.fit.family.cross_coupling import stated_terms  # noqa: PLC0415
+
+        known, told = stated_terms(unit, folder)
+        notes = (*calibration.notes, *told)
+        calibration = replace(calibration, terms=Terms(known), notes=notes)
     return unit, measurements, calibration
 
 
@@ -160,8 +174,10 @@ def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:
     recorded = MEASUREMENTS_FILE
     if unit is not None and unit.recording is not None:
         recorded = unit.recording.file
+    pair = () if unit is None or unit.pair is None else (folder / unit.pair.file,)
     return files_sha256(
-        (folder / UNIT_FILE, folder / recorded), "put it there, or correct [recording] file"
+        (folder / UNIT_FILE, folder / recorded, *pair),
+        "put it there, or correct its name in unit.toml",
     )
 
 
@@ -236,8 +252,15 @@ def _constants_at_t0(calibration: Calibration) -> list[str]:
     ]
 
 
+def _rate_codes(unit: UnitDescription, dwells: Sequence[Dwell]) -> Int32Array:
+    """dT/dt of the dwells in codes of the firmware, shape (n,)."""
+    code = unit.temperature_sensor.degc_per_code * 2.0**-RATE_Q
+    rates = np.rint([d.rate_k_per_s / code for d in dwells])
+    return rates.clip(-INT32_MAX, INT32_MAX).astype(np.int32)
+
+
 def _other_routines(
-    unit: UnitDescription, calibration: Calibration, reference: Reference
+    unit: UnitDescription, calibration: Calibration, reference: Reference, rates: Int32Array
 ) -> dict[str, Routine | RefusedError]:
     """The methods that the unit did not choose, run by the reference C."""
     routines: dict[str, Routine | RefusedError] = {}
@@ -249,7 +272,8 @@ def _other_routines(
         except RefusedError as refusal:
             routines[method] = refusal
         else:
-            routines[method] = reference.routine(image_bytes(plan))
+            own = routines_of(plan.rate, reference.library, reference.library, rates)[1]
+            routines[method] = own.routine(image_bytes(plan))
     return routines
 
 

@@ -53,6 +53,8 @@ class Dwell:
         Number of independent readings in the mean; None when the file does not say.
     sd_v : array, shape (3,), or None
         Standard deviation of one reading, V.
+    rate_k_per_s : float
+        dT/dt, where a term in it is fitted.
     """
 
     row: int
@@ -61,6 +63,7 @@ class Dwell:
     voltage_v: FloatArray
     count: int | None
     sd_v: FloatArray | None
+    rate_k_per_s: float = 0.0
 
     @property
     def variance_of_mean_v2(self) -> FloatArray | None:

@@ -10,7 +10,14 @@ from pathlib import Path
 from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certificate_details
 from triaxcal.errors import RefusedError
 from triaxcal.measured import MEASURED_KEYS, Measured, measured_details
-from triaxcal.recordinglayout import DEFAULT_LSB, KEYS, RecordingLayout, recording_layout
+from triaxcal.model.positions import AXES
+from triaxcal.recordinglayout import (
+    DEFAULT_LSB,
+    KEYS,
+    RecordingLayout,
+    is_in_folder,
+    recording_layout,
+)
 from triaxcal.tomltable import Layout, Table, has_table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
@@ -56,6 +63,7 @@ _LAYOUT: Layout = {
     "certificate": dict.fromkeys(CERTIFICATE_KEYS, False),
     "recording": dict.fromkeys(KEYS, False),
     "measured": dict.fromkeys(MEASURED_KEYS, False),
+    "quadratic": {"cross_coupling": False, "axes": False},
 }
 _OF_RECORDING: Layout = {
     **_LAYOUT,
@@ -158,6 +166,14 @@ class StatedUncertainty:
 
 
 @dataclass(frozen=True)
+class PairSource:
+    """File of a pair's readings on a dividing head, and the unit's axes that A and B are."""
+
+    file: str
+    axes: tuple[int, int]
+
+
+@dataclass(frozen=True)
 class UnitDescription:
     """One unit, validated.
 
@@ -177,6 +193,8 @@ class UnitDescription:
         One of `TERMS`, `LOSSES`: of a recording's fit.
     adc_open : bool
         Whether a recording may widen [adc], which says nothing of its bits.
+    pair : PairSource or None
+        Readings of a pair whose cross-coupling is taken off.
     """
 
     name: str
@@ -199,6 +217,7 @@ class UnitDescription:
     terms: str = "auto"
     loss: str = "linear"
     adc_open: bool = False
+    pair: PairSource | None = None
     measured: Measured = field(default_factory=Measured)
 
 
@@ -314,8 +333,33 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
         terms=_choice(tables["fit"], "terms", TERMS),
         loss=_choice(tables["fit"], "loss", LOSSES),
         adc_open=recording is not None and not tables["adc"].values,
+        pair=_pair(tables["quadratic"]),
         measured=measured_details(tables["measured"]),
     )
+
+
+def _pair(table: Table) -> PairSource | None:
+    if not table.values:
+        return None
+    for key in ("cross_coupling", "axes"):
+        if key not in table:
+            raise RefusedError(
+                table.where(key),
+                "missing",
+                expected='cross_coupling = "pair.csv" and axes = ["x", "y"], those of A and B',
+            )
+    name = table.text("cross_coupling")
+    if not is_in_folder(name):
+        raise table.refuse("cross_coupling", "a file in the unit's folder", "copy it there")
+    axes = table.values["axes"]
+    if (
+        not isinstance(axes, list)
+        or len(axes) != 2
+        or not all(isinstance(a, str) and a in AXES for a in axes)
+        or axes[0] == axes[1]
+    ):
+        raise table.refuse("axes", 'the axes that A and B are, as ["x", "y"]')
+    return PairSource(name, (AXES.index(axes[0]), AXES.index(axes[1])))
 
 
 def _choice(table: Table, key: str, choices: tuple[str, ...]) -> str:

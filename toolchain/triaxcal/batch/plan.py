@@ -88,10 +88,19 @@ def _not_of_a_series(path: Path) -> str:
 
 
 def _order(folder: Path, by: str) -> Order:
-    recorded = _recorded(find_unit(folder))
+    description = find_unit(folder)
     # A recording that lies elsewhere is refused when the unit is made.
-    files = (UNIT_FILE, recorded) if is_in_folder(recorded) else (UNIT_FILE,)
-    return planned(folder, by, files)
+    named = (_recorded(description), *_pair(description))
+    return planned(folder, by, (UNIT_FILE, *filter(is_in_folder, named)))
+
+
+def _pair(path: Path) -> tuple[str, ...]:
+    """Name of the pair's readings that [quadratic] names, if it does."""
+    if not has_table(path, "quadratic"):
+        return ()
+    table = read_toml(path)["quadratic"]
+    name = table.get("cross_coupling") if isinstance(table, dict) else None
+    return (name,) if isinstance(name, str) else ()
 
 
 def _recorded(path: Path) -> str:

@@ -21,10 +21,10 @@ def recorded(folder: Path) -> tuple[RecordingLayout, Samples]:
         When the unit has none, or it cannot be read.
     """
     from triaxcal.recording.samples import read_samples  # noqa: PLC0415
-    from triaxcal.tomltable import read_toml  # noqa: PLC0415
+    from triaxcal.tomltable import has_table  # noqa: PLC0415
     from triaxcal.unitfile import find_unit, read_unit  # noqa: PLC0415
 
-    if "dynamic" in read_toml(find_unit(folder)):
+    if has_table(find_unit(folder), "dynamic"):
         raise RefusedError(
             f"{folder}/unit.toml",
             "a whole IMU on a turntable, [dynamic]",

@@ -108,20 +108,22 @@ class Generated:
 
 @dataclass(frozen=True)
 class RateReference(Reference):
-    """The handwritten reference with the rates of temperature of `rates_of`."""
+    """The handwritten reference with the rates of temperature of `rates_of`, or those given."""
 
     rate: RatePlan
+    given: Int32Array | None = None
     entry: ClassVar[str] = "triax_ref_batch_rate"
 
     def _inputs(self, temp: Int32Array, raw: Int32Array) -> tuple[Int32Array, ...]:
-        return temp, _rates(self.rate, temp), raw
+        return temp, _rates(self.rate, self.given, temp), raw
 
 
 @dataclass(frozen=True)
 class RateGenerated(Generated):
-    """A generated routine with a term in dT/dt, with the rates of `rates_of`."""
+    """A generated routine with a term in dT/dt, with the rates of `rates_of`, or those given."""
 
     rate: RatePlan
+    given: Int32Array | None = None
 
     def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
         """Answers with the compiled-in constants."""
@@ -134,7 +136,7 @@ class RateGenerated(Generated):
     def _call_rate(
         self, image: bytes | None, temp: Int32Array, raw: Int32Array
     ) -> tuple[int, Answers]:
-        inputs = temp, _rates(self.rate, temp), raw
+        inputs = temp, _rates(self.rate, self.given, temp), raw
         return _call(self.library.triax_batch_rate, _image(image), inputs)
 
 
@@ -179,12 +181,18 @@ class GeneratedImu:
 
 
 def routines_of(
-    rate: RatePlan | None, generated: ctypes.CDLL, reference: ctypes.CDLL
+    rate: RatePlan | None,
+    generated: ctypes.CDLL,
+    reference: ctypes.CDLL,
+    given: Int32Array | None = None,
 ) -> tuple[Generated, Reference]:
-    """Generated routine and reference as the cross-check of an accelerometer calls them."""
+    """Generated routine and reference as the cross-check of an accelerometer calls them.
+
+    `given` are rates in codes, one a vector, for vectors that have their own.
+    """
     if rate is None:
         return Generated(generated), Reference(reference)
-    return RateGenerated(generated, rate), RateReference(reference, rate)
+    return RateGenerated(generated, rate, given), RateReference(reference, rate, given)
 
 
 def _call(
@@ -206,7 +214,9 @@ def _image(image: bytes | None) -> tuple[object, ...]:
     return image, ctypes.c_size_t(len(image or b""))
 
 
-def _rates(rate: RatePlan, temp: Int32Array) -> Int32Array:
+def _rates(rate: RatePlan, given: Int32Array | None, temp: Int32Array) -> Int32Array:
+    if given is not None:
+        return given
     return np.ascontiguousarray(rates_of(rate, temp).astype(np.int32))
 
 

@@ -214,7 +214,8 @@ class _Columns:
 def _moment(text: str) -> datetime.datetime:
     """Moment of ISO 8601, with slashes for dashes, or of a day without a date."""
     if _TIME_OF_DAY.fullmatch(text):
-        return datetime.datetime.fromisoformat(f"2000-01-01T{text.zfill(8)}")
+        hours, rest = text.split(":", 1)
+        return datetime.datetime.fromisoformat(f"2000-01-01T{hours.zfill(2)}:{rest}")
     return datetime.datetime.fromisoformat(text.replace("/", "-"))
 
 

@@ -80,6 +80,12 @@ def _beyond_the_tilter(calibration: Calibration) -> dict[str, Any]:
             "products": list(PRODUCT_NAMES),
             "per_g": calibration.terms.quadratic_per_g.tolist(),
         }
+    rate = calibration.terms.rate
+    if rate is not None:
+        found["rate_term"] = {
+            "offset_g_s_per_k": rate.offset_g_s_per_k.tolist(),
+            "range_k_per_s": list(rate.range_k_per_s),
+        }
     recording = calibration.recording
     if calibration.notes:
         found["findings"] = list(calibration.notes)

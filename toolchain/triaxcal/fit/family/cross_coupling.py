@@ -16,12 +16,15 @@ The squares cancel the table's error: it enters through products with the coeffi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from triaxcal.errors import RefusedError
 from triaxcal.model.terms import PRODUCT_NAMES, Terms
 from triaxcal.model.types import FloatArray
+from triaxcal.recording.pair import read_pair
+from triaxcal.unitfile import UnitDescription
 
 NAMES = ("K0B", "K0A", "K1A", "K1B", "KipA", "KipB", "b0")
 UNITS = ("g", "g", "", "", "g/g^2", "g/g^2", "rad")
@@ -166,3 +169,26 @@ def terms_of_pair(kip_a: float, kip_b: float, axes: tuple[int, int]) -> Terms:
     Q[axes[0], PRODUCT_NAMES.index(product)] = -kip_a
     Q[axes[1], PRODUCT_NAMES.index(product)] = kip_b
     return Terms(quadratic_per_g=Q)
+
+
+def stated_terms(unit: UnitDescription, folder: Path) -> tuple[FloatArray, tuple[str, ...]]:
+    """Q (3, 6) of the pair that unit.toml names, 0 without one, and what is told of it.
+
+    Raises
+    ------
+    RefusedError
+        When the pair's file cannot be read, or leaves a coefficient open.
+    """
+    if unit.pair is None:
+        return np.zeros((3, 6)), ()
+    path = folder / unit.pair.file
+    fit = fit_pair(str(path), *read_pair(path), unit.gravity_g)
+    kip_a, kip_b = (float(v) for v in fit.values[4:6])
+    Q = terms_of_pair(kip_a, kip_b, unit.pair.axes).quadratic_per_g
+    assert Q is not None
+    first, second = ("xyz"[k] for k in unit.pair.axes)
+    told = (
+        f"cross-coupling of {unit.pair.file} is taken off: KipA {kip_a:.3g} (sd {fit.sd[4]:.1g}), "
+        f"KipB {kip_b:.3g} (sd {fit.sd[5]:.1g}) g/g^2, A along {first} and B along {second}"
+    )
+    return Q, (told,)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +19,7 @@ from triaxcal.fit.family.checks import (
 )
 from triaxcal.fit.family.frame import CASE, case_rotation, turned_constants, turned_quadratic
 from triaxcal.fit.family.outliers import worst_outlier
+from triaxcal.fit.family.rate import half_cycle_turns, pose_rates
 from triaxcal.fit.family.result import RecordingFit
 from triaxcal.fit.family.scalar import MODELS, NINE, ScalarData, ScalarModel, scalar_data
 from triaxcal.fit.family.temperatures import (
@@ -30,17 +31,19 @@ from triaxcal.fit.family.temperatures import (
 from triaxcal.fit.family.trials import (
     TURNS_MAX,
     Judged,
+    PoseClimate,
     Trial,
     choose,
     folds,
     judge,
     reason,
     unscored,
+    without_idle_rates,
 )
 from triaxcal.fit.grouping import GROUP_GAP_DEGC
-from triaxcal.fit.thermal import ThermalShape, polynomial_shape
+from triaxcal.fit.thermal import polynomial_shape
 from triaxcal.model.metrological import force_from_voltage
-from triaxcal.model.terms import NO_TERMS, Terms
+from triaxcal.model.terms import RateTerm, Terms
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.poses import PoseSet, find_poses, orientation_groups
 from triaxcal.recording.samples import Samples
@@ -58,9 +61,9 @@ BEYOND_1_G = "quadratic terms were seen at 1 g; beyond it they grow with the squ
 
 
 def calibrate_poses(
-    unit: UnitDescription, layout: RecordingLayout, samples: Samples
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples, known: FloatArray
 ) -> tuple[MeasurementSet, Calibration]:
-    """Calibrate from poses of which only |a| = g is known.
+    """Calibrate from poses of which only |a| = g is known; `known` is a part of Q, (3, 6).
 
     Raises
     ------
@@ -71,24 +74,31 @@ def calibrate_poses(
     poses = find_poses(samples, layout)
     data, temps, findings = _prepared(unit, layout, samples, poses)
     orientations, temperatures = _groups(data, temps)
-    left_out = folds(orientations, temperatures, len(temps))
-    trials = _trials(unit, temps, temperatures)
-    rows = [judge(trial, data, temps, left_out, unit.loss) for trial in trials]
-    turns = _turns(orientations, temperatures)
+    halves = half_cycle_turns(temps)
+    climate = PoseClimate(temps, pose_rates(samples, poses, layout) if halves else None, unit.loss)
+    left_out = folds(orientations, temperatures, len(temps)) + halves
+    trials = [
+        replace(trial, model=replace(trial.model, known=known))
+        for trial in _trials(unit, climate, temperatures)
+    ]
+    rows = [judge(trial, data, climate, left_out) for trial in trials]
+    turns = _turns(orientations, temperatures, len(halves))
     if unscored(rows):
         left_out = folds([[k] for k in range(len(temps))], temperatures, len(temps))
-        rows = [judge(trial, data, temps, left_out, unit.loss) for trial in trials]
+        rows = [judge(trial, data, climate, left_out) for trial in trials]
         turns = f"{len(temps)} single poses, alike ones staying in,"
     if not any(row.able for row in rows):
         largest = max(rows, key=lambda row: -row.trial.parameters)
         refuse_unseen(poses, largest.fit.condition, largest.fit.unseen())
         refuse_few(poses, len(orientations), rows[0].trial.parameters + 1)
-    values = sum(int(mask.sum()) for mask in left_out)
-    best = choose(rows)
-    why = reason(rows, best, turns, values)
+    values = sum(int(judged.sum()) for _, judged in left_out)
+    able = without_idle_rates(rows, sum(int(judged.sum()) for _, judged in halves))
+    best = choose(able)
+    why = reason(able, best, turns, values)
     findings += _outlier(best, poses) + ([BEYOND_1_G] if len(best.fit.model.quadratic) else [])
-    measurements = MeasurementSet(poses.source, pose_dwells(poses, temps))
-    made = _Made(unit, layout, poses, temps, rows, best, why, findings)
+    rates = climate.rates if best.trial.rate else None
+    measurements = MeasurementSet(poses.source, pose_dwells(poses, temps, rates))
+    made = _Made(unit, layout, poses, climate, rows, best, why, findings)
     return measurements, made.calibration()
 
 
@@ -143,15 +153,24 @@ def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
     return cells
 
 
-def _trials(unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]) -> list[Trial]:
-    """Every model at one temperature, and the nine constants with each thermal order."""
+def _trials(
+    unit: UnitDescription, climate: PoseClimate, temperatures: list[list[int]]
+) -> list[Trial]:
+    """Every model at one temperature, and the nine constants with each thermal order.
+
+    With a term in dT/dt besides, where there are half-cycles to judge it on.
+    """
     trials = []
+    temps = climate.temps_degc
     for order in thermal_orders(unit, temps, temperatures):
         shape = polynomial_shape(temps, unit.t0_degc, order)
         if order == 0:
             trials += [Trial(model, shape, 1) for model in _models(unit)]
         else:
-            trials += [Trial(NINE, shape, g) for g in sorted({1, order, order + 1})]
+            gains = sorted({1, order, order + 1})
+            trials += [Trial(NINE, shape, g) for g in gains]
+            if climate.rates is not None:
+                trials += [Trial(NINE, shape, g, rate=True) for g in gains]
     return trials
 
 
@@ -160,11 +179,12 @@ def _models(unit: UnitDescription) -> tuple[ScalarModel, ...]:
     return kept[unit.terms]
 
 
-def _turns(orientations: list[list[int]], temperatures: list[list[int]]) -> str:
+def _turns(orientations: list[list[int]], temperatures: list[list[int]], halves: int) -> str:
     inner = max(len(temperatures) - 2, 0) if len(temperatures) >= 4 else 0
     bundles = f" in {TURNS_MAX} bundles" if len(orientations) > TURNS_MAX else ""
     words = f"{len(orientations)} orientations{bundles}"
-    return words + (f" and {inner} temperatures" if inner else "")
+    words += f" and {inner} temperatures" if inner else ""
+    return words + (f" and {halves} half-cycles" if halves else "")
 
 
 def _outlier(best: Judged, poses: PoseSet) -> list[str]:
@@ -187,8 +207,11 @@ def _outlier(best: Judged, poses: PoseSet) -> list[str]:
     return [told]
 
 
-def pose_dwells(poses: PoseSet, temps: FloatArray) -> tuple[Dwell, ...]:
-    """Poses as dwells, named P and their number."""
+def pose_dwells(
+    poses: PoseSet, temps: FloatArray, rates: FloatArray | None = None
+) -> tuple[Dwell, ...]:
+    """Poses as dwells, named P and their number; with dT/dt where a term in it is fitted."""
+    rates = np.zeros(len(temps)) if rates is None else rates
     return tuple(
         Dwell(
             row=pose.line,
@@ -197,8 +220,9 @@ def pose_dwells(poses: PoseSet, temps: FloatArray) -> tuple[Dwell, ...]:
             voltage_v=pose.reading,
             count=None,
             sd_v=None,
+            rate_k_per_s=float(rate),
         )
-        for pose, temp in zip(poses.poses, temps, strict=True)
+        for pose, temp, rate in zip(poses.poses, temps, rates, strict=True)
     )
 
 
@@ -209,7 +233,7 @@ class _Made:
     unit: UnitDescription
     layout: RecordingLayout
     poses: PoseSet
-    temps: FloatArray
+    climate: PoseClimate
     rows: list[Judged]
     best: Judged
     why: str
@@ -217,37 +241,51 @@ class _Made:
 
     def calibration(self) -> Calibration:
         """The calibration, in the frame of the layout."""
-        fit, shape = self.best.fit, self.best.trial.shape
+        fit = self.best.fit
         constants, slopes = fit.constants(), fit.constants_jacobian()
         quadratic = fit.quadratic
         findings = list(self.findings)
         if self.layout.frame == CASE:
-            force = force_from_voltage((shape.basis(self.temps) @ constants.T), self.poses.readings)
+            force = force_from_voltage(fit.data.basis @ constants.T, self.poses.readings)
             rotation, told = case_rotation(self.poses.source, force)
             findings.append(told)
             constants = turned_constants(constants, rotation)
             quadratic = turned_quadratic(quadratic, rotation)
             turned = [turned_constants(slopes[..., k], rotation) for k in range(slopes.shape[-1])]
             slopes = np.stack(turned, axis=-1)
+        rate = self._rate_term(constants) if self.best.trial.rate else None
+        if rate is not None:
+            findings.append(rate_in_words(rate))
+            constants, slopes = constants[:, :-1], slopes[:, :-1]
         covariance = np.einsum("apk,kl,bql->apbq", slopes, fit.covariance, slopes)
         if len(fit.residual_g) == len(fit.theta):
             covariance = np.full_like(covariance, np.nan)
             findings.insert(0, _UNCHECKED.format(count=len(fit.theta)))
-        return self._calibration(shape, constants, quadratic, covariance, findings)
+        terms = Terms(quadratic if quadratic.any() else None, rate)
+        return self._calibration(constants, terms, covariance, findings)
+
+    def _rate_term(self, constants: FloatArray) -> RateTerm:
+        """The biases' last function, reading units at the largest rate, as an offset of a at T0."""
+        rates, shape = self.climate.rates, self.best.trial.shape
+        assert rates is not None
+        at_t0 = constants[:9, :-1] @ shape.basis(self.unit.t0_degc)
+        per_rate = constants[9:, -1] / np.abs(rates).max()
+        offset = -np.linalg.solve(at_t0.reshape(3, 3), per_rate).astype(np.float64)
+        # A hundredth beyond: the fastest pose must not be clamped by the rounding of its code.
+        low, high = 1.01 * min(float(rates.min()), 0.0), 1.01 * max(float(rates.max()), 0.0)
+        return RateTerm(offset, (low, high))
 
     def _calibration(
         self,
-        shape: ThermalShape,
         constants: FloatArray,
-        quadratic: FloatArray,
+        terms: Terms,
         covariance: FloatArray,
         findings: list[str],
     ) -> Calibration:
-        fit, t0 = self.best.fit, self.unit.t0_degc
+        fit, t0, shape = self.best.fit, self.unit.t0_degc, self.best.trial.shape
         thermal = shape.model(constants)
         basis = shape.basis(t0)
         dof = len(fit.residual_g) - len(fit.theta)
-        terms = Terms(quadratic_per_g=quadratic) if len(fit.model.quadratic) else NO_TERMS
         result = RecordingFit(
             poses=self.poses,
             route=f"only |a| = g known; frame: {self.layout.frame}",
@@ -267,7 +305,7 @@ class _Made:
             estimator=ESTIMATOR,
             thermal=thermal,
             shape=shape,
-            range_degc=recording_range(self.unit, self.poses, self.temps),
+            range_degc=recording_range(self.unit, self.poses, self.climate.temps_degc),
             points=(
                 CalibrationPoint(
                     temp_degc=t0,
@@ -289,6 +327,16 @@ class _Made:
             recording=result,
             reading_unit=self.layout.acceleration_unit,
         )
+
+
+def rate_in_words(rate: RateTerm) -> str:
+    """What a term in dT/dt is, and what the firmware does about it."""
+    offset = ", ".join(f"{v * 1e3 / 60.0:.3g}" for v in rate.offset_g_s_per_k)
+    low, high = (60.0 * v for v in rate.range_k_per_s)
+    return (
+        f"a term in dT/dt is fitted: {offset} mg for 1 K/min in x, y, z, from {low:.3g} to "
+        f"{high:+.3g} K/min; the firmware gives the rate by triax_set_temperature_rate"
+    )
 
 
 def covariance_blocks(covariance: FloatArray) -> FloatArray:

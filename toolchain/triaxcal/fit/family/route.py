@@ -10,10 +10,12 @@ import numpy as np
 from triaxcal.errors import RefusedError
 from triaxcal.fit.acceptance import refuse_unacceptable
 from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.fit.family.cross_coupling import stated_terms
 from triaxcal.fit.family.faces import face_measurements
 from triaxcal.fit.family.recordings import calibrate_poses
 from triaxcal.fit.family.tables import calibrate_table
 from triaxcal.fit.family.temperatures import no_temperature
+from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.recording.samples import Samples, read_samples
 from triaxcal.recordinglayout import RecordingLayout
 from triaxcal.records import MeasurementSet
@@ -33,26 +35,30 @@ def calibrate_recording(
     RefusedError
         When the recording cannot be read, or its poses do not carry a calibration.
     """
+    known, told = stated_terms(unit, folder)
     samples = read_samples(folder, layout, unit.temperature_sensor)
     unit = replace(unit, adc=_wide_enough(unit, layout, samples))
     if layout.faces:
         measurements = face_measurements(unit, layout, samples)
         found = calibrate(unit, measurements)
         refuse_unacceptable(unit, found, measurements)
-        notes = list(samples.findings) + list(found.notes)
-        if samples.temp_degc is None:
-            notes.append(no_temperature(unit))
-        return (
-            unit,
-            measurements,
-            replace(found, reading_unit=layout.acceleration_unit, notes=tuple(notes)),
+        unseen = [no_temperature(unit)] if samples.temp_degc is None else []
+        calibration = replace(
+            found,
+            reading_unit=layout.acceleration_unit,
+            notes=(*samples.findings, *found.notes, *unseen, *told),
+            terms=Terms(known) if known.any() else NO_TERMS,
         )
+        return unit, measurements, calibration
     if layout.angles is not None:
-        measurements, calibration = calibrate_table(unit, layout, layout.angles, samples)
+        measurements, calibration = calibrate_table(unit, layout, layout.angles, samples, known)
     else:
-        measurements, calibration = calibrate_poses(unit, layout, samples)
+        measurements, calibration = calibrate_poses(unit, layout, samples, known)
     _refuse_beyond_limits(unit, calibration)
-    return unit, measurements, calibration
+    recording = calibration.recording
+    assert recording is not None
+    recording = replace(recording, findings=(*recording.findings, *told))
+    return unit, measurements, replace(calibration, recording=recording)
 
 
 def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Samples) -> Adc:

@@ -18,7 +18,7 @@ singular value of the Jacobian means the same in counts and in m/s^2.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
@@ -76,12 +76,15 @@ class ScalarModel:
         K is the sum of these, each with its parameter.
     quadratic : array, shape (q, 3, 6)
         Q likewise.
+    known : array, shape (3, 6)
+        Part of Q that is known beforehand.
     """
 
     label: str
     gain_names: tuple[str, ...]
     gain: FloatArray
     quadratic: FloatArray
+    known: FloatArray = field(default_factory=lambda: np.zeros((3, 6)))
 
     @property
     def parameters(self) -> int:
@@ -370,7 +373,7 @@ def _split(
     rest = theta[m * gain_functions :]
     bias = rest[: 3 * P].reshape(3, P).T
     K = np.einsum("mp,mij->pij", gains, model.gain)
-    Q = np.einsum("q,qij->ij", rest[3 * P :], model.quadratic)
+    Q = model.known + np.einsum("q,qij->ij", rest[3 * P :], model.quadratic)
     return K, bias, Q
 
 
@@ -389,7 +392,7 @@ def _residual(
     length = np.linalg.norm(force, axis=1)
     unit = force / length[:, None]
     through = np.broadcast_to(np.eye(3), (n, 3, 3))
-    if len(model.quadratic):
+    if Q.any():
         through = through + np.einsum("ik,nkj->nij", Q, _product_slopes(linear))
     row = np.einsum("ni,nij,njk->nk", unit, through, N)  # d|a| / d(U - U0)
     by_gain = -np.einsum("nk,mkl,nl->nm", row, model.gain, linear)

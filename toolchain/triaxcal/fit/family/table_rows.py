@@ -38,15 +38,24 @@ class TablePoses:
     readings, force : arrays, shape (n, 3)
         Reading units, and g with the sign of the readings.
     temps_degc : array, shape (n,)
+    known : array, shape (3, 6)
+        Part of Q that is known beforehand.
     """
 
     readings: FloatArray
     force: FloatArray
     temps_degc: FloatArray
+    known: FloatArray
+
+    @property
+    def target(self) -> FloatArray:
+        """What is left to fit when the known part of Q is taken off, to first order in it."""
+        result: FloatArray = self.force - products(self.force) @ self.known.T
+        return result
 
     def select(self, kept: BoolArray) -> TablePoses:
         """Only the poses of a mask."""
-        return TablePoses(self.readings[kept], self.force[kept], self.temps_degc[kept])
+        return TablePoses(self.readings[kept], self.force[kept], self.temps_degc[kept], self.known)
 
 
 @dataclass(frozen=True)
@@ -99,9 +108,11 @@ class TableTrial:
         """Fit to the poses."""
         if self.solver is None:
             return _forward_over_temperature(self.shape, self.gains, poses)
-        found = self.solver(poses.readings, poses.force)
+        found = self.solver(poses.readings, poses.target)
         constants = pack_constants(found.K, found.U0)[:, None]
-        return TableFit(self.shape, constants, found.quadratic, found.condition)
+        return TableFit(
+            self.shape, constants, _with_known(found.quadratic, poses.known), found.condition
+        )
 
 
 @dataclass(frozen=True)
@@ -222,7 +233,7 @@ def _oriented(constants: FloatArray, condition: float) -> OrientedFit:
 def thermal_design(shape: ThermalShape, gains: int, poses: TablePoses) -> FloatArray:
     """Design of the forward form over temperature, shape (n, 3 gains + P)."""
     basis = shape.basis(poses.temps_degc)
-    of_gain = (poses.force[:, :, None] * basis[:, None, :gains]).reshape(len(basis), -1)
+    of_gain = (poses.target[:, :, None] * basis[:, None, :gains]).reshape(len(basis), -1)
     return np.concatenate([of_gain, basis], axis=1)
 
 
@@ -232,4 +243,11 @@ def _forward_over_temperature(shape: ThermalShape, gains: int, poses: TablePoses
     constants = np.zeros((12, shape.parameters))
     constants[:9, :gains] = solution[:, : 3 * gains].reshape(9, gains)
     constants[9:] = solution[:, 3 * gains :]
-    return TableFit(shape, constants, None, scaled_condition(design))
+    known = _with_known(None, poses.known)
+    return TableFit(shape, constants, known, scaled_condition(design))
+
+
+def _with_known(quadratic: FloatArray | None, known: FloatArray) -> FloatArray | None:
+    if not known.any():
+        return quadratic
+    return known if quadratic is None else quadratic + known

@@ -52,9 +52,13 @@ _RAD_PER_ARCSEC = math.pi / 180.0 / 3600.0
 
 
 def calibrate_table(
-    unit: UnitDescription, layout: RecordingLayout, angles: Angles, samples: Samples
+    unit: UnitDescription,
+    layout: RecordingLayout,
+    angles: Angles,
+    samples: Samples,
+    known_quadratic: FloatArray,
 ) -> tuple[MeasurementSet, Calibration]:
-    """Calibrate from poses whose angles are known.
+    """Calibrate from poses whose angles are known; `known_quadratic` is a part of Q, (3, 6).
 
     Raises
     ------
@@ -71,7 +75,7 @@ def calibrate_table(
     refuse_open(poses, gravity_direction(angles.kind, table))
     temps, temperatures = pose_temperatures(unit, poses)
     force, sign = known_force(poses.source, layout, readings, table, unit.gravity_g)
-    known = TablePoses(readings, force, temps)
+    known = TablePoses(readings, force, temps, known_quadratic)
     left_out = turns(known, temperatures)
     trials = [t for t in _trials(unit, temps, temperatures) if t.parameters <= 3 * len(temps)]
     rows = [judge_table(trial, known, left_out) for trial in trials]
@@ -92,7 +96,7 @@ def calibrate_table(
     findings = [
         *poses.findings,
         *outlier_findings(unit, angles, poses, table=table, sign=sign, best=best),
-        *([] if best.fit.quadratic is None else [BEYOND_1_G]),
+        *([BEYOND_1_G] if best.trial.parameters > 12 and best.fit.quadratic is not None else []),
         *([] if poses.temps_degc is not None else [no_temperature(unit)]),
         *table_findings(angles, table[near], readings[near], found[near], unit.gravity_g),
         _angle_residuals(angles, table, found),
@@ -108,18 +112,21 @@ def _trials(
     unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]
 ) -> list[TableTrial]:
     orders = thermal_orders(unit, temps, temperatures)
-    trials = []
-    if 0 in orders:
-        trials += [
-            trial
-            for trial in one_temperature_trials(polynomial_shape(temps, unit.t0_degc, 0))
-            if unit.terms == "auto"
-            or (unit.terms == "quadratic") == trial.label.startswith("quadratic")
-        ]
-    for order in orders:
-        if order > 0 and unit.terms != "quadratic":
-            trials += thermal_trials(polynomial_shape(temps, unit.t0_degc, order))
-    return trials
+    shapes = [polynomial_shape(temps, unit.t0_degc, order) for order in orders]
+    if orders != (0,):
+        if unit.terms == "quadratic":
+            raise RefusedError(
+                f"{unit.name}/unit.toml, [fit] terms",
+                f'"quadratic" with angles at {len(temperatures)} temperatures',
+                expected="one temperature, or linear terms",
+                remedy="make a unit of one temperature, or leave it out",
+            )
+        return [trial for shape in shapes for trial in thermal_trials(shape)]
+    return [
+        trial
+        for trial in one_temperature_trials(shapes[0])
+        if unit.terms == "auto" or (unit.terms == "quadratic") == trial.label.startswith("quadr")
+    ]
 
 
 def _choose(rows: Sequence[TableRow], temperatures: list[list[int]]) -> tuple[TableRow, str]:

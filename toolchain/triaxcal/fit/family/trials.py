@@ -24,6 +24,8 @@ from triaxcal.fit.selection import Candidate
 from triaxcal.fit.thermal import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
 
+Turn = tuple[BoolArray, BoolArray]
+"""Poses that are left out, and those of them that are judged, as masks."""
 TURNS_MAX = 60
 """Of hundreds of poses one more or less left out changes nothing that a rms could show."""
 
@@ -36,30 +38,50 @@ class Trial:
     ----------
     gain_functions : int
         How many functions of `shape` the entries of K have; the biases have all.
+    rate : bool
+        Whether the biases also have a term in dT/dt.
     """
 
     model: ScalarModel
     shape: ThermalShape
     gain_functions: int
+    rate: bool = False
 
     @property
     def parameters(self) -> int:
         """Free parameters over all temperatures."""
         m, q = len(self.model.gain), len(self.model.quadratic)
-        return m * self.gain_functions + 3 * self.shape.parameters + q
+        return m * self.gain_functions + 3 * (self.shape.parameters + self.rate) + q
+
+    def basis(self, temps_degc: FloatArray, rates: FloatArray | None) -> FloatArray:
+        """Functions of temperature at the poses, (n, P), the rate over its largest the last."""
+        functions = self.shape.basis(temps_degc)
+        if not self.rate or rates is None:
+            return functions
+        return np.column_stack([functions, rates / np.abs(rates).max()])
 
     @property
     def label(self) -> str:
         """Words for tables."""
-        if self.shape.parameters == 1:
+        if self.shape.parameters == 1 and not self.rate:
             return self.model.label
         of_gain = f", K of order {self.gain_functions - 1}"
         short = f"; {self.shape.label.replace('polynomial of ', '')}"
-        return self.model.label + short + (of_gain if self._gain_differs else "")
+        of_rate = " and dT/dt" if self.rate else ""
+        return self.model.label + short + (of_gain if self._gain_differs else "") + of_rate
 
     @property
     def _gain_differs(self) -> bool:
         return self.gain_functions != self.shape.parameters
+
+
+@dataclass(frozen=True)
+class PoseClimate:
+    """Temperatures of the poses, (n,); dT/dt there in K/s, where it is known; the fit's loss."""
+
+    temps_degc: FloatArray
+    rates: FloatArray | None
+    loss: str
 
 
 @dataclass(frozen=True)
@@ -101,37 +123,35 @@ class Judged:
 
 def folds(
     orientations: Sequence[Sequence[int]], temperatures: Sequence[Sequence[int]], count: int
-) -> list[BoolArray]:
+) -> list[Turn]:
     """Masks of what is left out in turn: orientations, then inner temperatures (rising).
 
     More than `TURNS_MAX` orientations are left out in so many bundles.
     """
     inner = temperatures[1:-1] if len(temperatures) >= 4 else ()
     turns = [[k for g in orientations[n::TURNS_MAX] for k in g] for n in range(TURNS_MAX)]
-    masks: list[BoolArray] = []
+    masks: list[Turn] = []
     for group in (*(filter(None, turns) if len(orientations) > 1 else ()), *inner):
         mask = np.zeros(count, dtype=np.bool_)
         mask[list(group)] = True
-        masks.append(mask)
+        masks.append((mask, mask))
     return masks
 
 
-def judge(
-    trial: Trial, data: ScalarData, temps_degc: FloatArray, left_out: Sequence[BoolArray], loss: str
-) -> Judged:
+def judge(trial: Trial, data: ScalarData, poses: PoseClimate, left_out: Sequence[Turn]) -> Judged:
     """Fit a trial to all poses, and to what each turn leaves."""
-    own = data.with_basis(trial.shape.basis(temps_degc))
+    own, loss = data.with_basis(trial.basis(poses.temps_degc, poses.rates)), poses.loss
     fit = fit_scalar(trial.model, own, trial.gain_functions, loss)
     if fit.condition > CONDITION_MAX or len(fit.residual_g) < trial.parameters:
         return Judged(trial, fit, None, able=False)
     errors = []
-    for mask in left_out:
+    for mask, judged in left_out:
         part = fit_scalar(
             trial.model, own.select(~mask), trial.gain_functions, loss, start=fit.theta
         )
         if part.condition > CONDITION_MAX or len(part.residual_g) < trial.parameters:
             return Judged(trial, fit, None, able=True)
-        errors.append(part.errors_g(own.select(mask)))
+        errors.append(part.errors_g(own.select(judged)))
     if not errors:
         return Judged(trial, fit, None, able=True)
     every = np.concatenate(errors)
@@ -164,6 +184,26 @@ def choose(rows: Sequence[Judged]) -> Judged:
         row for row in scored if not any(beats(other.errors_g, row.errors_g) for other in scored)
     ]
     return min(unbeaten, key=lambda row: (row.trial.parameters, row.held_out_g))
+
+
+def without_idle_rates(rows: Sequence[Judged], values: int) -> list[Judged]:
+    """Rows without the terms in dT/dt that do not win on half-cycles left out, the last `values`.
+
+    A term in dT/dt must beat the same candidate without it there, whatever it gains elsewhere.
+    """
+    plain = {(r.trial.shape, r.trial.gain_functions): r for r in rows if not r.trial.rate}
+    kept = []
+    for row in rows:
+        rival = plain.get((row.trial.shape, row.trial.gain_functions))
+        if row.trial.rate and (
+            row.errors_g is None
+            or rival is None
+            or rival.errors_g is None
+            or not beats(row.errors_g[-values:], rival.errors_g[-values:])
+        ):
+            continue
+        kept.append(row)
+    return kept
 
 
 def beats(errors: FloatArray | None, rival: FloatArray | None) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 from triaxcal import __version__
 from triaxcal.codegen.render import environment
 from triaxcal.codegen.tryout import BEFORE
+from triaxcal.fit.calibrate import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.measured import measured_words
 from triaxcal.report.passport.content import Acceptance, Passport
@@ -75,6 +76,7 @@ def _identity(p: Passport) -> dict[str, Any]:
             ("Serial number", d.unit.serial),
             ("Working range", signed(f"{low:g} to {high:g} °C")),
             ("Measured", signed(measured_words(d).replace("degC", "°C"))),
+            *_left_out(d.calibration),
             ("Local gravity", f"{d.unit.gravity_g * 9.80665:.6g} m/s²"),
             ("Thermal model", f"{signed(d.calibration.shape.label.replace('degC', '°C'))}"),
             ("Bias estimator", d.calibration.estimator),
@@ -83,6 +85,15 @@ def _identity(p: Passport) -> dict[str, Any]:
             ("Inputs", f"sha256 {d.inputs_sha256[:16]}…"),
         ],
     }
+
+
+def _left_out(calibration: Calibration) -> list[tuple[str, str]]:
+    """What counts most of a recording."""
+    if calibration.recording is None:
+        return []
+    rms = calibration.recording.left_out_length_g
+    told = "nothing: no pose can be spared" if rms is None else f"|a| − g {g_in_words(rms)} rms"
+    return [("Poses left out", told)]
 
 
 def _findings(p: Passport) -> tuple[str, ...]:

@@ -1,0 +1,85 @@
+"""Calibrations that nothing checks are not called passed; certificates of recordings."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from family_cases import U0, K, directions, log, write_unit
+from test_recordings import found
+
+from triaxcal.cli.main import main
+from triaxcal.delivery import deliver
+from triaxcal.errors import RefusedError
+from triaxcal.model.types import FloatArray
+from triaxcal.report.dcc import certificate_xml
+from triaxcal.report.passport.content import passport
+from triaxcal.report.passport.page import passport_html
+from triaxcal.report.summary import summary
+
+
+def exact(count: int) -> FloatArray:
+    tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+    poses = directions(6) if count == 6 else tetrahedron
+    return poses @ K.T + U0
+
+
+@pytest.mark.parametrize("count", [4, 6])
+def test_as_many_constants_as_poses_are_not_called_passed(tmp_path: Path, count: int) -> None:
+    recording = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "m/s^2"'
+    delivery = deliver(write_unit(tmp_path / "U", exact(count), recording, header="a,b,c"))
+    made = passport(delivery, {})
+    told = summary(made, ["a"], "build")
+    assert f"NOT CHECKED: {count} constants from {count} poses fit whatever" in " ".join(
+        told.split()
+    )
+    assert "\nNOT CHECKED " in told
+    assert "\npassed" not in told
+    assert "uncertainty     unknown: as many constants as poses" in told
+    assert "left out        nothing: no pose can be spared" in told
+    assert b"NOT CHECKED<small>as many constants as poses" in passport_html(made)
+    assert not made.shown
+    assert np.isnan(delivery.calibration.constants_covariance(20.0)).any()
+
+
+CERTIFICATE = """[certificate]
+identifier = "C-1"
+laboratory = "L"
+city = "Kyiv"
+country = "UA"
+customer = "C"
+signer = "S"
+manufacturer = "M"
+begin = 2026-03-30
+end = 2026-03-31
+
+"""
+
+
+def test_a_recording_gets_its_certificate_in_its_own_units(tmp_path: Path) -> None:
+    delivery = deliver(write_unit(tmp_path / "U", log(directions(12)), more=CERTIFICATE))
+    made = passport(delivery, {})
+    assert delivery.unit.certificate is not None
+    text = certificate_xml(made, delivery.unit.certificate).decode()
+    assert "12 poses, only |a| = g known; frame: sensor" in text
+    assert r"\one \one \one \one \one \one \one \one \one \metre\second\tothe{-2}" in text
+    values = re.findall(r"<si:valueXMLList>([^<]*)", text)[0].split()
+    matrix, bias = found(delivery.calibration)
+    expected = np.concatenate([matrix.ravel() / 9.80665, bias])
+    # Twelve digits are printed.
+    assert np.allclose(np.array(values, dtype=float), expected, rtol=1e-11)
+    # Nothing is known of the change with temperature: no unconditional conformity.
+    assert "not in it: the change with temperature" in text
+    assert "conditionalPass" in text
+    assert ">pass<" not in text
+
+
+def test_a_certificate_of_what_nothing_checks_is_refused(tmp_path: Path) -> None:
+    folder = write_unit(tmp_path / "U", log(directions(6)), more=CERTIFICATE)
+    result = CliRunner().invoke(main, ["calib", str(folder), "--build", str(tmp_path / "b")])
+    assert isinstance(result.exception, RefusedError)
+    assert "a certificate of constants that nothing checks" in str(result.exception)
+    assert not (tmp_path / "b").exists()
