@@ -183,8 +183,8 @@ def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
     cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image, names)]
     changes = itertools.chain(
         _temperature_edges(layout, words), _coefficient_edges(layout, words),
-        _row_edges(layout, words), _wild(layout, words), _inverse_edges(layout, plan), _term_edges(layout),
-        _rate_edges(layout, words), rate_ties(layout, shape),
+        _row_edges(layout, words), _wild(layout, words), _inverse_edges(layout, plan),
+        _term_edges(layout), _rate_edges(layout, words), rate_ties(layout, shape),
     )  # fmt: skip
     for name, change in changes:
         if not all(INT32_MIN <= value <= INT32_MAX for value in change.values()):
