@@ -183,8 +183,8 @@ def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
     cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image, names)]
     changes = itertools.chain(
         _temperature_edges(layout, words), _coefficient_edges(layout, words),
-        _row_edges(layout), _wild(layout, words), _inverse_edges(layout, plan), _term_edges(layout),
-        _rate_edges(layout, words), rate_ties(layout, shape),
+        _row_edges(layout, words), _wild(layout, words), _inverse_edges(layout, plan),
+        _term_edges(layout), _rate_edges(layout, words), rate_ties(layout, shape),
     )  # fmt: skip
     for name, change in changes:
         if not all(INT32_MIN <= value <= INT32_MAX for value in change.values()):
@@ -277,7 +277,7 @@ def _coefficient_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
     yield "INT32_MIN", {at: INT32_MIN}
 
 
-def _row_edges(layout: Layout) -> Iterator[Change]:
+def _row_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
     """Rows whose sum is just below the limit and at it, each function in turn deciding."""
     floors = sum_of_floors(layout.order)
     for s, row, last in itertools.product(range(layout.segments), range(3), range(4)):
@@ -290,6 +290,8 @@ def _row_edges(layout: Layout) -> Iterator[Change]:
                 for k in range(layout.order + 1)
             }
             left -= sum(w * floors for w in weights)
+            if layout.rate:
+                left -= 2 * (abs(words[layout.rate_word(_RATE_WORDS + row)]) // 2 + 1)
             order = [j for j in range(4) if j != last] + [last]
             for j in order:
                 most = INT32_MAX - floors
@@ -405,7 +407,7 @@ def _rate_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
             )
         }
         # The row is gains and 2 (b + |r| / 2 + 1): b takes what is left, some less and one more.
-        left = layout.row_limit // 2 - 3 * sum_of_floors(layout.order) - 2**30 - 1
+        left = (layout.row_limit - 1 - 5 * sum_of_floors(layout.order) - 2**31) // 2
         for b in (left - 3, left - 2, left - 1, left, left + 1):
             change = {**nothing, here: 2**31 - 2}
             change |= {layout.coefficient(s, 4 * row + 3, 0): b for s in range(layout.segments)}

@@ -195,17 +195,18 @@ def assembly(shape: Shape) -> dict[str, int]:
     """Which assembly there is for a shape, and its shifts; 0 for none.
 
     Keys: `thumb2` and `thumb1`, whether `triax_apply` has that form (with a state of its own), for
-    `thumb1` the number of limbs of a gain; `evaluate2` and `evaluate1`, whether the thermal
-    functions have one too (that of Thumb-2 stores the offset shifted, to which nothing can be added
-    after); `in_sum`, bits of the final shift that the assembly for Thumb-2 gets for nothing,
-    because it shifts the raw codes by so many less.
+    `thumb1` the number of limbs of a gain; `evaluate`, whether the thermal functions have one too;
+    `in_sum`, bits of the final shift that the assembly for Thumb-2 gets for nothing, because it
+    shifts the raw codes by so many less; `completes`, whether C puts the offset for that in place,
+    as it does where there is no `evaluate` and where dT/dt adds to the offset first.
     """
     thumb2 = int(not shape.saturates and not shape.adds_to_sums)
+    evaluate = int(shape.order > 0 and shape.inverse is None)
     return {
         "thumb2": thumb2,
         "thumb1": 2 if limb_split(shape) else 3 * thumb2,
-        "evaluate2": int(shape.order > 0 and shape.inverse is None and not shape.rate),
-        "evaluate1": int(shape.order > 0 and shape.inverse is None),
+        "evaluate": evaluate,
+        "completes": int(thumb2 and (not evaluate or shape.rate)),
         "in_sum": min(shape.raw_shift, shape.output_shift - 32) if thumb2 else 0,
     }
 
@@ -217,8 +218,8 @@ def forms_using(shape: Shape) -> dict[str, str]:
     """
     given = assembly(shape)
     limbs, order = limb_split(shape) > 0, shape.order > 0
-    in_asm_2 = bool(given["thumb2"]) and bool(given["evaluate2"])
-    in_asm_1 = bool(given["thumb1"]) and bool(given["evaluate1"])
+    in_asm_2 = bool(given["thumb2"]) and bool(given["evaluate"])
+    in_asm_1 = bool(given["thumb1"]) and bool(given["evaluate"])
     plain_apply = not shape.saturates and not shape.adds_to_sums
     in_every_high_word = bool(shape.adds_to_sums or shape.rate)
     in_every_asr32 = bool(shape.adds_to_sums) and not shape.saturates
@@ -232,7 +233,7 @@ def forms_using(shape: Shape) -> dict[str, str]:
         "asr32": _condition(
             portable=plain_apply or in_every_asr32,
             limbs=plain_apply or order or in_every_asr32,
-            thumb2=(plain_apply and not in_asm_2 and given["in_sum"] > 0) or in_every_asr32,
+            thumb2=(given["completes"] and given["in_sum"] > 0) or in_every_asr32,
             thumb1=plain_apply or order or in_every_asr32,
         ),
         "high_half": _condition(limbs=limbs or order, thumb1=given["thumb1"] == 2 or order),
@@ -246,7 +247,7 @@ def forms_using(shape: Shape) -> dict[str, str]:
             portable=True, limbs=not limbs, thumb1=given["thumb1"] != 2, thumb2=not plain_apply
         ),
         "complete": _condition(
-            thumb2=plain_apply and not in_asm_2, thumb1=plain_apply and not in_asm_1
+            thumb2=bool(given["completes"]), thumb1=plain_apply and not in_asm_1
         ),
     }
 
