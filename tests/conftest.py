@@ -36,6 +36,7 @@ LONG = {
     "rig/test_session.py",
     "targets/test_targets.py",
     "test_batch.py",
+    "test_dynamic_plan.py",
     "test_dynamic_together.py",
     "test_uncertainty.py",
     "test_uncertainty_coverage.py",

@@ -13,7 +13,7 @@ import numpy as np
 from triaxcal import __version__
 from triaxcal.codegen.render import environment
 from triaxcal.dynamic.calibrate import DynamicResult
-from triaxcal.dynamic.observability import Weak
+from triaxcal.dynamic.observability import Observability, Weak
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.imudelivery import ImuDelivery
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
@@ -171,8 +171,37 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
             lines += textwrap.wrap(
                 effect.hint, 92, initial_indent=" " * 8, subsequent_indent=" " * 8
             )
+    lines += _seen_lines(seen)
+    lines += ["", *imu_c_lines(made), "", f"files           {target}/"]
+    lines += textwrap.wrap(
+        "  ".join(files), 80, initial_indent=" " * 16, subsequent_indent=" " * 16
+    )
+    return "\n".join(lines)
+
+
+def plan_summary(done: DynamicUnit) -> str:
+    """What a planned motion lets see, for the screen."""
+    result, layout = done.result, done.result.layout
+    span = result.survey.windows.start_s[[0, -1]]
+    minutes, states = (span[1] - span[0]) / 60, 3 + len(layout)
+    lines = [
+        f"plan            {done.unit.name}: {minutes:.1f} min, {states} states",
+        "",
+        "standard deviations that a recording of it will give, nothing else being wrong",
+    ]
+    for block in layout.blocks:
+        lines.append(block.title)
+        for i, state in enumerate(block.states, start=layout.place(block.name).start):
+            sd = result.sd[i] / state.per_unit
+            lines.append(f"  {state.name:9s} {_digits(sd, sd):>10s} {state.unit}")
+    return "\n".join([*lines, *_seen_lines(done.seen)])
+
+
+def _seen_lines(seen: Observability) -> list[str]:
+    """What the motion did not separate."""
+    lines: list[str] = []
     if seen.unseen:
-        lines += ["", "not seen by this motion (the values above are the prior's guess):"]
+        lines += ["", "not seen by this motion (their values are the prior's guess):"]
         lines += ["  " + " with ".join(names) for names in seen.unseen]
     for weak in seen.weak:
         lines += ["", "known badly:"]
@@ -180,11 +209,7 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
     if seen.together:
         lines += ["", "known only together:"]
         lines += [f"  {a} and {b}, correlation {c:+.4f}" for a, b, c in seen.together]
-    lines += ["", *imu_c_lines(made), "", f"files           {target}/"]
-    lines += textwrap.wrap(
-        "  ".join(files), 80, initial_indent=" " * 16, subsequent_indent=" " * 16
-    )
-    return "\n".join(lines)
+    return lines
 
 
 def _page(done: DynamicUnit) -> bytes:
