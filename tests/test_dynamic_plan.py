@@ -41,7 +41,6 @@ def unit(tmp_path: Path, truth: str = TRUTH) -> Path:
         ("sqrt_h = 0.3", "sqrt_h = 0.002"),
         ("sqrt_hz = 100", "sqrt_hz = 10"),
         ("accel_lsb = 10", "accel_lsb = 0.01"),
-        ("[noise]", 'blocks = ["g-drift"]\n[noise]'),
     ):
         assert old in text
         text = text.replace(old, new)
