@@ -29,9 +29,26 @@ def case_header(plan: Plan) -> str:
             _table("CASE_TEMP_OUT", "", [int32_literal(t) for t in temps_out]),
             _table("CASE_RAW", "[3]", [_triple(r) for r in raw]),
             _table("CASE_RAW_OUT", "[3]", [_triple(r) for r in _raw_out(raw_low, raw_high)]),
+            *_more_inputs(plan),
             "",
         ]
     )
+
+
+def _more_inputs(plan: Plan) -> list[str]:
+    """Rates in range and out of it, and any specific forces, where the routine takes them."""
+    lines = []
+    if plan.rate is not None:
+        low, high = plan.rate.min_code, plan.rate.max_code
+        rates, outside = [low, 0, 1, high], [low - 1, high + 1, INT32_MIN, INT32_MAX]
+        lines.append(_table("CASE_RATE", "", [int32_literal(r) for r in rates]))
+        lines.append(_table("CASE_RATE_OUT", "", [int32_literal(r) for r in outside]))
+    if plan.shape.gyro:
+        rng = np.random.Generator(np.random.PCG64(SEED))
+        forces = [[0, 0, 0], [INT32_MIN] * 3, [INT32_MAX] * 3]
+        forces += rng.integers(INT32_MIN, INT32_MAX, (RANDOM, 3), endpoint=True).tolist()
+        lines.append(_table("CASE_FORCE", "[3]", [_triple(f) for f in forces]))
+    return lines
 
 
 def _raw_out(low: int, high: int) -> list[list[int]]:

@@ -39,9 +39,12 @@ def flash_of(
     include: Sequence[Path],
     work: Path,
     *,
-    floating: bool,
+    prefix: str,
 ) -> Flash:
-    """Link the routine alone, without start-up code, and take its sections apart."""
+    """Link the routine alone, without start-up code, and take its sections apart.
+
+    `prefix` is that of its names: "triax", "triax_gyro" or "floating".
+    """
     work.mkdir(parents=True)
     objects = []
     for source in sources:
@@ -49,14 +52,13 @@ def flash_of(
         includes = [f"-I{path}" for path in (*include, shipped("firmware_ref") / "target")]
         run([*toolset.command(), *includes, "-c", str(source), "-o", str(made)])
         objects.append(made)
-    prefix = "floating" if floating else "triax"
     roots = [f"{prefix}_set_temperature", f"{prefix}_apply"]
-    tables_root = "FLOATING_CALIB" if floating else "TRIAX_CALIB"
+    tables_root = f"{prefix.upper()}_CALIB"
     code, helpers = _text(toolset, objects, roots, work / "routine.elf")
     _, tables = _text(toolset, objects, [tables_root], work / "tables.elf")
     loader = 0
-    if not floating:
-        whole = _text(toolset, objects, [*roots, "triax_calib_load"], work / "whole.elf")
+    if prefix != "floating":
+        whole = _text(toolset, objects, [*roots, f"{prefix}_calib_load"], work / "whole.elf")
         loader = sum(whole) - code - helpers
     return Flash(code, tables, helpers, loader)
 
