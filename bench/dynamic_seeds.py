@@ -16,7 +16,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from dynamic_judge import judge
-
 from triaxcal.simulation.imu_grades import GRADES, draw_truth
 from triaxcal.simulation.imu_motion import three_axes
 

@@ -1,4 +1,4 @@
-"""Hand rotations of real units, of mikoff (MPU-9150, imu-calib) and imucal, against what they say."""
+"""Hand rotations of real units, of mikoff (MPU-9150) and imucal, against what they publish."""
 
 from __future__ import annotations
 
