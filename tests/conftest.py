@@ -37,6 +37,7 @@ LONG = {
     "test_batch.py",
     "test_dynamic_calibrate.py",
     "test_dynamic_equations.py",
+    "test_dynamic_plan.py",
     "test_dynamic_together.py",
     "test_uncertainty.py",
     "test_uncertainty_coverage.py",

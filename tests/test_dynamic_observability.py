@@ -8,6 +8,7 @@ from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.observability import observability
 from triaxcal.dynamic.registry import extensions
+from triaxcal.report.dynamic import weak_words
 
 LAYOUT = Layout((*BASE, *extensions()["elastic-gyro"].blocks))
 NAMES = [state.name for state in LAYOUT.states]
@@ -45,3 +46,26 @@ def test_a_state_that_nothing_measures() -> None:
     seen = observability(LAYOUT, covariance({(n,): 1e-3 for n in NAMES if n != "Theta33"}))
     assert seen.unseen == (("Theta33",),)
     assert abs(seen.gain[NAMES.index("Theta33")] - 1.0) < 1e-9
+
+
+def test_a_combination_that_is_known_badly_is_stated_with_its_sd() -> None:
+    """D11 = D22 = D33 is a rate about the vertical: 98 each where the differences are to 1.4."""
+    layout = Layout((*BASE, *extensions()["g-drift"].blocks))
+    unit = layout.per_unit
+    n = len(layout)
+    place = layout.place("g-drift")
+    common = np.zeros(n)
+    common[[place.start, place.start + 4, place.start + 8]] = 98.0
+    covariance = np.diag((1.4 * unit) ** 2) + np.outer(common * unit, common * unit)
+    seen = observability(layout, covariance)
+    assert seen.together == ()
+    (weak,) = seen.weak
+    assert weak.names == ("D11", "D22", "D33")
+    assert abs(weak.sd_each - np.sqrt(98.0**2 + 1.4**2 / 3)) < 1e-6
+    assert abs(weak.sd_next - 1.4) < 1e-9
+    assert weak_words(weak) == (
+        "D11 and D22 and D33 in common to 98 deg/h/g each (sd); every other combination to 1.4 or "
+        "better: with the force along gravity it is a rate about the vertical, which only a "
+        "heading shows; along a force of 1 g the gyros' rates are uncertain by as much. Recording "
+        'the table\'s angle separates it (block "table-angles").'
+    )

@@ -1,4 +1,4 @@
-"""Hand rotations of real MPU-9150 units (mikoff, imu-calib) against the constants in its table."""
+"""Hand rotations of real units, of mikoff (MPU-9150) and imucal, against what they publish."""
 
 from __future__ import annotations
 
@@ -63,3 +63,42 @@ def test_hand_rotations_give_the_published_constants(unit: int) -> None:
     rounding = float(np.radians(ROUNDED_DEG_PER_S))
     compare("gyro-bias", [0, 1, 2], np.radians(GYRO_BIAS_DEG_PER_S[unit]), rounding)
     compare("accelerometer-bias", [0, 1, 2], np.array(ACCEL_BIAS[unit]), 5e-4)
+
+
+IMUCAL_RATE_HZ = 102.4
+IMUCAL_REST = {(0, 1): (540, 1271), (0, -1): (1620, 2361), (1, 1): (2814, 3298),
+               (1, -1): (3740, 4152), (2, 1): (4522, 4975), (2, -1): (5376, 5983)}  # fmt: skip
+IMUCAL_TURNS = ((6770, 7093), (8081, 8405), (9205, 9512))
+HAND_DEG = 2.0
+"""A turn by hand against an edge comes back to where it began within so much."""
+
+
+@pytest.mark.slow
+def test_hand_turns_of_imucal_agree_with_its_own_evaluation() -> None:
+    """Six rests and a turn by 360 deg about each axis (Ferraris), sections as its list has them.
+
+    The gyros' scale factors by the turns are as good as the turns; gravity tells them here.
+    """
+    table = np.loadtxt(
+        recording("imucal") / "example_ferraris_session.csv", delimiter=",", skiprows=1
+    )
+    rate, force = np.radians(table[:, 1:4]), table[:, 4:7]
+    rest = IMUCAL_REST[0, 1]
+    start = 420  # it is put down before
+    sd = [values[slice(*rest)].std(axis=0).max() for values in (rate, force)]
+    root = np.sqrt(IMUCAL_RATE_HZ)
+    noise = DataSheet(float(np.degrees(sd[0] / root) * 60), float(sd[1] / root / 9.80665e-6))
+    samples = ImuSamples(
+        np.arange(len(table) - start) / IMUCAL_RATE_HZ, rate[start:], force[start:]
+    )
+    about = {"rate_hz": IMUCAL_RATE_HZ, "latitude_deg": 49.6, "gravity_m_per_s2": 9.81}
+    result = calibrate_dynamic(recording_of(samples, "imucal", **about), noise)
+    bias = rate[slice(*rest)].mean(axis=0)
+    theta = result.p[result.layout.place("gyro-matrix")].reshape(3, 3)
+    found = result.p[result.layout.place("accelerometer-bias")]
+    for axis, section in enumerate(IMUCAL_TURNS):
+        turned = np.degrees(np.sum((rate[slice(*section)] - bias)[:, axis])) / IMUCAL_RATE_HZ
+        assert abs(abs(turned) - 360.0 * (1 + theta[axis, axis])) < HAND_DEG
+        ends = [force[slice(*IMUCAL_REST[axis, sign])].mean(axis=0)[axis] for sign in (1, -1)]
+        # The half-sum takes the unit as level in both: cosines of 2 deg are 6 mm/s^2.
+        assert abs(sum(ends) / 2 - found[axis]) < 9.81 * (1 - np.cos(np.radians(HAND_DEG)))

@@ -7,10 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynamic_cases import aviation, changed, sheet
 from dynamic_judge import judge
 from test_dynamic_judge import ALL, CENTRES, motion
+from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.channels import steady
-from triaxcal.dynamic.recording import INCREMENT, INSTANT
+from triaxcal.dynamic.missing import missing_effects
+from triaxcal.dynamic.noise import DataSheet
+from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuRecording
 from triaxcal.simulation.imu_grades import AVIATION, EFFECTS, draw_truth
 from triaxcal.simulation.imu_motion import three_axes
 
@@ -55,3 +59,31 @@ def test_a_table_that_creeps_does_not_rest() -> None:
     angle[3] = np.linspace(0.0, 2.4 * arcsec, 30)  # its halves differ by 1.24"
     assert steady(angle, arcsec).tolist() == [True, True, False, False, False, True]
     assert steady(angle * 0.8, arcsec).all()
+
+
+def shown(recording: ImuRecording, noise: DataSheet) -> dict[str, str]:
+    """Hints beside the effects that show, by name."""
+    result = calibrate_dynamic(recording, noise)
+    return {e.name: e.hint for e in missing_effects(recording, noise, result) if e.shown}
+
+
+def test_forces_of_reversed_sign_are_diagnosed_where_the_gyros_see_the_earth() -> None:
+    truth, recording = aviation()
+    force = recording.all().force
+    hints = shown(changed(recording, force=-force), sheet(truth))
+    assert hints["g-drift"] == (
+        "the Earth turns the other way: forces of reversed sign (at rest the axis that points up "
+        "reads +g), or latitude_deg (north is positive)"
+    )
+
+
+def test_forces_a_sample_late_are_diagnosed() -> None:
+    truth, recording = aviation()
+    force = np.roll(recording.all().force, 1, axis=0)
+    hints = shown(changed(recording, force=force), sheet(truth))
+    assert hints["delay"].startswith("+1.00 samples: look at rate_samples and force_samples")
+
+
+def test_what_is_right_gives_no_hint() -> None:
+    truth, recording = aviation()
+    assert shown(recording, sheet(truth)) == {}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -13,9 +15,27 @@ from triaxcal.cli.options import unit_and_build
 
 @click.command()
 @unit_and_build
-def dynamic(unit: Path, build: Path) -> None:
+@click.option(
+    "--plan",
+    is_flag=True,
+    help="Only tell what the motion planned in imu_truth.toml will let see, without a recording.",
+)
+def dynamic(unit: Path, build: Path, plan: bool) -> None:
     """Calibrate the IMU UNIT, a folder with unit.toml and a recording on a turntable."""
-    calibrate_imu(unit, build)
+    if plan:
+        tell_plan(unit)
+    else:
+        calibrate_imu(unit, build)
+
+
+def tell_plan(unit: Path) -> None:
+    """Print what a planned motion will let see; nothing is written."""
+    from triaxcal.report.dynamic import plan_summary  # noqa: PLC0415
+    from triaxcal.simulation.imu_plan import plan_unit  # noqa: PLC0415
+
+    with _bar() as progress:
+        done = plan_unit(unit, progress)
+    click.echo(plan_summary(done))
 
 
 def calibrate_imu(unit: Path, build: Path) -> None:
@@ -25,6 +45,17 @@ def calibrate_imu(unit: Path, build: Path) -> None:
     from triaxcal.report.dynamic import dynamic_files, dynamic_summary  # noqa: PLC0415
     from triaxcal.report.imuc import C_FILES  # noqa: PLC0415
 
+    with _bar() as progress:
+        made = deliver_imu(unit, progress)
+    files = dynamic_files(made)
+    target = build / made.done.unit.name
+    publish(files, target, C_FILES)
+    click.echo(dynamic_summary(made, files, str(target)))
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[str, float], None]]:
+    """Progress on the screen, by the name of a step and the part of it that is done."""
     with progressbar(length=1000, label="pass 1", file=sys.stderr) as bar:
 
         def progress(step: str, part: float) -> None:
@@ -33,8 +64,4 @@ def calibrate_imu(unit: Path, build: Path) -> None:
                 bar.pos = 0
             bar.update(max(0, round(1000 * part) - bar.pos))
 
-        made = deliver_imu(unit, progress)
-    files = dynamic_files(made)
-    target = build / made.done.unit.name
-    publish(files, target, C_FILES)
-    click.echo(dynamic_summary(made, files, str(target)))
+        yield progress

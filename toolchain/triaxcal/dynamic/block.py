@@ -108,6 +108,8 @@ class StateBlock:
     needs : str
         Column that must be recorded: "temp_degc", "force2", "table_angle_rad"; "table" for the
         table's axis in unit.toml; or "".
+    weak : str
+        For people: what it is that a usual motion shows badly, and what would show it; or "".
     """
 
     name: str
@@ -124,6 +126,7 @@ class StateBlock:
     motion_curve: Callable[[Signals, FloatArray], FloatArray] | None = None
     reset: bool = False
     needs: str = ""
+    weak: str = ""
 
 
 @dataclass(frozen=True)

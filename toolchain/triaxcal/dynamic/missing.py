@@ -16,15 +16,23 @@ from scipy.stats import chi2
 
 from triaxcal.dynamic.block import Extension
 from triaxcal.dynamic.calibrate import DynamicResult
-from triaxcal.dynamic.filterpass import run_pass
+from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.passdata import Reference, Task
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.registry import extensions
+from triaxcal.model.types import FloatArray
 
 SIGNIFICANCE = 1e-3
 """Some seven tests on each recording: one false alarm in a hundred and forty recordings."""
+
+
+HINT_SD = 4.0
+HALF_SAMPLE = 0.02
+"""Of a sample: how near to a half or a whole one a delay is no accident."""
+REVERSED = 0.1
+"""Of the Earth's rate: the rest of a unit's errors, and what D cannot take of it."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +46,8 @@ class Effect:
     states : int
     shown : bool
         Whether the recording shows it beyond `SIGNIFICANCE`.
+    hint : str
+        A mistake of conventions that looks so; or "".
     """
 
     name: str
@@ -45,6 +55,7 @@ class Effect:
     chi_square: float
     states: int
     shown: bool
+    hint: str = ""
 
 
 def missing_effects(
@@ -77,8 +88,35 @@ def missing_effects(
             done.p[index] @ np.linalg.solve(covariance[np.ix_(index, index)], done.p[index])
         )
         shown = bool(chi2.sf(value, len(index)) < SIGNIFICANCE)
-        found.append(Effect(extension.name, extension.title, value, len(index), shown))
+        hint = _hint(extension.name, done.p[index], covariance[np.ix_(index, index)], recording)
+        found.append(
+            Effect(extension.name, extension.title, value, len(index), shown, hint if shown else "")
+        )
     return tuple(sorted(found, key=lambda e: -e.chi_square / e.states))
+
+
+def _hint(name: str, p: FloatArray, covariance: FloatArray, recording: ImuRecording) -> str:
+    """Conventions that were mistaken, where an effect has just the size that this gives."""
+    if name == "delay":
+        samples, sd = p[0] * recording.rate_hz, covariance[0, 0] ** 0.5 * recording.rate_hz
+        nearest = round(2 * samples) / 2
+        if nearest and abs(samples - nearest) < HALF_SAMPLE + HINT_SD * sd:
+            return (
+                f"{samples:+.2f} samples: look at rate_samples and force_samples, and at what the "
+                "time stamps of both mean"
+            )
+    if name == "g-drift":
+        # D11 = D22 = D33 is a rate about up: there the Earth turns, and the other way if up is down
+        common = np.eye(3).ravel() / 3
+        rate, sd = common @ p, np.sqrt(common @ covariance @ common)
+        earth = EARTH_RATE_RAD_PER_S * np.sin(np.radians(recording.latitude_deg))
+        turned_round = abs(rate + 2 * earth) < HINT_SD * sd + REVERSED * abs(earth)
+        if turned_round and abs(rate) > HINT_SD * sd:
+            return (
+                "the Earth turns the other way: forces of reversed sign (at rest the axis that "
+                "points up reads +g), or latitude_deg (north is positive)"
+            )
+    return ""
 
 
 def _possible(extension: Extension, recording: ImuRecording, result: DynamicResult) -> bool:

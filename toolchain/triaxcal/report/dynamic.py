@@ -13,6 +13,7 @@ import numpy as np
 from triaxcal import __version__
 from triaxcal.codegen.render import environment
 from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.observability import Observability, Weak
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.imudelivery import ImuDelivery
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
@@ -80,9 +81,14 @@ def _calibration_json(done: DynamicUnit) -> bytes:
         },
         "switched_off": [
             {"name": e.name, "chi_square": e.chi_square, "states": e.states, "shown": e.shown}
+            | ({"hint": e.hint} if e.hint else {})
             for e in done.off
         ],
         "not_seen": [list(names) for names in seen.unseen],
+        "known_badly": [
+            {"states": w.names, "unit": w.unit, "sd_each": w.sd_each, "sd_next": w.sd_next}
+            for w in seen.weak
+        ],
         "known_only_together": [list(pair) for pair in seen.together],
     }
     return (json.dumps(document, indent=1) + "\n").encode()
@@ -102,6 +108,23 @@ def verdict(result: DynamicResult) -> str:
     return f"innovations {math.sqrt(ratio):.2f} times the stated noise: consistent"
 
 
+def weak_words(weak: Weak) -> str:
+    """One direction that a motion hardly shows, for people."""
+    common = " and ".join(weak.names)
+    text = (
+        f"{common} in common to {_digits(weak.sd_each, weak.sd_each)} {weak.unit} each (sd); "
+        f"every other combination to {_digits(weak.sd_next, weak.sd_next)} or better"
+    )
+    return f"{text}: {weak.why}." if weak.why else f"{text}."
+
+
+def axis_up(result: DynamicResult) -> str:
+    """The instrument axis that pointed up most at the start, by the force: "+z"."""
+    force = result.survey.sections[0].force
+    axis = int(np.argmax(np.abs(force)))
+    return f"{'+' if force[axis] > 0 else '-'}{'xyz'[axis]}"
+
+
 def _digits(value: float, sd: float) -> str:
     """Value to the second digit of its standard deviation."""
     places = max(0, 1 - math.floor(math.log10(sd))) if sd > 0 else 3
@@ -119,7 +142,7 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
         f"unit            {unit.name}  (serial {unit.serial})",
         f"recording       {unit.recording.name}: {found.sections[-1].last + 1:_} samples, "
         f"{len(found.sections)} section{'s' * (len(found.sections) > 1)}, first "
-        f"{found.sections[0].still_s:.0f} s at rest".replace("_", " "),
+        f"{found.sections[0].still_s:.0f} s at rest, {axis_up(result)} up".replace("_", " "),
     ]
     for stage in found.stages:
         lines.append(
@@ -145,17 +168,48 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
             call = "  SHOWN: switch it on" if effect.shown else ""
             size = f"{effect.chi_square:.1f} of {effect.states}"
             lines.append(f"  {effect.name:24s} {size:>14s}{call}")
-    if seen.unseen:
-        lines += ["", "not seen by this motion (the values above are the prior's guess):"]
-        lines += ["  " + " with ".join(names) for names in seen.unseen]
-    if seen.together:
-        lines += ["", "known only together:"]
-        lines += [f"  {a} and {b}, correlation {c:+.4f}" for a, b, c in seen.together]
+            lines += textwrap.wrap(
+                effect.hint, 92, initial_indent=" " * 8, subsequent_indent=" " * 8
+            )
+    lines += _seen_lines(seen)
     lines += ["", *imu_c_lines(made), "", f"files           {target}/"]
     lines += textwrap.wrap(
         "  ".join(files), 80, initial_indent=" " * 16, subsequent_indent=" " * 16
     )
     return "\n".join(lines)
+
+
+def plan_summary(done: DynamicUnit) -> str:
+    """What a planned motion lets see, for the screen."""
+    result, layout = done.result, done.result.layout
+    span = result.survey.windows.start_s[[0, -1]]
+    minutes, states = (span[1] - span[0]) / 60, 3 + len(layout)
+    lines = [
+        f"plan            {done.unit.name}: {minutes:.1f} min, {states} states",
+        "",
+        "standard deviations that a recording of it will give, nothing else being wrong",
+    ]
+    for block in layout.blocks:
+        lines.append(block.title)
+        for i, state in enumerate(block.states, start=layout.place(block.name).start):
+            sd = result.sd[i] / state.per_unit
+            lines.append(f"  {state.name:9s} {_digits(sd, sd):>10s} {state.unit}")
+    return "\n".join([*lines, *_seen_lines(done.seen)])
+
+
+def _seen_lines(seen: Observability) -> list[str]:
+    """What the motion did not separate."""
+    lines: list[str] = []
+    if seen.unseen:
+        lines += ["", "not seen by this motion (their values are the prior's guess):"]
+        lines += ["  " + " with ".join(names) for names in seen.unseen]
+    for weak in seen.weak:
+        lines += ["", "known badly:"]
+        lines += textwrap.wrap(weak_words(weak), 92, initial_indent="  ", subsequent_indent="  ")
+    if seen.together:
+        lines += ["", "known only together:"]
+        lines += [f"  {a} and {b}, correlation {c:+.4f}" for a, b, c in seen.together]
+    return lines
 
 
 def _page(done: DynamicUnit) -> bytes:
@@ -183,8 +237,11 @@ def _page(done: DynamicUnit) -> bytes:
             for block in layout.blocks
         ],
         "innovations": _innovations(result),
-        "off": [(e.title, f"{e.chi_square:.1f}", e.states, e.name, e.shown) for e in done.off],
+        "off": [
+            (e.title, f"{e.chi_square:.1f}", e.states, e.name, e.shown, e.hint) for e in done.off
+        ],
         "unseen": seen.unseen,
+        "weak": [weak_words(w) for w in seen.weak],
         "together": [(a, b, f"{c:+.4f}") for a, b, c in seen.together],
         "width": PANEL_WIDTH,
         "height": PANEL_HEIGHT,

@@ -285,6 +285,7 @@ def three_axes(
     still_s: float = 120.0,
     table: RoughTable | None = None,
     temperature: TemperatureDrift | None = None,
+    moves: tuple[Move, ...] | None = None,
     centre_mm: tuple[Three, Three, Three] = ((0.0, 0.0, 0.0),) * 3,
     placement_deg: tuple[Three, Three, Three] = (
         (0.0, 0.2, -0.3),
@@ -292,9 +293,12 @@ def three_axes(
         (0.3, -0.2, 0.0),
     ),
 ) -> ImuMotion:
-    """The ordinary recording: each axis along the table for `minutes`, all at 5 to 60 deg/s."""
+    """The ordinary recording: each axis along the table for `minutes`, all at 5 to 60 deg/s.
+
+    `moves` of each axis replace the ordinary ones, and their time `minutes`.
+    """
     table = table or RoughTable()
-    moves = programme(minutes, still_s, table.ramp_s)
+    moves = moves or programme(minutes, still_s, table.ramp_s)
     return ImuMotion(
         mountings=tuple(
             Mounting(moves, still_s, placement, centre)

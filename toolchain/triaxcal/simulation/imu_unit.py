@@ -12,7 +12,14 @@ from triaxcal.errors import RefusedError
 from triaxcal.records import write_measurements
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import EFFECTS, GRADES, draw_truth
-from triaxcal.simulation.imu_motion import PRECISE_TABLE, WARMING, RoughTable, three_axes
+from triaxcal.simulation.imu_motion import (
+    PRECISE_TABLE,
+    WARMING,
+    ImuMotion,
+    Move,
+    RoughTable,
+    three_axes,
+)
 from triaxcal.simulation.imu_truth import ARCSEC
 from triaxcal.simulation.truth import SEED_MAX, check_seed
 from triaxcal.tomltable import Layout, Table, read_tables, read_toml
@@ -26,7 +33,8 @@ _LAYOUT: Layout = {
     "unit": {"grade": True, "seed": True, "effects": False},
     "motion": {
         "rate_hz": True,
-        "minutes_per_axis": True,
+        "minutes_per_axis": False,
+        "moves": False,
         "still_s": True,
         "table": True,
         "temperature": True,
@@ -52,23 +60,70 @@ def write_simulated_recording(folder: Path, seed: int | None = None) -> Path:
     check_seed(seed, "seed")
     grade = GRADES[unit.choice("grade", tuple(GRADES))]
     truth = draw_truth(grade, seed, _effects(unit))
-    site = _site(find_unit(folder))
-    precise = motion.choice("table", ("rough", "precise")) == "precise"
-    warming = motion.choice("temperature", ("constant", "warming")) == "warming"
-    plan = replace(
-        three_axes(
-            motion.number("minutes_per_axis", 0.5, 600.0),
-            still_s=motion.number("still_s", 1.0, 36000.0),
-            table=PRECISE_TABLE if precise else RoughTable(),
-            temperature=WARMING if warming else None,
-        ),
-        latitude_deg=site.number("latitude_deg", -90.0, 90.0),
-        gravity_m_per_s2=site.number("local_gravity_m_per_s2", 9.7, 9.9),
-    )
+    plan = _plan(folder, motion)
     recording = simulate_imu(truth, plan, motion.number("rate_hz", 1.0, 1e4), seed)
     target = folder / RECORDING_FILE
     write_measurements(target, _columns(recording), _rows(recording))
     return target
+
+
+def planned_motion(folder: Path) -> tuple[ImuMotion, float]:
+    """Motion that imu_truth.toml of a unit folder plans, and its sampling rate, Hz.
+
+    Raises
+    ------
+    RefusedError
+        As `write_simulated_recording`.
+    """
+    motion = read_tables(folder / IMU_TRUTH_FILE, _LAYOUT, FORMAT)["motion"]
+    return _plan(folder, motion), motion.number("rate_hz", 1.0, 1e4)
+
+
+def _plan(folder: Path, motion: Table) -> ImuMotion:
+    site = _site(find_unit(folder))
+    precise = motion.choice("table", ("rough", "precise")) == "precise"
+    warming = motion.choice("temperature", ("constant", "warming")) == "warming"
+    still_s = motion.number("still_s", 1.0, 36000.0)
+    if ("moves" in motion) == ("minutes_per_axis" in motion):
+        raise RefusedError(
+            f"{motion.where('moves')} and minutes_per_axis",
+            "both given" if "moves" in motion else "neither given",
+            expected="one of them: the moves of an axis, or how long the usual ones are repeated",
+        )
+    given = None if "moves" not in motion else _moves(motion, RoughTable().ramp_s)
+    plan = three_axes(
+        motion.number("minutes_per_axis", 0.5, 600.0) if given is None else 0.0,
+        still_s=still_s,
+        table=PRECISE_TABLE if precise else RoughTable(),
+        temperature=WARMING if warming else None,
+        moves=given,
+    )
+    return replace(
+        plan,
+        latitude_deg=site.number("latitude_deg", -90.0, 90.0),
+        gravity_m_per_s2=site.number("local_gravity_m_per_s2", 9.7, 9.9),
+    )
+
+
+def _moves(motion: Table, ramp_s: float) -> tuple[Move, ...]:
+    expected = (
+        "a list of [angle in deg, rate in deg/s, stop in s] such as [-360, 30, 5], rates up to "
+        f"1000, stops up to 36000, each angle reaching its rate in {ramp_s:g} s"
+    )
+    rows = motion.values["moves"]
+    if not isinstance(rows, list) or not rows:
+        raise motion.refuse("moves", expected)
+    for row in rows:
+        sound = (
+            isinstance(row, list)
+            and len(row) == 3
+            and all(type(value) in (int, float) and math.isfinite(value) for value in row)
+        )
+        if not sound or not (0 < row[1] <= 1000 and 0 <= row[2] <= 36000):
+            raise motion.refuse("moves", expected)
+        if not row[1] * ramp_s <= abs(row[0]) <= 1e6:
+            raise motion.refuse("moves", expected)
+    return tuple(Move(float(a), float(rate), float(stop)) for a, rate, stop in rows)
 
 
 def _effects(unit: Table) -> tuple[str, ...]:

@@ -16,5 +16,10 @@ BLOCK = StateBlock(
     "g-dependent gyro drift",
     tuple(State(f"D{i}{j}", "deg/h/g", DEG_PER_H, 3600.0) for i in (1, 2, 3) for j in (1, 2, 3)),
     rate=_rows,
+    weak=(
+        "with the force along gravity it is a rate about the vertical, which only a heading shows; "
+        "along a force of 1 g the gyros' rates are uncertain by as much. Recording the table's "
+        'angle separates it (block "table-angles")'
+    ),
 )
 EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))

@@ -1,0 +1,46 @@
+"""What a planned motion will let a unit see: the filter's covariance, without a recording.
+
+The covariance depends on the motion and the noise and on no measured value, so the plan is
+simulated with a perfect unit without noise, and the filter is told the noise of the data sheet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from triaxcal.dynamic.calibrate import calibrate_dynamic
+from triaxcal.dynamic.description import read_dynamic
+from triaxcal.dynamic.observability import observability
+from triaxcal.dynamic.unit import DynamicUnit
+from triaxcal.simulation.imu import simulate_imu
+from triaxcal.simulation.imu_truth import ImuTruth, SecondTriad
+from triaxcal.simulation.imu_unit import planned_motion
+
+
+def plan_unit(folder: Path, progress: Callable[[str, float], None]) -> DynamicUnit:
+    """Standard deviations that the unit in `folder` will have after the motion it plans.
+
+    The motion is that of [motion] in imu_truth.toml, everything else of unit.toml; the recording
+    that unit.toml names is not read. The values of the result's states are zero.
+
+    Raises
+    ------
+    RefusedError
+        As `planned_motion`, `read_dynamic` and `calibrate_dynamic`.
+    """
+    unit = read_dynamic(folder)
+    motion, rate_hz = planned_motion(folder)
+    truth = ImuTruth(
+        second=SecondTriad() if "second-triad" in unit.blocks else None,
+        rate_convention=unit.rate_convention,
+        force_convention=unit.force_convention,
+    )
+    result = calibrate_dynamic(
+        simulate_imu(truth, motion, rate_hz, 0),
+        unit.noise,
+        unit.state_blocks(),
+        reference_degc=unit.reference_degc,
+        progress=lambda number, part: progress(f"pass {number + 1}", part),
+    )
+    return DynamicUnit(unit, result, observability(result.layout, result.covariance), ())
