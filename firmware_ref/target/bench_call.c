@@ -16,11 +16,11 @@ uint32_t bench_call_set(bench_set_t routine, subject_state_t *state, const subje
 }
 
 uint32_t bench_call_apply(bench_apply_t routine, const subject_state_t *state,
-                          const int32_t raw[3], int32_t accel[3])
+                          const int32_t raw[3], SUBJECT_FORCE_PARAMETER int32_t result[3])
 {
     uint32_t status;
     bench_begin();
-    status = routine(state, raw, accel);
+    status = routine(state, raw, SUBJECT_FORCE(force) result);
     bench_end();
     return status;
 }

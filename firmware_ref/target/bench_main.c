@@ -8,7 +8,7 @@
 #include "target_io.h"
 
 static subject_state_t state;
-static int32_t accel[3];
+static int32_t result[3];
 static const int32_t LOOP_ROUNDS[] = {1, 10, 100, 1000};
 
 static void print_line(const char *name, uint32_t value)
@@ -34,7 +34,7 @@ static void count_apply(const char *name, const int32_t (*raw)[3], uint32_t coun
     uint32_t i;
     for (i = 0u; i < count; i++) {
         (void)subject_set_temperature(&state, SUBJECT_CALIB, CASE_TEMP[i % CASE_TEMP_COUNT]);
-        (void)bench_call_apply(subject_apply, &state, raw[i], accel);
+        (void)bench_call_apply(subject_apply, &state, raw[i], SUBJECT_FORCE(CASE_FORCE[i % CASE_FORCE_COUNT]) result);
     }
     print_line(name, count);
 }
@@ -44,7 +44,7 @@ static void count_known(void)
     uint32_t i;
     (void)bench_call_set(bench_empty_set, &state, SUBJECT_CALIB, 0);
     print_line("empty_set", 1u);
-    (void)bench_call_apply(bench_empty_apply, &state, CASE_RAW[0], accel);
+    (void)bench_call_apply(bench_empty_apply, &state, CASE_RAW[0], SUBJECT_FORCE(CASE_FORCE[0]) result);
     print_line("empty_apply", 1u);
     for (i = 0u; i < 4u; i++) {
         (void)bench_call_set(bench_loop, &state, SUBJECT_CALIB, LOOP_ROUNDS[i]);
@@ -64,11 +64,11 @@ static void measure_stack(void)
     (void)bench_call_set(subject_set_temperature, &state, SUBJECT_CALIB, CASE_TEMP_OUT[0]);
     print_line("stack_set", bench_stack_used() - empty);
     bench_stack_paint();
-    (void)bench_call_apply(bench_empty_apply, &state, CASE_RAW[0], accel);
+    (void)bench_call_apply(bench_empty_apply, &state, CASE_RAW[0], SUBJECT_FORCE(CASE_FORCE[0]) result);
     empty = bench_stack_used();
     bench_stack_paint();
-    (void)bench_call_apply(subject_apply, &state, CASE_RAW[0], accel);
-    (void)bench_call_apply(subject_apply, &state, CASE_RAW_OUT[0], accel);
+    (void)bench_call_apply(subject_apply, &state, CASE_RAW[0], SUBJECT_FORCE(CASE_FORCE[0]) result);
+    (void)bench_call_apply(subject_apply, &state, CASE_RAW_OUT[0], SUBJECT_FORCE(CASE_FORCE[1]) result);
     print_line("stack_apply", bench_stack_used() - empty);
 }
 

@@ -9,6 +9,14 @@ typedef floating_calib_t subject_calib_t;
 #define subject_set_temperature floating_set_temperature
 #define subject_apply floating_apply
 #define SUBJECT_CALIB (&FLOATING_CALIB)
+#elif defined(BENCH_GYRO)
+#include "triax_gyro_comp.h"
+typedef triax_gyro_state_t subject_state_t;
+typedef triax_gyro_calib_t subject_calib_t;
+#define subject_set_temperature triax_gyro_set_temperature
+#define subject_apply triax_gyro_apply
+extern const triax_gyro_calib_t TRIAX_GYRO_CALIB;
+#define SUBJECT_CALIB (&TRIAX_GYRO_CALIB)
 #else
 #include "triax_comp.h"
 typedef triax_state_t subject_state_t;
@@ -17,6 +25,15 @@ typedef triax_calib_t subject_calib_t;
 #define subject_apply triax_apply
 extern const triax_calib_t TRIAX_CALIB;
 #define SUBJECT_CALIB (&TRIAX_CALIB)
+#endif
+
+/* A gyro takes the specific force besides. */
+#if defined(BENCH_GYRO)
+#define SUBJECT_FORCE_PARAMETER const int32_t force[3],
+#define SUBJECT_FORCE(f) (f),
+#else
+#define SUBJECT_FORCE_PARAMETER
+#define SUBJECT_FORCE(f)
 #endif
 
 #endif

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.termui import progressbar
+
+if TYPE_CHECKING:
+    from triaxcal.imudelivery import ImuDelivery
 
 
 @click.command()
@@ -25,10 +29,20 @@ def dynamic(unit: Path, build: Path) -> None:
 
 def calibrate_imu(unit: Path, build: Path) -> None:
     """Do the work of `triaxcal dynamic`, and of `triaxcal calib` for a unit with [dynamic]."""
-    from triaxcal.imudelivery import deliver_imu  # noqa: PLC0415
     from triaxcal.publish import publish  # noqa: PLC0415
     from triaxcal.report.dynamic import dynamic_files, dynamic_summary  # noqa: PLC0415
     from triaxcal.report.imuc import C_FILES  # noqa: PLC0415
+
+    made = delivered_imu(unit)
+    files = dynamic_files(made)
+    target = build / made.done.unit.name
+    publish(files, target, C_FILES)
+    click.echo(dynamic_summary(made, files, str(target)))
+
+
+def delivered_imu(unit: Path) -> ImuDelivery:
+    """Calibrate the IMU and make its C, with a bar of progress."""
+    from triaxcal.imudelivery import deliver_imu  # noqa: PLC0415
 
     with progressbar(length=1000, label="pass 1", file=sys.stderr) as bar:
 
@@ -38,8 +52,4 @@ def calibrate_imu(unit: Path, build: Path) -> None:
                 bar.pos = 0
             bar.update(max(0, round(1000 * part) - bar.pos))
 
-        made = deliver_imu(unit, progress)
-    files = dynamic_files(made)
-    target = build / made.done.unit.name
-    publish(files, target, C_FILES)
-    click.echo(dynamic_summary(made, files, str(target)))
+        return deliver_imu(unit, progress)

@@ -16,7 +16,7 @@ from triaxcal.targets.cores import CORES, Core, install_advice, missing_tools
 from triaxcal.targets.counting import Counts, build_plugin, measure
 from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB1, THUMB2
 from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, QUADRATIC, Case
-from triaxcal.targets.sizes import Flash, flash_of
+from triaxcal.targets.sizes import ACCELEROMETER, FLOATING, GYRO, Flash, Names, flash_of
 
 OPTIMISATION = "-O2"
 """gcc -O1 does not fuse the multiply-accumulates."""
@@ -41,6 +41,13 @@ class Subject:
         """For people."""
         kind = self.real or ARITHMETIC_NAMES[self.arithmetic]
         return f"{self.case.name}, {kind}"
+
+    @property
+    def names(self) -> Names:
+        """Names of its functions and constants."""
+        if self.real:
+            return FLOATING
+        return GYRO if self.case.plan.shape.gyro else ACCELEROMETER
 
 
 @dataclass(frozen=True)
@@ -131,7 +138,7 @@ def cost_of(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
         build(toolset, [*sources, *harness], include, program)
         counts = measure(core, program, plugin)
         small = Toolset(core, "gcc", SIZE_OPTIMISATION, subject.arithmetic, defines)
-        flash = flash_of(small, sources, include, work / "small", floating=bool(subject.real))
+        flash = flash_of(small, sources, include, work / "small", subject.names)
     except TargetError as error:
         return Cost(subject, core, None, None, str(error))
     return Cost(subject, core, counts, flash, "")
@@ -149,4 +156,5 @@ def _write_subject(subject: Subject, work: Path) -> tuple[list[Path], list[Path]
         return [target / "bench_floating.c", work / "floating_tables.c"], [work], defines
     for name, text in case.files.items():
         (work / name).write_text(text)
-    return [work / "triax_comp.c", target / "bench_tables.c"], [work], ()
+    defines = ("-DBENCH_GYRO",) if case.plan.shape.gyro else ()
+    return [work / case.routine, target / "bench_tables.c"], [work], defines
