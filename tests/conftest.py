@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
 import pytest
 
-from plans import COVERING, GOLDEN, SENSOR, random_plan
+from builds import UNITS, Built, write_generated
+from plans import COVERING, GOLDEN, random_plan
 from recordings import ABSENT, FOLDER
-from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
 from triaxcal.codegen.routines import Generated, Reference, start_generated, start_reference
 from triaxcal.delivery import Delivery, deliver
-from triaxcal.fixedpoint.plan import Plan
-
-UNITS = Path(__file__).parent.parent / "units"
-PROVENANCE = Provenance("GOLDEN-001", "0123456789abcdef" * 4, ("fixed constants of the tests",))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -29,6 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 LONG = {
     "family/test_over_temperature.py",
+    "family/test_real_recordings.py",
     "rig/test_cli_rig.py",
     "rig/test_firmware.py",
     "rig/test_live.py",
@@ -36,6 +31,8 @@ LONG = {
     "rig/test_session.py",
     "targets/test_targets.py",
     "test_batch.py",
+    "test_dynamic_calibrate.py",
+    "test_dynamic_equations.py",
     "test_uncertainty.py",
     "test_uncertainty_coverage.py",
 }
@@ -59,28 +56,6 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(
             f"NOT RUN: {absent} tests on real recordings, which are not in {FOLDER}", red=True
         )
-
-
-def write_generated(plan: Plan, folder: Path) -> None:
-    """Write what a delivery writes for the firmware."""
-    folder.mkdir(parents=True, exist_ok=True)
-    texts = render_routine(plan)
-    texts[CONSTANTS_FILE] = render_constants(plan, SENSOR, PROVENANCE)
-    for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
-
-
-@dataclass(frozen=True)
-class Built:
-    """A plan, the folder with its generated C, and that C as a library."""
-
-    plan: Plan
-    folder: Path
-    generated: Generated
-
-    @property
-    def image(self) -> bytes:
-        return image_bytes(self.plan)
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import oracle
-from conftest import Built, write_generated
+from builds import Built, write_generated
 from plans import COVERING, GOLDEN, INT32_MAX, INT32_MIN
 from triaxcal.codegen.crosscheck import (
     RANDOM_VECTORS,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conftest import UNITS
+from builds import UNITS
 from triaxcal import delivery
 from triaxcal.delivery import Delivery, deliver
 from triaxcal.fit.calibrate import Calibration, calibrate

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import oracle
-from conftest import Built
+from builds import Built
 from mutants import MUTANTS, Mutant
 from plans import (
     COVERING,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import PROVENANCE
+from builds import PROVENANCE
 from plans import GOLDEN, SENSOR
 from triaxcal.codegen.render import (
     CONSTANTS_FILE,

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import oracle
-from conftest import Built
+from builds import Built
 from plans import COVERING, GOLDEN, INT32_MAX, INT32_MIN, disturbed, random_plan
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.routines import Reference

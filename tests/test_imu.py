@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import oracle
-from conftest import PROVENANCE
+from builds import PROVENANCE
 from plans import SENSOR
 from triaxcal.codegen.forces import forces_of
 from triaxcal.codegen.image import image_bytes

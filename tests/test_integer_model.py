@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import oracle
-from conftest import Built
+from builds import Built
 from plans import (
     COVERING,
     GOLDEN,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import oracle
-from conftest import write_generated
+from builds import write_generated
 from plans import (
     SENSOR,
     TABLE_SLOPES,

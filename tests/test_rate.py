@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import oracle
-from conftest import PROVENANCE, write_generated
+from builds import PROVENANCE, write_generated
 from plans import SENSOR, TABLE_SLOPES, TABLE_T0, polynomial_model, unit_of
 from triaxcal.codegen.crosscheck import cross_check, vector_sets
 from triaxcal.codegen.forces import rates_of

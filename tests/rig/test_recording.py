@@ -142,6 +142,27 @@ def test_a_resumed_session_notices_a_log_that_was_cut_or_changed(recorded, tmp_p
         Recording(setup, tmp_path, "test")
 
 
+def test_an_event_after_a_resume_waits_for_no_hash(tmp_path, monkeypatch):
+    path = tmp_path / LOG_FILE
+    path.write_bytes(b"(1.000000) test 123#00\n" * 200_000)  # 4.4 MB, four reads
+    monkeypatch.setattr("triaxcal.rig.rawlog._HASH_BYTES", 1 << 20)
+    log = RawLog(path, "test")
+    states = [log.state for _ in range(5)]
+    assert ["sha256" in s for s in states] == [False, False, False, False, True]
+    assert {k: states[0][k] for k in ("lines", "bytes")} == {"lines": 200_000, "bytes": 4_600_000}
+    assert states[4]["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
+    log.close()
+
+
+def test_a_log_cut_while_it_is_open_is_told(tmp_path):
+    path = tmp_path / LOG_FILE
+    path.write_bytes(b"(1.000000) test 123#00\n" * 1000)
+    log = RawLog(path, "test")
+    os.truncate(path, 230)
+    with pytest.raises(RefusedError, match=r"it ends at byte 230; expected 23000 bytes; the log"):
+        log.close()
+
+
 @pytest.mark.parametrize("size", [1, 1000, 1 << 20])
 def test_the_hash_of_a_log_is_that_of_its_bytes(tmp_path, monkeypatch, size):
     """Also when it is made little by little, and from a known beginning."""
@@ -153,6 +174,8 @@ def test_the_hash_of_a_log_is_that_of_its_bytes(tmp_path, monkeypatch, size):
         for _ in range(3):
             log.append(rig.advance())
             log.flush()
+        while "sha256" not in log.state:
+            assert log.state.keys() <= {"lines", "bytes", "sha256"}
         known = log.state
         log.close()
         text = path.read_bytes()

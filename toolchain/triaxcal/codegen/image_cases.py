@@ -93,10 +93,9 @@ class Layout:
     def is_safe(self, words: list[int]) -> bool:
         """Step R: whether no arithmetic can overflow with these constants."""
         low, high = words[self.temp_min], words[self.temp_max]
-        firsts = [words[self.segment(s)] for s in range(self.segments)]
+        _, firsts, lasts = zip(*self.reaches(words), strict=True)
         if firsts[0] != low or any(not low < f <= high for f in firsts[1:]):
             return False
-        lasts = [f - 1 for f in firsts[1:]] + [high]
         if self.rate and not self._rate_is_safe(words):
             return False
         for row in range(3):
@@ -235,8 +234,7 @@ def _temperature_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
     firsts = [words[at] for at in starts]
     lasts = [f - 1 for f in firsts[1:]] + [high]
     for s, at in enumerate(starts):
-        reach = max(words[at + _ORIGIN] - firsts[s], lasts[s] - words[at + _ORIGIN])
-        fullest = INT32_MAX // max(reach, 1)
+        fullest = _fullest_gain(layout, words, s)
         for gain in (INT32_MIN, -1, 0, 1, fullest, fullest + 1, INT32_MAX):
             yield f"gain {gain} of segment {s}", {at + _GAIN: gain}
         for origin in (INT32_MIN, INT32_MAX, firsts[s], lasts[s]):
@@ -311,6 +309,12 @@ def sum_of_floors(order: int) -> int:
     return bound
 
 
+def _fullest_gain(layout: Layout, words: list[int], s: int) -> int:
+    """The largest gain of a segment for which its x fits int32."""
+    at, first, last = layout.reaches(words)[s]
+    return INT32_MAX // max(1, words[at + _ORIGIN] - first, last - words[at + _ORIGIN])
+
+
 def _wild(layout: Layout, words: list[int]) -> Iterator[Change]:
     """Random constants of all sizes: nearly singular K, saturating inverses, full rows.
 
@@ -318,8 +322,7 @@ def _wild(layout: Layout, words: list[int]) -> Iterator[Change]:
     """
     rng = Random(SEED)
     gains = {
-        at + _GAIN: INT32_MAX // max(1, words[at + _ORIGIN] - first, last - words[at + _ORIGIN])
-        for at, first, last in layout.reaches(words)
+        layout.segment(s) + _GAIN: _fullest_gain(layout, words, s) for s in range(layout.segments)
     }
     for number in range(WILD_IMAGES):
         size = 1 << rng.randrange(1, 31)

@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -60,21 +61,22 @@ class Reference:
     """The handwritten reference, which runs any image."""
 
     library: ctypes.CDLL
+    entry: ClassVar[str] = "triax_ref_batch"
 
     def routine(self, image: bytes) -> Routine:
         """Bind an image."""
 
         def run(temp: Int32Array, raw: Int32Array) -> Answers:
-            accel, status = _outputs(len(temp))
-            refused = self.library.triax_ref_batch(
-                image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
-                _pointer(temp), _pointer(raw), _pointer(accel), _pointer(status),
-            )  # fmt: skip
+            function = getattr(self.library, self.entry)
+            refused, answers = _call(function, _image(image), self._inputs(temp, raw))
             if refused:
                 raise RefusedError("reference C", f"the image was refused (status {refused})")
-            return accel, status
+            return answers
 
         return run
+
+    def _inputs(self, temp: Int32Array, raw: Int32Array) -> tuple[Int32Array, ...]:
+        return temp, raw
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,7 @@ class Generated:
     """The generated routine with the constants of triax_calib.h compiled in."""
 
     library: ctypes.CDLL
+    entry: ClassVar[str] = "triax_batch"
 
     @property
     def compiler(self) -> str:
@@ -92,21 +95,15 @@ class Generated:
 
     def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
         """Answers with the compiled-in constants."""
-        accel, status = _outputs(len(temp))
-        self.library.triax_batch(
-            ctypes.c_size_t(len(temp)),
-            _pointer(temp), _pointer(raw), _pointer(accel), _pointer(status),
-        )  # fmt: skip
-        return accel, status
+        return _call(getattr(self.library, self.entry), (), self._inputs(temp, raw))[1]
 
     def run_image(self, image: bytes, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
-        """Status of triax_calib_load, and the answers with the constants of the image."""
-        accel, status = _outputs(len(temp))
-        loaded = self.library.triax_batch_image(
-            image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
-            _pointer(temp), _pointer(raw), _pointer(accel), _pointer(status),
-        )  # fmt: skip
-        return int(loaded), (accel, status)
+        """Status of the loader, and the answers with the constants of the image."""
+        function = getattr(self.library, f"{self.entry}_image")
+        return _call(function, _image(image), self._inputs(temp, raw))
+
+    def _inputs(self, temp: Int32Array, raw: Int32Array) -> tuple[Int32Array, ...]:
+        return temp, raw
 
 
 @dataclass(frozen=True)
@@ -114,22 +111,10 @@ class RateReference(Reference):
     """The handwritten reference with the rates of temperature of `rates_of`."""
 
     rate: RatePlan
+    entry: ClassVar[str] = "triax_ref_batch_rate"
 
-    def routine(self, image: bytes) -> Routine:
-        """Bind an image."""
-
-        def run(temp: Int32Array, raw: Int32Array) -> Answers:
-            accel, status = _outputs(len(temp))
-            rates = rates_of(self.rate, temp).astype(np.int32)
-            refused = self.library.triax_ref_batch_rate(
-                image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
-                _pointer(temp), _pointer(rates), _pointer(raw), _pointer(accel), _pointer(status),
-            )  # fmt: skip
-            if refused:
-                raise RefusedError("reference C", f"the image was refused (status {refused})")
-            return accel, status
-
-        return run
+    def _inputs(self, temp: Int32Array, raw: Int32Array) -> tuple[Int32Array, ...]:
+        return temp, _rates(self.rate, temp), raw
 
 
 @dataclass(frozen=True)
@@ -140,66 +125,37 @@ class RateGenerated(Generated):
 
     def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
         """Answers with the compiled-in constants."""
-        return self._run(None, temp, raw)[1]
+        return self._call_rate(None, temp, raw)[1]
 
     def run_image(self, image: bytes, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
-        """Status of triax_calib_load, and the answers with the constants of the image."""
-        return self._run(image, temp, raw)
+        """Status of the loader, and the answers with the constants of the image."""
+        return self._call_rate(image, temp, raw)
 
-    def _run(self, image: bytes | None, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
-        accel, status = _outputs(len(temp))
-        rates = rates_of(self.rate, temp).astype(np.int32)
-        loaded = self.library.triax_batch_rate(
-            image, ctypes.c_size_t(len(image or b"")), ctypes.c_size_t(len(temp)),
-            _pointer(temp), _pointer(rates), _pointer(raw), _pointer(accel), _pointer(status),
-        )  # fmt: skip
-        return int(loaded), (accel, status)
+    def _call_rate(
+        self, image: bytes | None, temp: Int32Array, raw: Int32Array
+    ) -> tuple[int, Answers]:
+        inputs = temp, _rates(self.rate, temp), raw
+        return _call(self.library.triax_batch_rate, _image(image), inputs)
 
 
 @dataclass(frozen=True)
 class GyroReference(Reference):
     """The handwritten reference of a gyro, with the forces of `forces_of`."""
 
-    def routine(self, image: bytes) -> Routine:
-        """Bind an image."""
+    entry: ClassVar[str] = "triax_ref_batch_gyro"
 
-        def run(temp: Int32Array, raw: Int32Array) -> Answers:
-            rate, status = _outputs(len(temp))
-            force = _forces(temp, raw)
-            refused = self.library.triax_ref_batch_gyro(
-                image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
-                _pointer(temp), _pointer(raw), _pointer(force), _pointer(rate), _pointer(status),
-            )  # fmt: skip
-            if refused:
-                raise RefusedError("reference C", f"the image was refused (status {refused})")
-            return rate, status
-
-        return run
+    def _inputs(self, temp: Int32Array, raw: Int32Array) -> tuple[Int32Array, ...]:
+        return temp, raw, _forces(temp, raw)
 
 
 @dataclass(frozen=True)
 class GyroGenerated(Generated):
     """A gyro's generated routine, with the forces of `forces_of`."""
 
-    def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
-        """Answers with the compiled-in constants."""
-        rate, status = _outputs(len(temp))
-        force = _forces(temp, raw)
-        self.library.triax_gyro_batch(
-            ctypes.c_size_t(len(temp)),
-            _pointer(temp), _pointer(raw), _pointer(force), _pointer(rate), _pointer(status),
-        )  # fmt: skip
-        return rate, status
+    entry: ClassVar[str] = "triax_gyro_batch"
 
-    def run_image(self, image: bytes, temp: Int32Array, raw: Int32Array) -> tuple[int, Answers]:
-        """Status of triax_gyro_calib_load, and the answers with the constants of the image."""
-        rate, status = _outputs(len(temp))
-        force = _forces(temp, raw)
-        loaded = self.library.triax_gyro_batch_image(
-            image, ctypes.c_size_t(len(image)), ctypes.c_size_t(len(temp)),
-            _pointer(temp), _pointer(raw), _pointer(force), _pointer(rate), _pointer(status),
-        )  # fmt: skip
-        return int(loaded), (rate, status)
+    def _inputs(self, temp: Int32Array, raw: Int32Array) -> tuple[Int32Array, ...]:
+        return temp, raw, _forces(temp, raw)
 
 
 @dataclass(frozen=True)
@@ -229,6 +185,29 @@ def routines_of(
     if rate is None:
         return Generated(generated), Reference(reference)
     return RateGenerated(generated, rate), RateReference(reference, rate)
+
+
+def _call(
+    function: Callable[..., int], image: tuple[object, ...], inputs: tuple[Int32Array, ...]
+) -> tuple[int, Answers]:
+    """What the entry returned (a status, where it takes an image) and the answers."""
+    results, status = _outputs(len(inputs[0]))
+    loaded = function(
+        *image,
+        ctypes.c_size_t(len(inputs[0])),
+        *map(_pointer, inputs),
+        _pointer(results),
+        _pointer(status),
+    )
+    return int(loaded), (results, status)
+
+
+def _image(image: bytes | None) -> tuple[object, ...]:
+    return image, ctypes.c_size_t(len(image or b""))
+
+
+def _rates(rate: RatePlan, temp: Int32Array) -> Int32Array:
+    return np.ascontiguousarray(rates_of(rate, temp).astype(np.int32))
 
 
 def _forces(temp: Int32Array, raw: Int32Array) -> Int32Array:

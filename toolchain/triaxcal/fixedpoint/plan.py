@@ -173,7 +173,10 @@ def triad_plan(compensation: Compensation, unit: Triad, *, gyro: bool) -> Plan:
     )
     plan = Plan(shape, low, high, tuple(frames), real, volts_per_lsb)
     terms = compensation.terms
-    room = np.zeros(3) if terms.rate is None else largest_offset_g(terms.rate) * 2.0**unit.output_q
+    room = np.zeros(3)
+    if terms.rate is not None:
+        # The loader allows for 2^31, which is up to twice what a rate times its gain reaches.
+        room = largest_offset_g(terms.rate) * 2.0 ** (unit.output_q + 1)
     planned = _inverse_plan if compensation.form == INVERSE else _direct_plan
     plan = _with_quadratic(planned(plan, room, where), terms.quadratic_per_g, where)
     if terms.rate is None:

@@ -122,6 +122,8 @@ class RawLog:
             seam = int(self._known["bytes"]) if self._known else self._size
             end = seam if self._hashed < seam else self._size
             chunk = os.pread(self._file, min(1 << 20, end - self._hashed), self._hashed)
+            if not chunk:
+                raise changed_log(self.path, f"it ends at byte {self._hashed}", f"{end} bytes")
             self._hash.update(chunk)
             self._hashed += len(chunk)
             most -= len(chunk)
@@ -142,8 +144,13 @@ class RawLog:
 
     @property
     def state(self) -> LogState:
-        """Lines, bytes and SHA-256 of what has been flushed."""
-        self._hash_on(self._size)
+        """Lines, bytes and SHA-256 of what has been flushed; no hash while much is still unread.
+
+        After a resume the beginning is hashed with the flushes: an event must not wait for it.
+        """
+        self._hash_on(_HASH_BYTES)
+        if self._hashed < self._size:
+            return self.place
         return {**self.place, "sha256": self._hash.hexdigest()}
 
     def close(self) -> None:

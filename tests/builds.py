@@ -1,0 +1,37 @@
+"""Generated C of a plan, as the tests write and compile it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from plans import SENSOR
+from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
+from triaxcal.codegen.routines import Generated
+from triaxcal.fixedpoint.plan import Plan
+
+UNITS = Path(__file__).parent.parent / "units"
+PROVENANCE = Provenance("GOLDEN-001", "0123456789abcdef" * 4, ("fixed constants of the tests",))
+
+
+def write_generated(plan: Plan, folder: Path) -> None:
+    """Write what a delivery writes for the firmware."""
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = render_routine(plan)
+    texts[CONSTANTS_FILE] = render_constants(plan, SENSOR, PROVENANCE)
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Built:
+    """A plan, the folder with its generated C, and that C as a library."""
+
+    plan: Plan
+    folder: Path
+    generated: Generated
+
+    @property
+    def image(self) -> bytes:
+        return image_bytes(self.plan)
