@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 from dataclasses import dataclass, replace
@@ -80,6 +81,10 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
     c = seen[0].c
     assert c is not None
     return Ran(done.output, folder, seen[0], c, GeneratedImu(library))
+
+
+def sha256_of(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def exact(model: ImuModel, accel_g: np.ndarray, gyro: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -171,11 +176,24 @@ def test_what_is_written_and_said(ran: Ran) -> None:
         f"  gyro          LSB 2^-19 deg/s; proven within {gyro_words}",
         f"  checked       {checked:,} vectors: Python".replace(",", " "),
         "  not corrected delay of the accelerometers behind the gyros",
-        '  constant      gyro over temperature: [dynamic] blocks has no "gyro-thermal"',
+        "  constant      gyro over temperature: [dynamic] blocks has no\n"
+        '                "gyro-thermal"',
     ):
         assert line in ran.output
+    summary = dynamic_summary(ran.made, dynamic_files(ran.made), "build/IMU-SIM")
+    assert max(map(len, summary.splitlines())) <= 80
     stated = json.loads((ran.folder / "verification.json").read_text(encoding="utf-8"))
     assert stated["accelerometer"]["bound_lsb"] == accel
+    fitted = json.loads((ran.folder / "calibration.json").read_text(encoding="utf-8"))
+    files = ran.made.done.unit.path, ran.made.done.unit.recording
+    digests = b"".join(hashlib.sha256(file.read_bytes()).digest() for file in files)
+    assert fitted["inputs_sha256"] == stated["inputs_sha256"] == hashlib.sha256(digests).hexdigest()
+    page = (ran.folder / "dynamic.html").read_text(encoding="utf-8")
+    for name in (*build.files, *map(sha256_of, build.files.values())):
+        assert name in page
+    assert f"≤ {accel:.3f} LSB" in page
+    assert f"carried along ≤ {gyro:.3f} LSB" in page
+    assert "not run on this delivery (triaxcal verify)" in page
     assert stated["gyro"]["with_accelerometer_lsb"] == list(build.rate_bound_lsb)
     header = (ran.folder / "triax_calib.h").read_text(encoding="utf-8")
     assert f"inputs sha256 {stated['inputs_sha256'][:16]}." in header
@@ -245,6 +263,7 @@ def test_without_a_device_no_c_is_written_and_it_is_said(ran: Ran) -> None:
     made = replace(ran.made, c=None)
     files = dynamic_files(made)
     assert set(files) == {"calibration.json", "dynamic.html"}
+    assert b"No C: unit.toml has no [device]" in files["dynamic.html"]
     assert (
         "C               none: unit.toml has no [device]; add it with accel_bits, "
         "accel_full_scale_g, gyro_bits, gyro_full_scale_deg_per_s, degc_per_code, range_degc\n"

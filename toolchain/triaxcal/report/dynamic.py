@@ -20,13 +20,13 @@ FORMAT = 1
 def dynamic_files(made: ImuDelivery) -> dict[str, bytes]:
     """Name and content of everything that build/<UNIT>/ receives."""
     return {
-        "calibration.json": _calibration_json(made.done),
+        "calibration.json": _calibration_json(made.done, made.inputs_sha256),
         "dynamic.html": dynamic_page(made, {}),
         **imu_c_files(made),
     }
 
 
-def _calibration_json(done: DynamicUnit) -> bytes:
+def _calibration_json(done: DynamicUnit, inputs_sha256: str) -> bytes:
     unit, result, seen = done.unit, done.result, done.seen
     layout, last = result.layout, result.passes[-1]
     document: dict[str, Any] = {
@@ -35,6 +35,7 @@ def _calibration_json(done: DynamicUnit) -> bytes:
         "triaxcal": __version__,
         "unit": unit.name,
         "serial": unit.serial,
+        "inputs_sha256": inputs_sha256,
         "recording": unit.recording.name,
         "reference_degc": unit.reference_degc,
         "local_gravity_m_per_s2": unit.gravity_m_per_s2,
