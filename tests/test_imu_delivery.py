@@ -176,8 +176,8 @@ def test_what_is_written_and_said(ran: Ran) -> None:
         f"  gyro          LSB 2^-19 deg/s; proven within {gyro_words}",
         f"  checked       {checked:,} vectors: Python".replace(",", " "),
         "  not corrected delay of the accelerometers behind the gyros",
-        "  constant      gyro over temperature: [dynamic] blocks has no\n"
-        '                "gyro-thermal"',
+        "  constant      gyro over temperature: [dynamic] blocks has no\n",
+        '                "gyro-thermal"\n',
     ):
         assert line in ran.output
     summary = dynamic_summary(ran.made, dynamic_files(ran.made), "build/IMU-SIM")
