@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import html
 import json
 import shutil
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from triaxcal.imudelivery import ImuC, ImuDelivery, deliver_imu
 from triaxcal.model.imu import ImuModel, compensate_imu
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
+from triaxcal.report.dynamicpage import digits, dynamic_page
 from triaxcal.report.imuc import C_FILES
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
 from triaxcal.simulation.unit import write_simulated_unit
@@ -199,6 +201,34 @@ def test_what_is_written_and_said(ran: Ran) -> None:
     assert f"inputs sha256 {stated['inputs_sha256'][:16]}." in header
     assert "accelerometer code: 21 bits for 10.48576 g full scale" in header
     assert "not corrected: delay of the accelerometers behind the gyros" in header
+
+
+def test_the_page_warns_of_what_was_left_out(ran: Ran) -> None:
+    """An effect that shows, and more noise than stated."""
+    made, (first, *others) = ran.made, ran.made.done.off
+    page = dynamic_page(made, {}).decode()
+    assert '<div class="badge">CONSISTENT<small>innovations ' in page
+    assert '<p class="warning">' not in page
+    shown = replace(made.done, off=(replace(first, chi_square=900.0, shown=True), *others))
+    page = html.unescape(dynamic_page(replace(made, done=shown), {}).decode())
+    assert '<div class="badge warn">AN EFFECT IS MISSING<small>' in page
+    assert (
+        "The recording shows an effect that is switched off, "
+        f'{first.title}: switch on "{first.name}" in [dynamic] blocks.</p>'
+    ) in page
+    last = made.done.result.passes[-1]
+    noisy = replace(last, chi_square=4.0 * last.freedom)
+    result = replace(made.done.result, passes=(*made.done.result.passes[:-1], noisy))
+    page = dynamic_page(replace(made, done=replace(made.done, result=result)), {}).decode()
+    assert "NOT CONSISTENT<small>innovations 2.00 times the stated noise" in page
+    assert '<p class="warning">The innovations 2.00 times the stated noise' in page
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "text"), [(-0.3, 108.0, "0"), (-7.4, 98.0, "-7"), (1.23456, 0.021, "1.235")]
+)
+def test_digits(value: float, sd: float, text: str) -> None:
+    assert digits(value, sd) == text
 
 
 @pytest.mark.parametrize(

@@ -40,8 +40,8 @@ def verdict(result: DynamicResult) -> str:
 
 def digits(value: float, sd: float) -> str:
     """Value to the second digit of its standard deviation."""
-    places = max(0, 1 - math.floor(math.log10(sd))) if sd > 0 else 3
-    return f"{value:.{min(places, 9)}f}"
+    places = min(max(0, 1 - math.floor(math.log10(sd))) if sd > 0 else 3, 9)
+    return f"{round(value, places) + 0.0:.{places}f}"  # no minus before a nought
 
 
 def consistent(result: DynamicResult) -> bool:
@@ -60,8 +60,7 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
     layout, time = result.layout, result.passes[-1].history.time_s
     context = {
         "unit": done.unit,
-        "consistent": consistent(result),
-        "ratio": f"{math.sqrt(result.passes[-1].chi_square / result.passes[-1].freedom):.2f}",
+        "badge": _badge(made),
         "facts": _facts(made),
         "warnings": _warnings(made),
         "stages": [
@@ -97,6 +96,17 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
         "files": [] if made.c is None else file_rows(made.c.build.files),
     }
     return environment().get_template("dynamic.html.j2").render(context).encode()
+
+
+def _badge(made: ImuDelivery) -> tuple[bool, str, str]:
+    """Whether all is well, and the words for it."""
+    last = made.done.result.passes[-1]
+    words = f"innovations {math.sqrt(last.chi_square / last.freedom):.2f} times the stated noise"
+    if not consistent(made.done.result):
+        return False, "NOT CONSISTENT", words
+    if any(effect.shown for effect in made.done.off):
+        return False, "AN EFFECT IS MISSING", "it shows and is switched off, see below"
+    return True, "CONSISTENT", words
 
 
 def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
