@@ -304,7 +304,11 @@ def test_a_simulated_unit_without_its_recording_says_how_to_make_it(tmp_path: Pa
     unit = copied(tmp_path / "IMU-SIM")
     done = CliRunner().invoke(main, ["calib", str(unit), "--build", str(tmp_path / "build")])
     assert str(done.exception) == (
-        f"{unit / 'recording.csv'}: no such file; expected the recording that unit.toml names; put "
-        f"it there; of a simulated unit, `triaxcal simulate {unit}` makes it"
+        f"{unit / 'recording.csv'}: no such file; expected the recording that unit.toml names; "
+        f"make simulate UNIT=IMU-SIM, or triaxcal simulate {unit}, writes it"
     )
+    assert not done.output  # no bar of work that has not begun
+    (unit / "imu_truth.toml").unlink()
+    done = CliRunner().invoke(main, ["calib", str(unit), "--build", str(tmp_path / "build")])
+    assert str(done.exception).endswith("names; put it there, or correct [dynamic] recording")
     assert not (tmp_path / "build").exists()

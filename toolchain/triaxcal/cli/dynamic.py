@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.termui import progressbar
@@ -44,9 +45,15 @@ def delivered_imu(unit: Path) -> ImuDelivery:
     """Calibrate the IMU and make its C, with a bar of progress."""
     from triaxcal.imudelivery import deliver_imu  # noqa: PLC0415
 
-    with progressbar(length=1000, label="pass 1", file=sys.stderr) as bar:
+    with ExitStack() as stack:
+        bars: list[Any] = []
 
         def progress(step: str, part: float) -> None:
+            if not bars:  # nothing is drawn for what is refused at the door
+                bars.append(
+                    stack.enter_context(progressbar(length=1000, label=step, file=sys.stderr))
+                )
+            bar = bars[0]
             if bar.label != step:
                 bar.label = step
                 bar.pos = 0
