@@ -3,14 +3,18 @@
 CPU seconds (workers and their compilers, from /proc) stand beside wall seconds: on a machine that
 others use too, only they say what a unit costs. Lines:
 
-    cost     CPU seconds a unit, by tenths of the series: flat when it does not grow
-    rate     units a minute, and a minute of CPU
+    machine  cores, and the load before and after: wall seconds are for a machine with nothing else
+    cost     seconds a unit, by tenths of the series, and the last hundred against the first
+    memory   the largest worker, and the process that hands the units out
+    rate     units a minute, a minute and core, and a minute of CPU
     rerun    the same command with nothing changed, as share of the first, wall and CPU
     workers  one worker against two on `--scaling` units, on one core and on two, after each
              worker's first unit (which pays for its start). By CPU cost: 2 when a unit costs the
              same with two, whatever else the machine does
 
-    python bench/series.py [--units N] [--scaling N] [--folder EXISTING] [--build FOLDER]
+Ctrl-C stops it; the same command goes on where it was, until all is told. Then it begins anew.
+
+    python bench/series.py [--units N] [--scaling N] [--rounds N]
 """
 
 from __future__ import annotations
@@ -18,11 +22,15 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import statistics
-import tempfile
+import sys
 import time
 from itertools import pairwise
 from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
 
 from triaxcal.batch.local import cores, run_local
 from triaxcal.batch.order import Outcome
@@ -34,6 +42,9 @@ from triaxcal.report.series.unit import make_unit
 from triaxcal.simulation.series import write_series
 
 ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / "build" / "bench-series"
+AT_SIM = ROOT / "units" / "AT-SIM"
+HUNDRED = 100
 TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 PAGE_KB = os.sysconf("SC_PAGE_SIZE") / 1024
 
@@ -64,46 +75,90 @@ def cpu_s(seen: dict[str, float]) -> float:
     return sum(seen.values()) + time.process_time()
 
 
-def resident_mb() -> float:
-    return max((int(v[21]) * PAGE_KB / 1024 for v in workers().values()), default=0.0)
+def resident_mb() -> tuple[float, float]:
+    """Of the largest worker, and of this process."""
+    own = int(fields("self")[21])
+    largest = max((int(v[21]) for v in workers().values()), default=0)
+    return largest * PAGE_KB / 1024, own * PAGE_KB / 1024
 
 
-def run(folder: Path, build: Path, jobs: int, log: Path | None = None) -> dict[str, list[float]]:
-    """Wall and CPU seconds, and the largest worker in MB, at each unit."""
+def progress() -> Progress:
+    console = Console(stderr=True)
+    return Progress(console=console, disable=not console.is_terminal, transient=True)
+
+
+Row = dict[str, float]
+"""What one unit took since the one before: wall and CPU seconds; memory in MB when it was made."""
+
+
+def run(units: Path, build: Path, jobs: int, label: str, log: Path | None = None) -> list[Row]:
+    """One row a unit made, and one for what comes after the last; `log` keeps them if stopped."""
     seen: dict[str, float] = {}
+    rows: list[Row] = []
     start, start_cpu = time.monotonic(), cpu_s({})
-    rows: dict[str, list[float]] = {"wall": [0.0], "cpu": [0.0], "mb": [0.0]}
+    work = plan_work(sorted(units.iterdir()), build)
+    if log and work.done:
+        rows = json.loads(log.read_text(encoding="utf-8"))[: len(work.done)]
 
-    def tell(outcome: Outcome) -> None:
-        if outcome.refusal:
-            print("refused ", outcome.refusal, flush=True)
-        rows["wall"].append(time.monotonic() - start)
-        rows["cpu"].append(cpu_s(seen) - start_cpu)
-        rows["mb"].append(resident_mb())
-        if log:
-            log.write_text(json.dumps(rows), encoding="utf-8")
+    def row() -> None:
+        nonlocal start, start_cpu
+        now, cpu, (worker, own) = time.monotonic(), cpu_s(seen), resident_mb()
+        rows.append({"wall": now - start, "cpu": cpu - start_cpu, "worker": worker, "own": own})
+        start, start_cpu = now, cpu
 
-    work = plan_work(sorted(folder.iterdir()), build)
-    series = run_series(
-        work, build, make_unit, lambda m, o: run_local(m, o, jobs), sometimes=SOMETIMES, tell=tell
-    )
+    with progress() as bar:
+        task = bar.add_task(label, total=work.total, completed=len(work.done))
+
+        def tell(outcome: Outcome) -> None:
+            if outcome.refusal:
+                print("refused ", outcome.refusal, flush=True)
+            row()
+            bar.advance(task)
+            if log:
+                log.write_text(json.dumps(rows), encoding="utf-8")
+
+        series = run_series(
+            work,
+            build,
+            make_unit,
+            lambda m, o: run_local(m, o, jobs),
+            sometimes=SOMETIMES,
+            tell=tell,
+        )
     series_files(series)
-    rows["wall"].append(time.monotonic() - start)
-    rows["cpu"].append(cpu_s(seen) - start_cpu)
+    row()
     return rows
 
 
-def held_to(count: int, folder: Path, build: Path) -> tuple[float, float]:
+def total(rows: list[Row], name: str) -> float:
+    return sum(row[name] for row in rows)
+
+
+def mean(rows: list[Row], name: str) -> float:
+    return total(rows, name) / len(rows)
+
+
+def simulated(folder: Path, count: int) -> Path:
+    """So many units in `folder`, written once."""
+    done = folder.with_name(f"{folder.name}-{count}")
+    if not done.exists():
+        shutil.rmtree(folder, ignore_errors=True)
+        with progress() as bar:
+            list(bar.track(write_series(AT_SIM, folder, count), count, description="simulating"))
+        done.touch()
+    return folder
+
+
+def held_to(count: int, units: Path, build: Path) -> tuple[float, float]:
     """Wall and CPU seconds a unit with `count` workers on as many cores, once each has made one."""
     every = os.sched_getaffinity(0)
     os.sched_setaffinity(0, sorted(every)[:count])
+    shutil.rmtree(build, ignore_errors=True)
     try:
-        rows = run(folder, build, count)
+        rows = run(units, build, count, f"{count} worker(s)")[count:-1]
     finally:
         os.sched_setaffinity(0, every)
-    made = len(rows["wall"]) - 2 - count
-    wall, cpu = ((rows[name][-2] - rows[name][count]) / made for name in ("wall", "cpu"))
-    return wall, cpu
+    return mean(rows, "wall"), mean(rows, "cpu")
 
 
 def main() -> None:
@@ -111,58 +166,62 @@ def main() -> None:
     parser.add_argument("--units", type=int, default=40)
     parser.add_argument("--scaling", type=int, default=12)
     parser.add_argument("--rounds", type=int, default=1)
-    parser.add_argument("--folder", type=Path)
-    parser.add_argument("--build", type=Path)
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
-        folder, build = options.folder, options.build or Path(scratch) / "build"
-        if folder is None and options.units:
-            folder = Path(scratch) / "units"
-            list(write_series(ROOT / "units" / "AT-SIM", folder, options.units))
-        if folder is not None:
-            measure(folder, build)
+    before = os.getloadavg()[0]
+    try:
+        if options.units:
+            measure(simulated(FOLDER / "units", options.units), FOLDER / "made")
         if options.scaling:
-            small = Path(scratch) / "small"
-            list(write_series(ROOT / "units" / "AT-SIM", small, options.scaling))
-            scaling(small, Path(scratch), options.rounds)
+            scaling(simulated(FOLDER / "few", options.scaling), options.rounds)
+    except KeyboardInterrupt:
+        sys.exit("stopped; the same command goes on")
+    print(f"machine  {cores()} cores, load {before:.1f} before and {os.getloadavg()[0]:.1f} after")
+    shutil.rmtree(FOLDER)
 
 
-def measure(folder: Path, build: Path) -> None:
-    build.mkdir(parents=True, exist_ok=True)
-    first = run(folder, build, cores(), build.with_name(f"{build.name}-times.json"))
-    count = len(first["wall"]) - 2
-    if count < 1:
-        print("everything was done already: name another --build")
-        return
+def measure(units: Path, build: Path) -> None:
+    log = FOLDER / "times.json"
+    if not log.exists():
+        shutil.rmtree(build, ignore_errors=True)
+    first = run(units, build, cores(), "first run", log)
+    made, count = first[:-1], len(first) - 1
+    log.write_text(json.dumps(made), encoding="utf-8")
     tenths = [round(k * count / 10) for k in range(11)]
     for name in ("cpu", "wall"):
-        steps = [
-            f"{(first[name][b] - first[name][a]) / (b - a):5.2f}"
-            for a, b in pairwise(tenths)
-            if b > a
-        ]
+        steps = [f"{mean(made[a:b], name):5.2f}" for a, b in pairwise(tenths) if b > a]
         print(f"cost     {name:<5}" + " ".join(steps) + "  s a unit, by tenths")
+    if count >= 2 * HUNDRED:
+        ratios = [
+            f"{mean(made[-HUNDRED:], name) / mean(made[:HUNDRED], name):.3f} {name}"
+            for name in ("cpu", "wall")
+        ]
+        print(f"cost     last {HUNDRED} units against the first {HUNDRED}: " + ", ".join(ratios))
+    early, late = made[max(0, count // 10 - 1)], made[-1]
     print(
-        f"memory   {first['mb'][max(1, count // 10)]:.0f} MB the largest worker after a tenth, "
-        f"{first['mb'][count]:.0f} MB at the end"
+        f"memory   {early['worker']:.0f} MB the largest worker after a tenth, {late['worker']:.0f} "
+        f"MB at the end; this process {early['own']:.0f} and {late['own']:.0f} MB"
     )
+    wall, cpu = total(first, "wall"), total(first, "cpu")
     print(
-        f"rate     {60 * count / first['wall'][-1]:.1f} units a minute on {cores()} workers, "
-        f"{60 * count / first['cpu'][-1]:.1f} a minute of CPU ({count} units, "
-        f"{first['wall'][-1]:.0f} s, {first['cpu'][-1]:.0f} CPU s)"
+        f"rate     {60 * count / wall:.1f} units a minute on {cores()} workers, "
+        f"{60 * count / wall / cores():.1f} a worker, {60 * count / cpu:.1f} a minute of CPU "
+        f"({count} units, {wall:.0f} s, {cpu:.0f} CPU s)"
     )
-    again = run(folder, build, cores())
+    again = run(units, build, cores(), "rerun")
+    if len(again) > 1:
+        sys.exit(f"rerun    made {len(again) - 1} units again: they were refused or damaged")
     print(
-        f"rerun    {100 * again['wall'][-1] / first['wall'][-1]:.2f} % wall, "
-        f"{100 * again['cpu'][-1] / first['cpu'][-1]:.2f} % CPU   (limit 2)"
+        f"rerun    {100 * total(again, 'wall') / wall:.2f} % wall, "
+        f"{100 * total(again, 'cpu') / cpu:.2f} % CPU   (limit 2)",
+        flush=True,
     )
 
 
-def scaling(folder: Path, scratch: Path, rounds: int) -> None:
+def scaling(units: Path, rounds: int) -> None:
     ratios = []
-    for k in range(rounds):
-        one = held_to(1, folder, scratch / f"one-{k}")
-        two = held_to(2, folder, scratch / f"two-{k}")
+    for _ in range(rounds):
+        one = held_to(1, units, FOLDER / "one")
+        two = held_to(2, units, FOLDER / "two")
         ratios.append((one[0] / two[0], 2.0 * one[1] / two[1]))
         print(
             f"         one worker {one[0]:.2f} s and {one[1]:.2f} CPU s a unit, two "

@@ -25,7 +25,7 @@ from triaxcal.verify.mutation import (
     Verdict,
     read_equivalents,
 )
-from triaxcal.verify.shapes import SHAPES, subject
+from triaxcal.verify.shapes import ALL_SHAPES, subject
 from triaxcal.verify.workspace import Workspace
 
 HERE = Path(__file__).parent
@@ -35,10 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the campaigns and print a line for each."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--every", type=int, default=1, help="only each n-th mutant")
-    parser.add_argument("--shape", choices=list(SHAPES), action="append")
+    parser.add_argument("--shape", choices=list(ALL_SHAPES), action="append")
     parser.add_argument("--units", type=Path, default=HERE.parent / "units")
     given = parser.parse_args(arguments)
-    by_shape = {s: _shape(s, given.units, given.every) for s in given.shape or SHAPES}
+    by_shape = {s: _shape(s, given.units, given.every) for s in given.shape or ALL_SHAPES}
     verdicts = [v for found in by_shape.values() for v in found]
     survivors = [v.mutant for v in verdicts if v.fate == SURVIVED]
     stale = _stale(by_shape) if given.every == 1 and not given.shape else []

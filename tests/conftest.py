@@ -34,6 +34,7 @@ LONG = {
     "test_imu_delivery_thermal.py",
     "test_dynamic_calibrate.py",
     "test_dynamic_equations.py",
+    "test_dynamic_together.py",
     "test_uncertainty.py",
     "test_uncertainty_coverage.py",
 }

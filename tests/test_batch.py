@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ import batch_workers
 from triaxcal.batch import journal
 from triaxcal.batch.cluster import connect
 from triaxcal.batch.local import run_local
-from triaxcal.batch.order import Make, Order, Outcome
+from triaxcal.batch.order import Make, Order, Outcome, filled
 from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import Series, run_series
 from triaxcal.cli.batch import batch
@@ -336,6 +337,43 @@ def test_an_interrupt_is_told_and_the_next_run_goes_on(
     assert sorted(series.entries) == ["U-1", "U-2", "U-3", "U-4"]
 
 
+@pytest.mark.parametrize("times", [1, 2])
+def test_ctrl_c_while_workers_start_is_one_line(bench: Path, tmp_path: Path, times: int) -> None:
+    """A terminal interrupts all of its processes, those as well that do not ignore it yet."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "triaxcal", "batch", "units/AT-CHERNIAK", "--build", str(tmp_path)],
+        cwd=bench, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    while process.poll() is None and not is_worker_of(process.pid):
+        pass
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.stderr is not None
+    lines = [process.stderr.readline()]
+    if times == 2:
+        os.killpg(process.pid, signal.SIGINT)
+    lines += process.communicate(timeout=120)[1].splitlines()
+    assert process.returncode == 1
+    assert lines == [
+        "interrupted: finishing 1 unit under way; once more to leave at once\n",
+        f"triaxcal: batch: interrupted; {2 - times} of 1 units are done; run it again to go on",
+    ]
+    assert (tmp_path / "AT-CHERNIAK").exists() == (times == 1)
+
+
+def is_worker_of(parent: int) -> bool:
+    """Whether a worker of that process has been started; it may have done nothing yet."""
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            status = (entry / "stat").read_text(encoding="utf-8")
+            command = (entry / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if status[status.rindex(")") + 2 :].split()[1] == str(parent) and b"spawn_main" in command:
+            return True
+    return False
+
+
 def test_an_imu_is_left_out(tmp_path: Path) -> None:
     work = plan_work([UNITS / "AT-SIM", UNITS / "IMU-SIM"], tmp_path)
     assert work.skipped == [(UNITS / "IMU-SIM", "an IMU, which triaxcal dynamic calibrates")]
@@ -348,7 +386,8 @@ def test_a_unit_of_a_recording_brings_its_recording(tmp_path: Path) -> None:
     (folder / "unit.toml").write_text('serial = "H-1"\n[recording]\nfile = "poses.csv"\n')
     (folder / "poses.csv").write_text("ax,ay,az\n")
     (order,) = plan_work([folder], tmp_path / "build").orders
-    assert set(order.inputs) == {"unit.toml", "poses.csv"}
+    assert order.files == ("unit.toml", "poses.csv")
+    assert set(filled(order).inputs) == {"unit.toml", "poses.csv"}
 
 
 def test_a_recording_outside_of_the_unit_s_folder_is_not_sent(tmp_path: Path) -> None:
@@ -359,8 +398,8 @@ def test_a_recording_outside_of_the_unit_s_folder_is_not_sent(tmp_path: Path) ->
         f'serial = "H-1"\n[recording]\nfile = "{tmp_path / "poses.csv"}"\n'
     )
     (order,) = plan_work([folder], tmp_path / "build").orders
-    assert set(order.inputs) == {"unit.toml"}
-    outcome = make_unit(replace(order, inputs={**order.inputs, "../poses.csv": b"other"}))
+    assert order.files == ("unit.toml",)
+    outcome = make_unit(replace(order, inputs={**filled(order).inputs, "../poses.csv": b"other"}))
     assert "lies outside of the unit's folder" in outcome.refusal
     assert (tmp_path / "poses.csv").read_text() == "mine\n"
 
@@ -371,7 +410,7 @@ def test_a_recording_in_a_subfolder_goes_with_its_unit(tmp_path: Path) -> None:
     (folder / "unit.toml").write_text('serial = "H-1"\n[ recording ]\nfile = "data/x.csv"\n')
     (folder / "data" / "x.csv").write_text("ax,ay,az\n")
     (order,) = plan_work([folder], tmp_path / "build").orders
-    outcome = make_unit(order)
+    outcome = make_unit(filled(order))
     assert "unit.toml" in outcome.refusal  # of the keys that this unit lacks
     assert "fault" not in outcome.refusal
 
@@ -383,3 +422,27 @@ def test_a_word_in_a_comment_makes_no_imu(tmp_path: Path) -> None:
         file.write("# no [dynamic] here\n")
     work = plan_work([unit], tmp_path / "build")
     assert (len(work.orders), work.skipped) == (1, [])
+
+
+@pytest.mark.parametrize("table", ["dynamic", "recording"])
+def test_a_file_that_is_not_toml_is_refused_and_the_others_made(tmp_path: Path, table: str) -> None:
+    folder, build = units(tmp_path / "units", 3), tmp_path / "build"
+    (folder / "U-2" / "unit.toml").write_text(f"[{table}\n", encoding="utf-8")
+    _, series, _ = run(folder, build)
+    assert sorted(series.entries) == ["U-1", "U-3"]
+    assert series.refused["U-2"].startswith(f"{folder}/U-2/unit.toml: not TOML: ")
+
+
+def test_a_unit_that_changes_while_the_series_runs_is_refused(tmp_path: Path) -> None:
+    folder, build = units(tmp_path / "units", 3), tmp_path / "build"
+    work = plan_work(folder.iterdir(), build)
+    # Planned without their contents: a thousand recordings are not held in memory.
+    assert not any(order.inputs for order in work.orders)
+    (folder / "U-2" / "measurements.csv").write_text("new rows", encoding="utf-8")
+    (folder / "U-3" / "measurements.csv").unlink()
+    told = {o.name: o for o in run_local(batch_workers.made, work.orders, 1)}
+    assert not told["U-1"].refusal
+    assert told["U-2"].refusal == (
+        f"{folder}/U-2: its files changed while the series ran; run again"
+    )
+    assert "U-3/measurements.csv: cannot be read: no such file" in told["U-3"].refusal

@@ -37,22 +37,25 @@ ORDER = {
     "software": "name release type? description?",
     "coreData": "countryCodeISO3166_1 usedLangCodeISO639_1+ mandatoryLangCodeISO639_1+ "
     "uniqueIdentifier identifications? receiptDate? beginPerformanceDate endPerformanceDate "
-    "performanceLocation issueDate? previousReport?",
-    "items": "name? equipmentClass* description? owner? identifications? item+",
+    "performanceLocation issueDate? reportAmendedSubstituted? previousReport?",
+    "items": "name? equipmentClass* description? owner? manufacturer? identifications? item+",
     "item": "name equipmentClass* description? installedSoftwares? manufacturer model? "
     "identifications itemQuantities?",
     "identifications": "identification+",
     "identification": "issuer value name?",
-    "calibrationLaboratory": "calibrationLaboratoryCode? contact cryptElectronicSeal?",
+    "calibrationLaboratory": "calibrationLaboratoryCode? contact cryptElectronicSeal? "
+    "cryptElectronicSignature? cryptElectronicTimeStamp?",
     "contact": "name eMail? phone? fax? location descriptionData?",
     "customer": "name eMail? phone? fax? location descriptionData?",
     "manufacturer": "name eMail? phone? fax? location? descriptionData?",
     "person": "name eMail? phone? fax? location? descriptionData?",
     "respPersons": "respPerson+",
-    "respPerson": "person description? role? mainSigner?",
+    "respPerson": "person description? role? mainSigner? cryptElectronicSeal? "
+    "cryptElectronicSignature? cryptElectronicTimeStamp?",
     "statements": "statement+",
     "statement": "name? description? countryCodeISO3166_1* convention? traceable? norm* reference* "
-    "declaration? valid? date? period? respAuthority? conformity? data?",
+    "declaration? valid? date? period? respAuthority? conformity? data? nonSIDefinition? "
+    "nonSIUnit? location?",
     "measurementResults": "measurementResult+",
     "measurementResult": "name description? usedMethods? usedSoftware? measuringEquipments? "
     "influenceConditions? results measurementMetaData?",
@@ -72,7 +75,40 @@ ORDER = {
     "location": "(city|countryCode|further)+",
     **dict.fromkeys(("name", "description", "declaration", "further"), "content+"),
 }
-"""Children in the order of DCC 3.2.0 and D-SI 2.1 as documented; unlisted elements have none."""
+"""Children as in PTB's dcc.xsd 3.2.1 and SI_Format.xsd 2.1.0; unlisted elements have none.
+
+Optional ones that we never write may be left out. `data`, `quantity` and `location` are choices of
+which those that we write are listed.
+"""
+
+NOT_EMPTY = r"[^\s]+(\s+[^\s]+)*"
+NUMBER = r"((\d*\.\d+)|(\d+\.\d*)|(\d+\.?))([Ee][-+]?\d+)?"
+DAY = r"\d{4}-\d{2}-\d{2}"
+TEXTS = {
+    "release": NOT_EMPTY,
+    "countryCodeISO3166_1": "[A-Z]{2}",
+    "countryCode": "[A-Z]{2}",
+    "usedLangCodeISO639_1": "[a-z]{2}",
+    "mandatoryLangCodeISO639_1": "[a-z]{2}",
+    "uniqueIdentifier": NOT_EMPTY,
+    "beginPerformanceDate": DAY,
+    "endPerformanceDate": DAY,
+    "performanceLocation": "laboratory|customer|laboratoryBranch|customerBranch|other",
+    "city": NOT_EMPTY,
+    "mainSigner": "true|false|1|0",
+    "issuer": "manufacturer|calibrationLaboratory|customer|owner|other",
+    "conformity": "pass|fail|conditionalPass|conditionalFail|noPass|noFail",
+    "content": "(?s).*",
+    "value": NOT_EMPTY,  # of an identification; that of si:real is a NUMBER as well
+    "unit": r"\S+",
+    "labelXMLList": r"\S+",
+    "unitXMLList": r"\S+",
+    "valueXMLList": f"[-+]?{NUMBER}",
+    "uncertaintyXMLList": rf"\+?{NUMBER}",
+    "coverageFactorXMLList": r"\+?(([1-9]\d*\.\d*)|([1-9]\d*))",
+    "coverageProbabilityXMLList": r"\+?((0(\.\d*)?)|(1(\.0*)?))",
+}
+"""Simple types of the same: what the text of an element, or each word of a list, must be."""
 
 
 def wrong_children(element: ET.Element) -> list[str]:
@@ -90,6 +126,17 @@ def wrong_children(element: ET.Element) -> list[str]:
     return wrong + [found for child in element for found in wrong_children(child)]
 
 
+def wrong_texts(element: ET.Element) -> list[str]:
+    """Elements whose text is not that of `TEXTS`."""
+    wrong = []
+    for leaf in (e for e in element.iter() if not len(e)):
+        name = leaf.tag.split("}")[1]
+        words = (leaf.text or "").split(" ") if name.endswith("XMLList") else [leaf.text or ""]
+        if not all(re.fullmatch(TEXTS[name], word) for word in words):
+            wrong.append(f"{name}: {leaf.text}")
+    return wrong
+
+
 @pytest.fixture(scope="session")
 def certificate(delivered: dict[str, Delivery]) -> ET.Element:
     return ET.fromstring(certificate_xml(passport(delivered["AT-SIM"], {}), DETAILS))
@@ -97,7 +144,24 @@ def certificate(delivered: dict[str, Delivery]) -> ET.Element:
 
 def test_elements_stand_in_the_documented_order(certificate: ET.Element) -> None:
     assert wrong_children(certificate) == []
-    assert certificate.get("schemaVersion") == "3.2.0"
+    assert certificate.get("schemaVersion") == "3.2.1"
+
+
+def test_texts_are_of_the_schema_s_simple_types(certificate: ET.Element) -> None:
+    assert wrong_texts(certificate) == []
+    real = certificate.find(f".//{{{SI}}}real/{{{SI}}}value")
+    assert real is not None
+    assert re.fullmatch(f"[-+]?{NUMBER}", real.text or "")
+    lists = certificate.findall(f".//{{{SI}}}realListXMLList")
+    assert len(lists) == 3
+    for numbers in lists:
+        for name in ("label", "value", "unit", "uncertainty", "coverageFactor"):
+            assert len((numbers.findtext(f".//{{{SI}}}{name}XMLList") or "").split()) == 12
+    broken = ET.fromstring(ET.tostring(certificate))
+    factors = broken.find(f".//{{{SI}}}coverageFactorXMLList")
+    assert factors is not None
+    factors.text = "0.9"
+    assert wrong_texts(broken) == ["coverageFactorXMLList: 0.9"]
 
 
 def test_the_order_is_really_checked(certificate: ET.Element) -> None:

@@ -229,3 +229,21 @@ def test_the_unchanged_routine_survives(
 ) -> None:
     for name, sets in shipped_vectors.items():
         assert killed_by(built[name].generated.library, sets) == ""
+
+
+@pytest.mark.parametrize(
+    ("form", "complaint"),
+    [
+        (2, "TRIAX_THUMB2 needs a core with Thumb-2 (Cortex-M3, M4, M7, M33): use"),
+        (3, "TRIAX_THUMB1 needs a core with Thumb (Cortex-M0, M0+, M1): use TRIAX_LIMBS"),
+        (4, "TRIAX_ARITHMETIC is none of TRIAX_PORTABLE, TRIAX_LIMBS, TRIAX_THUMB2, TRIAX_THUMB1"),
+    ],
+)
+def test_a_form_for_another_core_is_refused_by_name(
+    built: dict[str, Built], form: int, complaint: str
+) -> None:
+    command = ["gcc", "-std=c99", "-fsyntax-only", f"-DTRIAX_ARITHMETIC={form}", "triax_comp.c"]
+    folder = built[next(iter(GOLDEN))].folder
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert f'#error "{complaint}' in done.stderr

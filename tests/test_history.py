@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from dataclasses import replace
 from datetime import date
@@ -12,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from triaxcal.cli.history import history as command
+from triaxcal.cli.main import main
 from triaxcal.errors import RefusedError
 from triaxcal.fit.calibrate import calibrate
 from triaxcal.simulation.dwells import simulate
@@ -26,6 +28,12 @@ from triaxcal.uncertainty.history import (
 )
 from triaxcal.unitfile import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
 
+WARNING = re.compile(
+    r"warning: calibration (?P<name>\S+) contradicts (?P<before>\S+): (?P<constant>\w+) at "
+    r"[-\d.]+ degC changed by (?P<by>[-+\d.]+) mg, (?P<en>[\d.]+) times the (?P<allowed>[\d.]+) mg "
+    r"\(95 %\) that their uncertainties allow; the unit has aged or was damaged, or one of the two "
+    r"is wrong"
+)
 AT_SIM = Path(__file__).resolve().parents[1] / "units" / "AT-SIM"
 RIG = Imperfections(
     squareness_sd_arcsec=8.0,
@@ -135,8 +143,40 @@ def test_the_command(folder: Path) -> None:
     lines = done.output.splitlines()
     assert lines[0].startswith("3 calibrations of AT-SIM-001")
     assert [line.split()[0] for line in lines[3:6]] == ["2024-03-30", "2025-03-30", "now"]
-    assert lines[-1].startswith("warning: calibration now contradicts the one before: U0x at ")
+    told = WARNING.fullmatch(lines[-1])
+    assert told, lines[-1]
+    assert (told["name"], told["before"]) == ("now", "2025-03-30")
     assert max(map(len, lines[:-1])) <= 100
+
+
+def test_calib_tells_of_a_contradiction_with_figures(folder: Path, tmp_path: Path) -> None:
+    """0.5 mV over Kxx = -0.5506 V/g is -0.908 mg; noise of 1 micro-g a dwell, and curves."""
+    done = CliRunner().invoke(main, ["calib", str(folder), "--build", str(tmp_path / "build")])
+    assert done.exit_code == 0, done.output
+    told = WARNING.fullmatch(done.stderr.strip())
+    assert told, done.stderr
+    assert (told["name"], told["before"], told["constant"]) == ("now", "2025-03-30", "U0x")
+    by, allowed = float(told["by"]), float(told["allowed"])
+    assert by == pytest.approx(-0.908, abs=0.01)
+    assert 0.0005 < allowed < 0.01
+    assert float(told["en"]) == pytest.approx(abs(by) / allowed, rel=0.01)  # printed to 3 figures
+
+
+def test_calib_is_silent_when_the_last_calibration_agrees(folder: Path, tmp_path: Path) -> None:
+    newest = folder / "measurements.csv"
+    newest.rename(folder / "history" / "2026-03-30.csv")
+    write_simulated_unit(folder, 4)
+    done = CliRunner().invoke(main, ["calib", str(folder), "--build", str(tmp_path / "build")])
+    assert (done.exit_code, done.stderr) == (0, "")
+
+
+def test_a_broken_last_calibration_stops_calib_before_anything_is_written(
+    folder: Path, tmp_path: Path
+) -> None:
+    (folder / "history" / "2026-03-30.csv").write_text("junk\n", encoding="utf-8")
+    with pytest.raises(RefusedError, match=r"history/2026-03-30.csv, row 1 \(header\): missing"):
+        main.main(["calib", str(folder), "--build", str(tmp_path / "b")], standalone_mode=False)
+    assert not (tmp_path / "b").exists()
 
 
 def test_a_unit_without_history(folder: Path) -> None:

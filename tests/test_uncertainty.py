@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -222,6 +223,25 @@ def test_residuals_tell_squareness_from_repeatability() -> None:
     # Variances with 6 and 36 degrees of freedom, averaged over 100: 6 % and 2.4 %; four times that.
     assert np.mean(np.square(squares)) == pytest.approx(15.0**2, rel=0.24)
     assert np.mean(np.square(repeats)) == pytest.approx(5.0**2, rel=0.12)
+
+
+def test_a_squareness_that_noise_explains_is_not_counted() -> None:
+    """A perfect tilter: half of the units show none at all, and no more is claimed than is seen."""
+    unit, found = sim_unit(replace(ZERO, squareness_arcsec=None)), []
+    truth, plan = read_truth(UNITS / "AT-SIM")
+    for seed in range(20):
+        measurements = simulate(unit, truth, replace(plan, seed=seed, readings_per_dwell=30))
+        _, u = evaluated(unit, measurements)
+        found.append(next(s for s in u.sources if s.key == "squareness"))
+    # S_m has 6 degrees of freedom, S_w 36: F(6, 36) is below 1 in 56 % of units, and 20 draws are
+    # all above it once in 10^7.
+    none = [s for s in found if s.sd == 0.0]
+    assert none
+    told = re.fullmatch(r".*; below ([\d.]+) arcsec it is not told from noise", none[0].origin)
+    assert told
+    # v = (20 micro-g)^2 / 30, G = 7: sqrt(1.5 v / G sqrt(1/3)) rad is 0.265 arcsec; v has 39 * 29
+    # degrees of freedom, which makes 2 % of it, and is written with two digits.
+    assert float(told[1]) == pytest.approx(0.265, rel=0.08)
 
 
 def test_a_stated_squareness_that_the_residuals_contradict_is_told() -> None:

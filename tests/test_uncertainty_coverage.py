@@ -84,9 +84,14 @@ def coverage(
     )
 
 
-def within(found: Coverage) -> bool:
+PERFECT_MOST = 0.98
+"""A variance that is zero comes out above zero in half of the units and never below: on the safe
+side, for noise, repeatability, squareness and thermal model together."""
+
+
+def within(found: Coverage, most: float = 0.97) -> bool:
     """93 to 97 %, each. Values of one unit hang together, so it is like 500 to 1000 draws: 1 %."""
-    return all(0.93 <= share <= 0.97 for share in (found.constants, found.components, found.length))
+    return all(0.93 <= share <= most for share in (found.constants, found.components, found.length))
 
 
 def test_intervals_of_500_units_hold_the_truth() -> None:
@@ -101,14 +106,28 @@ def test_intervals_of_500_units_hold_the_truth() -> None:
         (STATED, RIG, True),
         (TILTER_FROM_RESIDUALS, RIG, False),
         (StatedUncertainty(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), Imperfections(), False),
+        (StatedUncertainty(None, None, 0.0, 0.0, 0.0, 0.0), Imperfections(), False),
+        # As large as what the residuals of 30 readings a dwell can just show.
+        (
+            StatedUncertainty(None, None, 0.0, 0.0, 0.0, 0.0),
+            Imperfections(squareness_sd_arcsec=0.4),
+            False,
+        ),
     ],
-    ids=["model chosen by auto", "tilter from the residuals", "noise alone"],
+    ids=[
+        "model chosen by auto",
+        "tilter from the residuals",
+        "noise alone",
+        "a perfect tilter from the residuals",
+        "a tilter that the residuals just show",
+    ],
 )
 def test_intervals_of_1000_units_hold_the_truth(
     stated: StatedUncertainty, imperfections: Imperfections, auto: bool
 ) -> None:
     found = coverage(1000, stated, imperfections, auto=auto)
-    assert within(found), found
+    perfect = imperfections == Imperfections()
+    assert within(found, PERFECT_MOST if perfect else 0.97), found
 
 
 @pytest.mark.slow

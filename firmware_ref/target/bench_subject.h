@@ -21,19 +21,30 @@ extern const triax_gyro_calib_t TRIAX_GYRO_CALIB;
 #include "triax_comp.h"
 typedef triax_state_t subject_state_t;
 typedef triax_calib_t subject_calib_t;
+#if defined(TRIAX_RATE_Q)
+#define subject_set_temperature triax_set_temperature_rate
+#else
 #define subject_set_temperature triax_set_temperature
+#endif
 #define subject_apply triax_apply
 extern const triax_calib_t TRIAX_CALIB;
 #define SUBJECT_CALIB (&TRIAX_CALIB)
 #endif
 
-/* A gyro takes the specific force besides. */
-#if defined(BENCH_GYRO)
-#define SUBJECT_FORCE_PARAMETER const int32_t force[3],
-#define SUBJECT_FORCE(f) (f),
+/* What a routine is given besides: dT/dt after the temperature, the force after the raw codes. */
+#if defined(TRIAX_RATE_Q)
+#define RATE_PARAMETER , int32_t rate
+#define RATE_ARGUMENT(rate) , (rate)
 #else
-#define SUBJECT_FORCE_PARAMETER
-#define SUBJECT_FORCE(f)
+#define RATE_PARAMETER
+#define RATE_ARGUMENT(rate)
+#endif
+#if defined(BENCH_GYRO)
+#define FORCE_PARAMETER const int32_t force[3],
+#define FORCE_ARGUMENT(force) (force),
+#else
+#define FORCE_PARAMETER
+#define FORCE_ARGUMENT(force)
 #endif
 
 #endif

@@ -78,9 +78,3 @@ def test_a_unit_without_a_recording_is_told(tmp_path: Path) -> None:
     )
     with pytest.raises(RefusedError, match=r"no table \[recording\]"):
         run("poses", str(folder))
-
-
-def test_a_certificate_of_a_recording_is_refused(tmp_path: Path) -> None:
-    folder = write_unit(tmp_path / "U", log(directions(12)), more='[certificate]\ncity = "Kyiv"\n')
-    with pytest.raises(RefusedError, match=r"certificate: given with \[recording\]"):
-        run("poses", str(folder))

@@ -25,6 +25,7 @@ from triaxcal.codegen.render import Provenance, render_constants, render_routine
 from triaxcal.errors import RefusedError
 from triaxcal.resources import shipped
 from triaxcal.targets import bench_table, cores, counting, matrix
+from triaxcal.targets.bench import Subject, _write_subject, cost_of
 from triaxcal.targets.build import TargetError, Toolset, build, emulate
 from triaxcal.targets.counting import build_plugin, measure
 from triaxcal.targets.matrix import (
@@ -37,7 +38,14 @@ from triaxcal.targets.matrix import (
     compare,
     run_builds,
 )
-from triaxcal.targets.shapes import CUBIC, Case, shipped_cases, unit_case
+from triaxcal.targets.shapes import (
+    CUBIC,
+    GYRO,
+    RATE_ALONE,
+    Case,
+    shipped_cases,
+    unit_case,
+)
 from triaxcal.targets.table import counts, matrix_table
 from triaxcal.targets.vectors import VECTORS, draw, expected_lines, raw_boundaries, vectors
 
@@ -190,10 +198,16 @@ def test_program_that_does_not_build_is_a_failure() -> None:
     assert "#error broken" in outcome.detail
 
 
+def test_thumb2_on_a_core_without_it_is_refused_by_name() -> None:
+    m0 = next(core for core in cores.CORES if core.no_long_multiply)
+    need(*m0.tools("gcc"))
+    outcome = run_builds([Build(case_named(CUBIC), Toolset(m0, "gcc", "-O2", THUMB2))])[0]
+    assert outcome.status == FAILED
+    assert "TRIAX_THUMB2 needs a core with Thumb-2 (Cortex-M3, M4, M7, M33)" in outcome.detail
+
+
 def known_program(tmp_path: Path, rounds: str) -> Path:
     """The benchmark program of the cubic with other loops than `counting.LOOP_ROUNDS`."""
-    from triaxcal.targets.bench import Subject, _write_subject
-
     sources, include, _ = _write_subject(Subject(case_named(CUBIC), 0, ""), tmp_path / "work")
     target = FIRMWARE / "target"
     main = tmp_path / "bench_main.c"
@@ -215,6 +229,24 @@ def test_counter_counts_known_loops_or_refuses(tmp_path: Path) -> None:
     with pytest.raises(TargetError, match=r"were counted as \[3, 21, 201, 2003\]"):
         measure(M3, known_program(tmp_path / "wrong", "{1, 10, 100, 1001}"), plugin)
     assert counting.LOOP_ROUNDS == (1, 10, 100, 1000)
+
+
+def test_rates_and_forces_are_given_and_counted(tmp_path: Path) -> None:
+    need(*M3.tools("gcc"))
+    plugin = build_plugin(tmp_path)
+    costs = {
+        name: cost_of(Subject(case_named(name), 0, ""), M3, tmp_path / str(i), plugin)
+        for i, name in enumerate((CUBIC, RATE_ALONE, GYRO))
+    }
+    assert [c.failure for c in costs.values()] == ["", "", ""]
+    counts = {name: c.counts for name, c in costs.items() if c.counts}
+    # Three multiplications of a rate; nine of a force, each with its load.
+    assert counts[RATE_ALONE].set.least > counts[CUBIC].set.most + 3
+    assert counts[RATE_ALONE].apply == counts[CUBIC].apply
+    assert counts[GYRO].apply.least > counts[CUBIC].apply.most + 18
+    flash = {name: c.flash for name, c in costs.items() if c.flash}
+    assert flash[RATE_ALONE].tables == flash[CUBIC].tables + 4 * 6
+    assert flash[GYRO].tables == flash[CUBIC].tables + 4 * 9
 
 
 def test_a_program_that_fails_is_reported(tmp_path: Path) -> None:

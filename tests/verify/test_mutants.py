@@ -10,8 +10,9 @@ from triaxcal.verify import mutation
 from triaxcal.verify.c_mutants import mutants_of
 from triaxcal.verify.c_tokens import tokens_of
 from triaxcal.verify.mutation import KILLED, STILLBORN, SURVIVED, Bench, Equivalent
-from triaxcal.verify.shapes import SHAPES, Subject
+from triaxcal.verify.shapes import ALL_SHAPES, SHAPES, Subject, subject
 from triaxcal.verify.workspace import ROUTINE, Workspace
+from verify.conftest import UNITS
 
 SOURCE = """#define LIMIT INT64_C(40) /* 41 */
 static int32_t half(int32_t c[2][3], uint32_t i, uint32_t j)
@@ -96,7 +97,7 @@ def test_an_equivalent_covers_its_line_only() -> None:
 def test_every_equivalent_has_a_reason_and_known_shapes() -> None:
     for entry in mutation.read_equivalents():
         assert len(entry.reason) > 40
-        assert set(entry.shapes) <= set(SHAPES)
+        assert set(entry.shapes) <= set(ALL_SHAPES)
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +132,45 @@ def fate(bench: Bench, folder: Path, old: str, new: str) -> str:
 )
 def test_fates(bench: Bench, tmp_path: Path, old: str, new: str, expected: str) -> None:
     assert fate(bench, tmp_path, old, new) == expected
+
+
+@pytest.mark.parametrize(
+    ("shape", "faults"),
+    [
+        ("rate", [
+            ("status = TRIAX_STATUS_RATE_RANGE;", ";"),
+            ("if (rate < calib->rate_min_code) {", "if (rate <= calib->rate_min_code) {"),
+            ("INT64_C(2147483648)", "INT64_C(2147483649)"),
+            ("INT64_C(2147483648)", "INT64_C(2147483647)"),
+        ]),
+        ("gyro", [
+            ("(int64_t)k[2] * force[2]", "(int64_t)k[2] * force[1]"),
+            ("sensitivity_sum(state->sensitivity[1], force)",
+             "sensitivity_sum(state->sensitivity[2], force)"),
+            ("INT64_C(536870912)", "INT64_C(536870913)"),
+        ]),
+    ],
+)  # fmt: skip
+def test_rates_and_forces_are_varied(
+    tmp_path: Path, shape: str, faults: list[tuple[str, str]]
+) -> None:
+    made = subject(shape, UNITS)
+    bench = Bench(Workspace.create(tmp_path, made.files, made.plan, made.bound), shape)
+    source = (tmp_path / bench.work.named(ROUTINE)).read_text()
+    for old, _ in faults:
+        assert old in source, old
+    planted = [
+        mutation.Mutant("planted", 0, old, new, source.replace(old, new, 1)) for old, new in faults
+    ]
+    verdicts = mutation.judge_all(bench, planted, ROUTINE)
+    assert [v.fate for v in verdicts] == [KILLED] * len(faults)
+
+
+def test_an_equivalent_is_known_by_a_gyros_names() -> None:
+    entry = Equivalent("triax_apply", "accel[0] = x;", ("accel[0] = y;",), "a reason")
+    mutant = mutation.Mutant("triax_gyro_apply", 1, "rate[0] = x;", "rate[0] = y;", "")
+    assert entry.covers(mutant, "gyro")
+    assert not entry.covers(mutant, "rate")
 
 
 @pytest.mark.slow

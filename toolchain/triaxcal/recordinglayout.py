@@ -1,7 +1,8 @@
 """[recording] in unit.toml: what the columns of somebody's recording are.
 
-A recording is either rows of samples, in which the poses have to be found, or rows of poses, each
-the mean of one. Presets name the layouts of published recordings; keys of the table override them.
+A recording is rows of samples, in which the poses have to be found, or rows of poses, each the
+mean of one, or sections: stretches of samples with one label, each a pose. Presets name the layouts
+of published recordings; keys of the table override them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from types import MappingProxyType
 from triaxcal.errors import RefusedError
 from triaxcal.tomltable import Table, shown
 
-SAMPLES, POSES = "samples", "poses"
+SAMPLES, POSES, SECTIONS = "samples", "poses", "sections"
 ACCELERATION_UNITS: Mapping[str, float | None] = MappingProxyType(
     {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3, "count": None, "V": None, "mV": None}
 )
@@ -123,7 +124,7 @@ class RecordingLayout:
     file : str
         Name of the file, in the unit's folder or below it.
     rows : str
-        "samples" or "poses".
+        "samples", "poses" or "sections".
     delimiter : str or None
         None finds it.
     header : bool or None
@@ -195,19 +196,23 @@ def recording_layout(table: Table) -> RecordingLayout | None:
 
 
 def _layout(table: Table) -> RecordingLayout:
-    rows = _word(table, "rows", (SAMPLES, POSES))
+    rows = _word(table, "rows", (SAMPLES, POSES, SECTIONS))
     angles = _angles(table)
     time = _column(table, "time") if "time" in table else None
     rate = table.number("sample_rate_hz", 1e-3, 1e6) if "sample_rate_hz" in table else None
-    if rows == SAMPLES and time is None and rate is None:
+    if rows == SAMPLES and "faces" not in table and time is None and rate is None:
         raise RefusedError(
             table.where("time"), "missing", expected="a time column, or sample_rate_hz"
+        )
+    if rows == SECTIONS and "section" not in table:
+        raise RefusedError(
+            table.where("section"), "missing", expected="the column that numbers or names the poses"
         )
     if angles is not None and rows == SAMPLES:
         raise RefusedError(
             table.where(ANGLE_NAMES[angles.kind][0]),
             "angles with rows of samples",
-            expected='rows = "poses", one row a pose',
+            expected='rows = "poses", one row a pose, or "sections"',
         )
     section = _column(table, "section") if "section" in table else None
     if "faces" in table and section is None:

@@ -53,12 +53,34 @@ def read_toml(path: Path) -> dict[str, object]:
     RefusedError
         When the file cannot be read, is not UTF-8, or is not TOML.
     """
+    return _document(path, _content(path))
+
+
+def has_table(path: Path, name: str) -> bool:
+    """Whether the top level of a TOML file has the key `name`, a word.
+
+    Raises
+    ------
+    RefusedError
+        As `read_toml`; a file without the letters of `name` is not parsed.
+    """
+    # Most files have none of the tables that are asked for: a thousand parses are saved.
+    content = _content(path)
+    return name.encode() in content and name in _document(path, content)
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RefusedError(str(path), f"cannot be read: {error.strerror}") from error
+
+
+def _document(path: Path, content: bytes) -> dict[str, object]:
     where = str(path)
     try:
         # utf-8-sig: editors that write a byte order mark are common, and it is harmless.
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise RefusedError(where, f"cannot be read: {error.strerror}") from error
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise RefusedError(
             where, f"byte {error.start} is not UTF-8", remedy="save the file as UTF-8"

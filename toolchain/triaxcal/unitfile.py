@@ -11,7 +11,7 @@ from triaxcal.certificate import CERTIFICATE_KEYS, CertificateDetails, certifica
 from triaxcal.errors import RefusedError
 from triaxcal.measured import MEASURED_KEYS, Measured, measured_details
 from triaxcal.recordinglayout import DEFAULT_LSB, KEYS, RecordingLayout, recording_layout
-from triaxcal.tomltable import Layout, Table, read_tables, read_toml, shown
+from triaxcal.tomltable import Layout, Table, has_table, read_tables, read_toml, shown
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
 OUTPUT_Q_RANGE = (8, 30)
@@ -212,7 +212,7 @@ def read_unit(folder: Path) -> UnitDescription:
         unit beside it has the same serial number.
     """
     path = find_unit(folder)
-    recorded = "recording" in read_toml(path)
+    recorded = has_table(path, "recording")
     tables = read_tables(path, _OF_RECORDING if recorded else _LAYOUT, FORMAT)
     unit = _unit_from_tables(folder.absolute().name, tables)
     _refuse_duplicate_serial(folder, unit.serial)
@@ -285,13 +285,6 @@ def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
     )
     gravity_m_per_s2 = site.number("local_gravity_m_per_s2", 9.7, 9.9)
     recording = recording_layout(tables["recording"])
-    if recording is not None and tables["certificate"].values:
-        raise RefusedError(
-            f"{tables[''].file}, certificate",
-            "given with [recording]",
-            expected="a certificate of a tilter's measurements only",
-            remedy="remove one of the two tables",
-        )
     limits_g = (3e-4, 10e-4) if recording is None else (RECORDING_LIMIT_G, RECORDING_LIMIT_G)
     return UnitDescription(
         name=name,

@@ -8,6 +8,16 @@
  */
 #include "triax_comp.h"
 
+#if (TRIAX_ARITHMETIC == TRIAX_THUMB2) && !defined(__thumb2__)
+#error "TRIAX_THUMB2 needs a core with Thumb-2 (Cortex-M3, M4, M7, M33): use TRIAX_THUMB1 or TRIAX_LIMBS"
+#endif
+#if (TRIAX_ARITHMETIC == TRIAX_THUMB1) && !defined(__thumb__)
+#error "TRIAX_THUMB1 needs a core with Thumb (Cortex-M0, M0+, M1): use TRIAX_LIMBS"
+#endif
+#if (TRIAX_ARITHMETIC < TRIAX_PORTABLE) || (TRIAX_ARITHMETIC > TRIAX_THUMB1)
+#error "TRIAX_ARITHMETIC is none of TRIAX_PORTABLE, TRIAX_LIMBS, TRIAX_THUMB2, TRIAX_THUMB1"
+#endif
+
 /* |n_i0| + |n_i1| + |n_i2| + 2 |b_i| stays below this, so that no sum leaves its type. */
 #define ROW_LIMIT INT64_C(3221225472)
 

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import importlib
 import socket
+from collections import deque
 from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlsplit
 
-from triaxcal.batch.order import Make, Order, Outcome, refused
+from triaxcal.batch.order import Make, Order, Outcome, filled, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.errors import RefusedError
+
+UNDER_WAY = 3
+"""Units sent for each thread of the workers: none waits for us, and few are in memory."""
 
 CONNECT_S = 10
 """Patience with a scheduler that does not answer."""
@@ -53,24 +57,37 @@ def workers(client: Any) -> int:
 def run_cluster(client: Any, make: Make, orders: list[Order]) -> Iterator[Outcome]:
     """Outcomes of all orders as they come; the scheduler redoes the units of a dead worker."""
     distributed = _distributed()
-    by_key = {f"triaxcal-{order.name}-{order.key[:16]}": order for order in orders}
-    futures = client.map(make, list(by_key.values()), key=list(by_key), pure=False)
-    for future in distributed.as_completed(futures):
-        order = by_key[future.key]
-        try:
-            outcome: Outcome = future.result()
-        except distributed.KilledWorker:
-            outcome = refused(
-                order, f"{order.folder}: the workers died on it; is there memory enough?"
-            )
-        except (distributed.CancelledError, OSError) as error:
-            raise RefusedError(
-                "--scheduler",
-                f"the cluster was lost ({type(error).__name__})",
-                remedy="run again when it is back: units that were made are kept",
-            ) from error
-        future.release()
-        yield outcome
+    waiting, results = deque(orders), distributed.as_completed()
+    under_way: dict[str, Order] = {}
+    try:
+        while waiting or under_way:
+            if waiting and len(under_way) < UNDER_WAY * max(1, workers(client)):
+                order = waiting.popleft()
+                try:
+                    content = filled(order)
+                except RefusedError as refusal:
+                    yield refused(order, refusal)
+                    continue
+                key = f"triaxcal-{order.name}-{order.key[:16]}"
+                under_way[key] = order
+                results.add(client.submit(make, content, key=key, pure=False))
+                continue
+            future = next(results)
+            order = under_way.pop(future.key)
+            try:
+                outcome: Outcome = future.result()
+            except distributed.KilledWorker:
+                outcome = refused(
+                    order, f"{order.folder}: the workers died on it; is there memory enough?"
+                )
+            future.release()
+            yield outcome
+    except (distributed.CancelledError, OSError) as error:
+        raise RefusedError(
+            "--scheduler",
+            f"the cluster was lost ({type(error).__name__})",
+            remedy="run again when it is back: units that were made are kept",
+        ) from error
 
 
 def _refuse_silence(address: str) -> None:

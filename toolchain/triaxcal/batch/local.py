@@ -13,15 +13,19 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context
 
-from triaxcal.batch.order import Make, Order, Outcome, refused
+from triaxcal.batch.order import Make, Order, Outcome, filled, refused
+from triaxcal.errors import RefusedError
 
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """A worker is a core's worth: libraries that would start threads of their own are told so."""
+_OF_THE_TERMINAL = {signal.SIGINT, signal.SIGHUP}
+"""Signals that a terminal sends to the workers as well."""
 
 
 def cores() -> int:
@@ -29,13 +33,21 @@ def cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def run_local(make: Make, orders: list[Order], jobs: int) -> Iterator[Outcome]:
+def run_local(
+    make: Make,
+    orders: list[Order],
+    jobs: int,
+    finishing: Callable[[int], None] = lambda _: None,
+) -> Iterator[Outcome]:
     """Outcomes of all orders as they come, on `jobs` processes.
 
-    At an interrupt the units under way are finished and given before it is raised.
+    At an interrupt `finishing` is told how many units are under way; they are finished and given
+    before it is raised. A second interrupt ends the workers.
     """
     waiting, suspects = deque(orders), deque[Order]()
-    with tempfile.TemporaryDirectory(prefix="triaxcal-batch-") as scratch:
+    with tempfile.TemporaryDirectory(
+        prefix="triaxcal-batch-", ignore_cleanup_errors=True
+    ) as scratch:
         before = {name: os.environ.get(name) for name in _ONE_THREAD}
         os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
         try:
@@ -43,7 +55,9 @@ def run_local(make: Make, orders: list[Order], jobs: int) -> Iterator[Outcome]:
                 if suspects:
                     yield from _alone(make, suspects, scratch)
                 else:
-                    yield from _together(make, waiting, suspects, jobs, scratch)
+                    yield from _together(
+                        make, waiting, suspects, jobs, scratch, finishing=finishing
+                    )
         finally:
             for name, value in before.items():
                 if value is None:
@@ -53,7 +67,13 @@ def run_local(make: Make, orders: list[Order], jobs: int) -> Iterator[Outcome]:
 
 
 def _together(
-    make: Make, waiting: deque[Order], suspects: deque[Order], jobs: int, scratch: str
+    make: Make,
+    waiting: deque[Order],
+    suspects: deque[Order],
+    jobs: int,
+    scratch: str,
+    *,
+    finishing: Callable[[int], None],
 ) -> Iterator[Outcome]:
     """Make the waiting; when a worker dies, those under way become suspects."""
     under_way: dict[Future[Outcome], Order] = {}
@@ -61,7 +81,8 @@ def _together(
         try:
             while waiting or under_way:
                 while waiting and len(under_way) < jobs:
-                    under_way[pool.submit(make, waiting[0])] = waiting[0]
+                    with _uninterrupted():
+                        under_way[_sent(pool, make, waiting[0])] = waiting[0]
                     waiting.popleft()
                 done, _ = wait(under_way, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -70,8 +91,16 @@ def _together(
                     yield outcome
         except KeyboardInterrupt:
             # Seconds of waiting keep what is nearly done; a second interrupt does not wait.
-            for future in list(under_way):
-                yield future.result()
+            try:
+                finishing(len(under_way))
+                for future in list(under_way):
+                    yield future.result()
+            except BrokenProcessPool:
+                pass  # the next run makes them
+            except KeyboardInterrupt:
+                for worker in active_children():
+                    worker.terminate()
+                raise
             raise
         except BrokenProcessPool:
             for future, order in under_way.items():
@@ -85,13 +114,24 @@ def _alone(make: Make, suspects: deque[Order], scratch: str) -> Iterator[Outcome
     order = suspects.popleft()
     with _pool(1, scratch) as pool:
         try:
-            yield pool.submit(make, order).result()
+            with _uninterrupted():
+                future = _sent(pool, make, order)
+            yield future.result()
         except BrokenProcessPool:
             yield refused(
                 order,
                 f"{order.folder}: the worker process died on it twice; is there memory enough? "
                 "run again with fewer --jobs",
             )
+
+
+def _sent(pool: ProcessPoolExecutor, make: Make, order: Order) -> Future[Outcome]:
+    try:
+        return pool.submit(make, filled(order))
+    except RefusedError as refusal:
+        future: Future[Outcome] = Future()
+        future.set_result(refused(order, refusal))
+        return future
 
 
 def _pool(jobs: int, scratch: str) -> ProcessPoolExecutor:
@@ -101,10 +141,28 @@ def _pool(jobs: int, scratch: str) -> ProcessPoolExecutor:
     )
 
 
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Interrupts wait; in a worker that starts meanwhile, until `_start` ignores them."""
+    came: list[int] = []
+    # The mask is what a worker inherits; here, threads of libraries take signals in spite of it.
+    handlers = {n: signal.signal(n, lambda n, _: came.append(n)) for n in _OF_THE_TERMINAL}
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _OF_THE_TERMINAL)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for name, handler in handlers.items():
+            signal.signal(name, handler)
+        if came:
+            raise KeyboardInterrupt
+
+
 def _start(scratch: str) -> None:
     """Leave interrupts to the parent, and litter to its folder."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    for name in _OF_THE_TERMINAL:
+        signal.signal(name, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _OF_THE_TERMINAL)
     tempfile.tempdir = scratch
     threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from triaxcal.batch import journal
-from triaxcal.batch.order import Order, Outcome, refused
+from triaxcal.batch.order import Order, Outcome, planned, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.errors import RefusedError
 from triaxcal.recordinglayout import is_in_folder
 from triaxcal.records import MEASUREMENTS_FILE
-from triaxcal.tomltable import read_toml
+from triaxcal.tomltable import has_table, read_toml
 from triaxcal.unitfile import UNIT_FILE, find_unit, list_units
 
 
@@ -55,18 +54,19 @@ def plan_work(folders: Iterable[Path], build: Path) -> Work:
         When no unit is named, or the journal cannot be read.
     """
     named = sorted(dict.fromkeys(folders))
-    reasons = {path: _not_of_a_series(path) for path in named}
-    units = [path for path, reason in reasons.items() if not reason]
-    skipped = [(path, reason) for path, reason in reasons.items() if reason]
-    if not units:
-        raise RefusedError("batch", "no units named", remedy="say triaxcal batch units/*")
     before, by = journal.read_journal(build), toolchain()
-    orders, failed = [], []
-    for folder in units:
+    orders, failed, skipped = [], [], []
+    for path in named:
         try:
-            orders.append(_order(folder, by))
+            reason = _not_of_a_series(path)
+            if reason:
+                skipped.append((path, reason))
+            else:
+                orders.append(_order(path, by))
         except RefusedError as refusal:
-            failed.append(Outcome(folder.absolute().name, "", str(refusal)))
+            failed.append(Outcome(path.absolute().name, "", str(refusal)))
+    if not orders and not failed:
+        raise RefusedError("batch", "no units named", remedy="say triaxcal batch units/*")
     clashes = _clashes(orders, before)
     failed += [refused(o, clashes[o.folder]) for o in orders if o.folder in clashes]
     orders = [o for o in orders if o.folder not in clashes]
@@ -82,44 +82,24 @@ def _not_of_a_series(path: Path) -> str:
     if path.is_file():
         return "a file, not a unit's folder"
     description = path / UNIT_FILE
-    if description.is_file() and _has_table(description, "dynamic"):
+    if description.is_file() and has_table(description, "dynamic"):
         return "an IMU, which triaxcal dynamic calibrates"
     return ""
 
 
 def _order(folder: Path, by: str) -> Order:
-    path = find_unit(folder)
-    inputs = {UNIT_FILE: _content(path)}
-    recorded = _recorded(path)
-    if is_in_folder(recorded):  # another is refused when the unit is made
-        inputs[recorded] = _content(folder / recorded)
-    digest = hashlib.sha256(by.encode())
-    digest.update(folder.absolute().name.encode())
-    for content in inputs.values():
-        digest.update(hashlib.sha256(content).digest())
-    return Order(folder.absolute().name, str(folder), digest.hexdigest(), by, inputs)
+    recorded = _recorded(find_unit(folder))
+    # A recording that lies elsewhere is refused when the unit is made.
+    files = (UNIT_FILE, recorded) if is_in_folder(recorded) else (UNIT_FILE,)
+    return planned(folder, by, files)
 
 
 def _recorded(path: Path) -> str:
     """Name of what was measured: measurements.csv, or the file of [recording]."""
-    if not _has_table(path, "recording"):
+    if not has_table(path, "recording"):
         return MEASUREMENTS_FILE
     recording = read_toml(path)["recording"]
     return str(recording.get("file", "")) if isinstance(recording, dict) else ""
-
-
-def _has_table(path: Path, name: str) -> bool:
-    # Most units have none of these tables: a thousand parses are saved.
-    return name.encode() in _content(path) and name in read_toml(path)
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise RefusedError(
-            str(path), f"cannot be read: {(error.strerror or str(error)).lower()}"
-        ) from error
 
 
 def _clashes(orders: list[Order], before: dict[str, dict[str, Any]]) -> dict[str, RefusedError]:

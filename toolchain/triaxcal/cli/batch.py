@@ -77,9 +77,14 @@ def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str
 
 def _local(jobs: int) -> Runner:
     def runner(make: Make, orders: list[Order]) -> Iterator[Outcome]:
-        return run_local(make, orders, jobs)
+        return run_local(make, orders, jobs, _tell_finishing)
 
     return runner
+
+
+def _tell_finishing(count: int) -> None:
+    units = "1 unit" if count == 1 else f"{count} units"
+    click.echo(f"interrupted: finishing {units} under way; once more to leave at once", err=True)
 
 
 def _run(work: Work, build: Path, runner: Runner) -> Series:

@@ -34,9 +34,14 @@ def history(unit: Path) -> None:
     )
 
 
-def warn_of_contradiction(folder: Path, delivery: Delivery) -> None:
-    """Tell when the calibration just made contradicts the last one in the unit's history."""
+def warning_of_contradiction(folder: Path, delivery: Delivery) -> str:
+    """What to tell when a calibration contradicts the last one in the unit's history; else empty.
+
+    Raises
+    ------
+    RefusedError
+        When the last one cannot be calibrated.
+    """
     newest = Calibrated("now", None, delivery.measurements, delivery.calibration)
     change = latest_change(folder, delivery.unit, newest)
-    if change is not None and change.contradicts:
-        click.echo(contradiction(change), err=True)
+    return contradiction(change) if change is not None and change.contradicts else ""

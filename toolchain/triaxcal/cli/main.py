@@ -53,10 +53,10 @@ def calib(unit: Path, build: Path) -> None:
 
     A unit whose unit.toml has [dynamic] is an IMU: the same as `triaxcal dynamic`.
     """
-    from triaxcal.tomltable import read_toml  # noqa: PLC0415
+    from triaxcal.tomltable import has_table  # noqa: PLC0415
     from triaxcal.unitfile import find_unit  # noqa: PLC0415
 
-    if "dynamic" in read_toml(find_unit(unit)):
+    if has_table(find_unit(unit), "dynamic"):
         from triaxcal.cli.dynamic import calibrate_imu  # noqa: PLC0415
 
         calibrate_imu(unit, build)
@@ -68,15 +68,18 @@ def calib(unit: Path, build: Path) -> None:
     from triaxcal.report.summary import summary  # noqa: PLC0415
 
     delivery = deliver(unit)
+    warning = ""
+    if (unit / "history").is_dir():
+        from triaxcal.cli.history import warning_of_contradiction  # noqa: PLC0415
+
+        warning = warning_of_contradiction(unit, delivery)
     made = passport(delivery, {})
     files = all_files(delivery, made)
     target = build / delivery.unit.name
     publish(files, target, SOMETIMES)
     click.echo(summary(made, files, str(target)))
-    if (unit / "history").is_dir():
-        from triaxcal.cli.history import warn_of_contradiction  # noqa: PLC0415
-
-        warn_of_contradiction(unit, delivery)
+    if warning:
+        click.echo(warning, err=True)
 
 
 @main.command()

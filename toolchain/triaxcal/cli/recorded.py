@@ -21,8 +21,16 @@ def recorded(folder: Path) -> tuple[RecordingLayout, Samples]:
         When the unit has none, or it cannot be read.
     """
     from triaxcal.recording.samples import read_samples  # noqa: PLC0415
-    from triaxcal.unitfile import read_unit  # noqa: PLC0415
+    from triaxcal.tomltable import read_toml  # noqa: PLC0415
+    from triaxcal.unitfile import find_unit, read_unit  # noqa: PLC0415
 
+    if "dynamic" in read_toml(find_unit(folder)):
+        raise RefusedError(
+            f"{folder}/unit.toml",
+            "a whole IMU on a turntable, [dynamic]",
+            expected="a unit with a table [recording]",
+            remedy=f"`triaxcal dynamic {folder}` calibrates it",
+        )
     unit = read_unit(folder)
     if unit.recording is None:
         raise RefusedError(

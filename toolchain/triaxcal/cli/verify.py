@@ -24,9 +24,11 @@ def verify(unit: Path, build: Path) -> None:
     UNIT is calibrated as by `calib`; the results go into its verification.json. Exit code 1 when
     a check failed; tools that are not installed are named, and their checks count as not done.
     """
-    from triaxcal.dynamic.description import is_dynamic  # noqa: PLC0415  numpy only when needed
+    from triaxcal.tomltable import has_table  # noqa: PLC0415
+    from triaxcal.unitfile import find_unit  # noqa: PLC0415
 
-    target, code = (_verify_imu if is_dynamic(unit) else _verify_accelerometer)(unit, build)
+    run = _verify_imu if has_table(find_unit(unit), "dynamic") else _verify_accelerometer
+    target, code = run(unit, build)
     click.echo(f"\nresults in {target / 'verification.json'}; what they mean: docs/verification.md")
     sys.exit(code)
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from triaxcal.codegen.image import QUADRATIC, RATE, SENSITIVITY, header_names, terms_word
 from triaxcal.codegen.inverse_edges import inverse_edges
+from triaxcal.codegen.rate_ties import rate_ties
 from triaxcal.codegen.routines import Generated, Reference
 from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.integer_model import STATUS_BAD_IMAGE, STATUS_OK
@@ -183,7 +184,7 @@ def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
     changes = itertools.chain(
         _temperature_edges(layout, words), _coefficient_edges(layout, words),
         _row_edges(layout), _wild(layout, words), _inverse_edges(layout, plan), _term_edges(layout),
-        _rate_edges(layout, words),
+        _rate_edges(layout, words), rate_ties(layout, shape),
     )  # fmt: skip
     for name, change in changes:
         if not all(INT32_MIN <= value <= INT32_MAX for value in change.values()):

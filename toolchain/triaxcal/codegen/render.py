@@ -195,15 +195,17 @@ def assembly(shape: Shape) -> dict[str, int]:
     """Which assembly there is for a shape, and its shifts; 0 for none.
 
     Keys: `thumb2` and `thumb1`, whether `triax_apply` has that form (with a state of its own), for
-    `thumb1` the number of limbs of a gain; `evaluate`, whether the thermal functions have one too;
-    `in_sum`, bits of the final shift that the assembly for Thumb-2 gets for nothing, because it
-    shifts the raw codes by so many less.
+    `thumb1` the number of limbs of a gain; `evaluate2` and `evaluate1`, whether the thermal
+    functions have one too (that of Thumb-2 stores the offset shifted, to which nothing can be added
+    after); `in_sum`, bits of the final shift that the assembly for Thumb-2 gets for nothing,
+    because it shifts the raw codes by so many less.
     """
     thumb2 = int(not shape.saturates and not shape.adds_to_sums)
     return {
         "thumb2": thumb2,
         "thumb1": 2 if limb_split(shape) else 3 * thumb2,
-        "evaluate": int(shape.order > 0 and shape.inverse is None and not shape.rate),
+        "evaluate2": int(shape.order > 0 and shape.inverse is None and not shape.rate),
+        "evaluate1": int(shape.order > 0 and shape.inverse is None),
         "in_sum": min(shape.raw_shift, shape.output_shift - 32) if thumb2 else 0,
     }
 
@@ -215,8 +217,8 @@ def forms_using(shape: Shape) -> dict[str, str]:
     """
     given = assembly(shape)
     limbs, order = limb_split(shape) > 0, shape.order > 0
-    in_asm_2 = bool(given["thumb2"]) and bool(given["evaluate"])
-    in_asm_1 = bool(given["thumb1"]) and bool(given["evaluate"])
+    in_asm_2 = bool(given["thumb2"]) and bool(given["evaluate2"])
+    in_asm_1 = bool(given["thumb1"]) and bool(given["evaluate1"])
     plain_apply = not shape.saturates and not shape.adds_to_sums
     in_every_high_word = bool(shape.adds_to_sums or shape.rate)
     in_every_asr32 = bool(shape.adds_to_sums) and not shape.saturates
@@ -234,7 +236,7 @@ def forms_using(shape: Shape) -> dict[str, str]:
             thumb1=plain_apply or order or in_every_asr32,
         ),
         "high_half": _condition(limbs=limbs or order, thumb1=given["thumb1"] == 2 or order),
-        "low_half": _condition(limbs=limbs or order, thumb1=order),
+        "low_half": _condition(limbs=limbs or order, thumb1=given["thumb1"] == 2 or order),
         "int64_horner": _condition(portable=order, thumb2=order and not in_asm_2),
         "limb_horner": _condition(limbs=order, thumb1=order),
         "short_horner": _condition(limbs=order, thumb1=order and not in_asm_1),
@@ -243,7 +245,9 @@ def forms_using(shape: Shape) -> dict[str, str]:
         "left_justify": _condition(
             portable=True, limbs=not limbs, thumb1=given["thumb1"] != 2, thumb2=not plain_apply
         ),
-        "complete": _condition(thumb2=plain_apply and not in_asm_2, thumb1=plain_apply),
+        "complete": _condition(
+            thumb2=plain_apply and not in_asm_2, thumb1=plain_apply and not in_asm_1
+        ),
     }
 
 

@@ -61,6 +61,10 @@ class Signals:
         m/s^2.
     acceleration : array, shape (n, 3), or None
         Rate of change of the angular rate, rad/s^2, where it is known.
+    jerk : array, shape (n, 3), or None
+        How fast what the accelerometers feel besides gravity changes, m/s^3, where it is known.
+    triad : array, shape (3, 3), or None
+        Rows are the sensitive axes of the accelerometers that the rows are for, 1 + Gamma.
     """
 
     rate: FloatArray
@@ -69,6 +73,8 @@ class Signals:
     delta_degc: FloatArray
     gravity: float
     acceleration: FloatArray | None = None
+    jerk: FloatArray | None = None
+    triad: FloatArray | None = None
 
     @property
     def load(self) -> FloatArray:

@@ -31,6 +31,8 @@ from triaxcal.dynamic.recording import Turntable
 from triaxcal.model.types import BoolArray, FloatArray
 
 TABLE, AXIS = "table-angles", "rotation-axis"
+STEADY_SD = 3.0
+"""A table whose angle drifts within a block by more than so many deviations does not rest."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,22 @@ def table_axes(table: Turntable) -> FloatArray:
     third = up - (up @ along) * along
     third /= np.linalg.norm(third)
     return np.array([along, np.cross(third, along), third])
+
+
+def steady(angle_rad: FloatArray, sd_rad: float) -> BoolArray:
+    """Blocks of readings (b, samples) in which the table's angle stays, shape (b,).
+
+    The gyros call a table still that turns slower than they can tell at the start: in the last
+    tenths of a second before a stop it may turn by 90", and the reading's mean over the block is
+    not its end. The two halves of a block differ by no more than their noise where the table
+    rests, and a block beside one that moves is not believed: it may hold what the test cannot see.
+    """
+    blocks, samples = angle_rad.shape
+    halves = angle_rad[:, : samples // 2 * 2].reshape(blocks, 2, -1).mean(axis=2)
+    drift = np.abs(halves[:, 1] - halves[:, 0])
+    rests = np.pad(drift < STEADY_SD * 2 * sd_rad / math.sqrt(samples), 1, mode="edge")
+    both_sides: BoolArray = rests[:-2] & rests[1:-1] & rests[2:]
+    return both_sides
 
 
 def extra_rows(

@@ -15,7 +15,7 @@ from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT, Turntable
 from triaxcal.dynamic.registry import extensions
 from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
-from triaxcal.tomltable import Layout, Table, read_tables, read_toml
+from triaxcal.tomltable import Layout, Table, has_table, read_tables
 from triaxcal.unitfile import FORMAT, PLAUSIBLE_DEGC, check_unit_name, find_unit
 
 _LAYOUT: Layout = {
@@ -123,11 +123,6 @@ class DynamicDescription:
         return tuple(b for name in self.blocks for b in extensions()[name].blocks)
 
 
-def is_dynamic(folder: Path) -> bool:
-    """Whether the unit in `folder` is calibrated on a turntable: its unit.toml has [dynamic]."""
-    return "dynamic" in read_toml(find_unit(folder))
-
-
 def read_dynamic(folder: Path) -> DynamicDescription:
     """Description of the unit in `folder`.
 
@@ -137,6 +132,13 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         When there is no such unit or its file breaks a rule of docs/file-formats.md.
     """
     path = find_unit(folder)
+    if not has_table(path, "dynamic"):
+        raise RefusedError(
+            str(path),
+            "no table [dynamic]",
+            expected="a whole IMU on a turntable",
+            remedy=f"`triaxcal calib {folder}` calibrates this unit; see docs/dynamic.md",
+        )
     tables = read_tables(path, _LAYOUT, FORMAT)
     top, site, dynamic = tables[""], tables["site"], tables["dynamic"]
     check_unit_name(top.text("serial"), top.where("serial"))

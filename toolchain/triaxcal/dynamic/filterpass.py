@@ -17,7 +17,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from triaxcal.dynamic.attitude import level, rotation_of
-from triaxcal.dynamic.channels import Moments, extra_rows
+from triaxcal.dynamic.channels import Moments, extra_rows, steady
+from triaxcal.dynamic.noise import ARCSEC
 from triaxcal.dynamic.passdata import History, PassResult, Reference, Task
 from triaxcal.dynamic.preintegrate import BlockEquations, equations
 from triaxcal.dynamic.recording import ImuRecording, ImuSamples, joined
@@ -197,11 +198,16 @@ class _Pass:
         still = self.found.still & self.found.use
         resting = still[np.maximum(first, 0)] & still[last]
         angle = samples.table_angle_rad
+        mean = None
+        if angle is not None and self.noise.table_sd_arcsec is not None:
+            by_block = angle[lead + 1 :][: blocks * size].reshape(blocks, size)
+            mean = by_block.mean(axis=1)
+            resting &= steady(by_block, self.noise.table_sd_arcsec * ARCSEC)
         inner = made.C[:-1].swapaxes(1, 2) @ made.C[1:]
         cosine = np.clip((np.trace(inner, axis1=1, axis2=2) - 1) / 2, -1, 1)
         moments = Moments(
             made.C[1:],
-            None if angle is None else angle[lead + 1 :][: blocks * size].reshape(-1, size).mean(1),
+            mean,
             np.arccos(cosine),
             resting,
             use.astype(bool) & ~resting,

@@ -148,19 +148,16 @@ def _trajectory(
     acceleration = np.gradient(mean_rate, spacing_s, axis=0)
     nodes = _points(window, mean_rate, C, degc)
     at = window.lead + frame.block * np.arange(window.blocks + 1)
-    after = np.minimum(at + 1, len(window.rate) - 1)
-    smooth = window.smooth_rate
-    between = (smooth[at] + smooth[after]) / 2
     if frame.force_is_increment:
         q = quaternion_product(q, quaternion_of(-0.5 * turns))
-        edge_rate = between if frame.rate_is_increment else smooth[at]
-        edges = _points(window, edge_rate, C_ends, window.delta_degc[at])
+        edges = _points(window, window.edge_rate(0.0), C_ends, window.delta_degc[at])
         return _Trajectory(q, nodes, _changing(nodes, acceleration), edges)
     half_s = frame.interval_s / 2
-    edge_rate = smooth[after] if frame.rate_is_increment else between
-    later = C_ends @ rotation_of(edge_rate * half_s)
+    edge_rate = window.edge_rate(0.5)
+    later = C_ends @ rotation_of((window.edge_rate(0.0) + edge_rate) / 2 * half_s)
     edges = _points(window, edge_rate, later, window.delta_degc[at])
-    later_nodes = _points(window, mean_rate, C @ rotation_of(mean_rate * half_s), degc)
+    C_later = C @ rotation_of(mean_rate * half_s)
+    later_nodes = _points(window, mean_rate + acceleration * half_s, C_later, degc)
     return _Trajectory(q, nodes, _changing(later_nodes, acceleration), edges)
 
 
@@ -216,20 +213,27 @@ def _force_rows(
     y = _mean_force(window, triad, path.inner)
     y[:, 2] -= window.frame.gravity
     F = np.zeros((window.blocks, 3, len(layout)))
-    signals, C = path.force_nodes.signals, path.force_nodes.C
+    axes = np.linalg.inv(triad.A_inverse).astype(np.float64)
+    signals, C = replace(path.force_nodes.signals, triad=axes), path.force_nodes.C
+    ends = replace(path.edges.signals, triad=axes)
 
     def mean(values: FloatArray) -> FloatArray:
         found: FloatArray = values.reshape(window.blocks, NODES, 3, -1).mean(axis=1)
         return found
 
+    loaded = signals
+    if any(np.any(p[place]) for _, place in layout.columns(triad.edges)):
+        felt, jerk = _felt(window, triad, _Points(signals, C))
+        signals = replace(signals, jerk=jerk)
+        loaded = replace(signals, force=signals.force + felt)
     for block, place in layout.columns(triad.force):
-        F[:, :, place] = mean(C @ triad.A_inverse @ getattr(block, triad.force)(signals))
+        F[:, :, place] = mean(C @ triad.A_inverse @ getattr(block, triad.force)(loaded))
         if block.name not in _EXACT:
             y -= F[:, :, place] @ p[place]
     for block, place in layout.columns(triad.motion):
         F[:, :, place] = mean(C @ getattr(block, triad.motion)(signals))
         if getattr(block, triad.edges) is not None:
-            velocity = path.edges.C @ getattr(block, triad.edges)(path.edges.signals)
+            velocity = path.edges.C @ getattr(block, triad.edges)(ends)
             F[:, :, place] += np.diff(velocity, axis=0) / duration[:, None, None]
         if block.motion_curve is None:
             y -= F[:, :, place] @ p[place]
@@ -237,6 +241,25 @@ def _force_rows(
             error = block.motion_curve(signals, p[place])
             y -= mean(np.einsum("nij,nj->ni", C, error))[:, :, 0]
     return y, F
+
+
+def _felt(window: Window, triad: _Triad, nodes: _Points) -> tuple[FloatArray, FloatArray]:
+    """Force besides gravity, m/s^2, and how fast it changes, m/s^3, on the instrument axes (n, 3).
+
+    By differences between nodes: they enter times a small constant or a delay.
+    """
+    frame, p = window.frame, window.about.p
+    signals, C = nodes.signals, nodes.C
+    velocity, force = np.zeros((2, len(C), 3))
+    for block, place in frame.layout.columns(triad.edges):
+        velocity += getattr(block, triad.edges)(signals) @ p[place]
+        force += getattr(block, triad.motion)(signals) @ p[place]
+    spacing_s = frame.block // NODES * frame.interval_s
+    velocity, rest = np.einsum("nij,knj->kni", C, np.stack([velocity, force]))
+    outside = rest + np.gradient(velocity, spacing_s, axis=0)
+    change = np.gradient(outside, spacing_s, axis=0)
+    felt, jerk = np.einsum("nji,knj->kni", C, np.stack([outside, change]))
+    return felt, jerk - np.cross(signals.turn, felt)
 
 
 def _mean_force(window: Window, triad: _Triad, inner: FloatArray) -> FloatArray:

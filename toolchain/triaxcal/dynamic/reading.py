@@ -246,12 +246,29 @@ def _parquet(path: Path, names: list[str]) -> Callable[[], Iterator[FloatArray]]
         with parquet.ParquetFile(path) as file:
             for batch in file.iter_batches(batch_size=PIECE, columns=names):
                 columns = [
-                    batch.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
+                    _doubles(path, name, batch.column(name).to_numpy(zero_copy_only=False))
                     for name in names
                 ]
                 yield np.column_stack(columns)
 
     return tables
+
+
+def _doubles(path: Path, name: str, values: Any) -> FloatArray:
+    """Numbers of a column; text and dates are refused."""
+    try:
+        if values.dtype.kind not in "biufO":
+            raise ValueError
+        found: FloatArray = values.astype(np.float64)
+    except (ValueError, TypeError) as error:
+        first = values[0] if len(values) else ""
+        raise RefusedError(
+            f"{path}, column {name}",
+            f"holds {values.dtype}, the first is {str(first)[:40]!r}",
+            expected="numbers",
+            remedy="write the column as numbers, or name another",
+        ) from error
+    return found
 
 
 def _hdf5(path: Path, names: list[str]) -> Callable[[], Iterator[FloatArray]]:
@@ -281,7 +298,7 @@ def _hdf5(path: Path, names: list[str]) -> Callable[[], Iterator[FloatArray]]:
     def tables() -> Iterator[FloatArray]:
         with opened() as file:
             for start in range(0, count, PIECE):
-                parts = [file[name][start : start + PIECE].astype(np.float64) for name in names]
+                parts = [_doubles(path, name, file[name][start : start + PIECE]) for name in names]
                 yield np.column_stack(parts)
 
     return tables

@@ -14,8 +14,9 @@ from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.recording import INCREMENT, ImuSamples
 from triaxcal.model.types import FloatArray
 
-_SMOOTH = np.array([-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0]) / 231
-"""Savitzky and Golay's weights for the middle of nine points, cubic."""
+EDGE_S = 0.0225
+EDGE_SAMPLES = (2.0, 5.0)
+"""How far from the end of a block its rate is fitted: enough for a cubic, at most what is there."""
 
 
 @dataclass(frozen=True)
@@ -164,17 +165,27 @@ class Window:
                 rate = (raw - sum(errors)) @ self.inverse_b.T
         return rate
 
-    @cached_property
-    def smooth_rate(self) -> FloatArray:
-        """Rate (n, 3) by a cubic through nine samples: free of most of the noise of counting.
+    def edge_rate(self, later: float) -> FloatArray:
+        """Rate (blocks + 1, 3) at the ends of the blocks, or the part `later` of an interval later.
 
-        A lever arm turns the rate at the ends of a block into a force.
+        A lever arm turns it into a force. By a cubic through the samples around, means of which
+        are taken as means: free of most of the noise of counting.
         """
-        reach = len(_SMOOTH) // 2
-        padded = np.pad(self.rate, ((reach, reach), (0, 0)), mode="edge")
-        n = len(self.rate)
-        smooth: FloatArray = sum(w * padded[k : k + n] for k, w in enumerate(_SMOOTH))
-        return smooth
+        low, high = EDGE_SAMPLES
+        reach = min(max(low, EDGE_S / self.frame.interval_s), high)
+        near = np.arange(-high, high + 2)
+        middle = near - later - (0.5 if self.frame.rate_is_increment else 0.0)
+        near, middle = near[np.abs(middle) <= reach], middle[np.abs(middle) <= reach]
+        power = np.arange(4)
+        powers = middle[:, None] ** power
+        if self.frame.rate_is_increment:
+            after, before = (middle[:, None] + half for half in (0.5, -0.5))
+            powers = (after ** (power + 1) - before ** (power + 1)) / (power + 1)
+        weights = np.linalg.pinv(powers)[0]
+        at = self.lead + self.frame.block * np.arange(self.blocks + 1)
+        samples = np.clip(at[:, None] + near.astype(np.int64), 0, len(self.rate) - 1)
+        fitted: FloatArray = np.einsum("k,nki->ni", weights, self.rate[samples])
+        return fitted
 
     def _force(self) -> FloatArray:
         """Specific force good enough for what the gyros feel of it."""

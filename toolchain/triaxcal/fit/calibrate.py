@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from triaxcal.errors import RefusedError
+from triaxcal.fit.contradiction import contradiction
 from triaxcal.fit.curves import (
     TilterData,
     curve_covariance,
@@ -125,6 +126,8 @@ class Calibration:
         constants at T0 alone, and `parameter_covariance` only the blocks of each output.
     reading_unit : str
         Unit of U0; K has it per g. That of the recording, where there is one.
+    notes : tuple of str
+        What the user should know of the readings, where they are no `recording`'s.
     """
 
     serial: str
@@ -141,6 +144,12 @@ class Calibration:
     terms: Terms = NO_TERMS
     recording: RecordingFit | None = None
     reading_unit: str = "V"
+    notes: tuple[str, ...] = ()
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What the user should know of the readings, the worst first."""
+        return self.notes if self.recording is None else self.recording.findings
 
     @property
     def gain_unit(self) -> str:
@@ -182,7 +191,8 @@ def calibrate(unit: UnitDescription, measurements: MeasurementSet) -> Calibratio
     checks = check_position_dwells(measurements)
     selection = _select(unit, data, estimators, checks)
     chosen = data.only(estimators.index(selection.estimator))
-    return _calibration(unit, measurements, chosen, selection, range_degc)
+    found = _calibration(unit, measurements, chosen, selection, range_degc)
+    return replace(found, notes=contradiction(unit, groups))
 
 
 def _select(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
@@ -11,11 +12,15 @@ from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.samples import Samples
 from triaxcal.recording.stillness import Stillness, duration_s, find_stillness
-from triaxcal.recordinglayout import POSES, RecordingLayout
+from triaxcal.recordinglayout import POSES, SECTIONS, TIME_UNITS, RecordingLayout
 
 BATCHES = 8
 _DRIFT_MAX = 6.0
 """Of its standard error: how far the two halves of a pose may differ."""
+_STEPS_S = (5e-4, 0.5)
+"""Between samples of a logger: what tells seconds from milliseconds."""
+_SAME_RAD = 1e-6
+"""Angles of one pose are written alike in all its rows."""
 _NOTED = 0.25
 """Of the shortest pose: still stretches shorter than this are part of the movement."""
 _MOVING = 0.1
@@ -128,6 +133,8 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     """
     if layout.rows == POSES:
         return PoseSet(samples.source, _row_poses(samples), (), None, samples.findings)
+    if layout.rows == SECTIONS:
+        return _section_poses(samples, layout)
     stillness = find_stillness(samples, layout.still_s)
     scale = _Scale.of(samples, layout)
     poses: list[Pose] = []
@@ -165,6 +172,38 @@ def _row_poses(samples: Samples) -> tuple[Pose, ...]:
         )
         for k in range(len(samples.reading))
     )
+
+
+def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
+    """Each stretch of rows with one label is a pose; without a label it is what lies between."""
+    assert samples.label is not None
+    scale = _Scale.of(samples, layout)
+    poses: list[Pose] = []
+    refused: list[RefusedPose] = []
+    start = 0
+    for label, rows in groupby(samples.label):
+        run = start, start + len(list(rows))
+        start = run[1]
+        if not label.strip():
+            continue
+        pose = _pose(samples, run, len(poses) + len(refused) + 1)
+        reason = _moves(samples.reading[run[0] : run[1]].std(axis=0), layout, scale)
+        if samples.angles_rad is not None:
+            angles = samples.angles_rad[run[0] : run[1]]
+            pose = replace(pose, angles_rad=angles[0])
+            if np.ptp(angles, axis=0).max() > _SAME_RAD:
+                reason = "its angles change within the section"
+        if reason:
+            told = RefusedPose(pose.number, pose.line, pose.start_s, pose.duration_s, reason)
+            refused.append(told)
+        else:
+            poses.append(pose)
+    if not poses:
+        first = f": pose {refused[0].number}: {refused[0].reason}" if refused else ""
+        raise RefusedError(
+            samples.source, f"no section is a pose{first}", expected="sections held still"
+        )
+    return PoseSet(samples.source, tuple(poses), tuple(refused), None, samples.findings)
 
 
 def _pose(samples: Samples, run: tuple[int, int], number: int) -> Pose:
@@ -208,12 +247,9 @@ def _reason(
                 f"axis {AXES[axis]} is clipped: it stays at {reading[0, axis]:g}, the end of what "
                 "the file shows; measure with a wider range"
             )
-    if deviation.max() > _MOVING * scale.one_g:
-        axis = int(deviation.argmax())
-        return (
-            f"axis {AXES[axis]} scatters by {deviation[axis]:.3g} {layout.acceleration_unit}: "
-            "it is not held still"
-        )
+    moves_by = _moves(deviation, layout, scale)
+    if moves_by:
+        return moves_by
     half = len(reading) // 2
     drift = np.abs(reading[half:].mean(axis=0) - reading[:half].mean(axis=0))
     assert pose.sd_mean is not None
@@ -228,6 +264,16 @@ def _reason(
     return ""
 
 
+def _moves(deviation: FloatArray, layout: RecordingLayout, scale: _Scale) -> str:
+    if deviation.max() <= _MOVING * scale.one_g:
+        return ""
+    axis = int(deviation.argmax())
+    return (
+        f"axis {AXES[axis]} scatters by {deviation[axis]:.3g} {layout.acceleration_unit}: "
+        "it is not held still"
+    )
+
+
 def _no_poses(
     samples: Samples, layout: RecordingLayout, refused: list[RefusedPose]
 ) -> RefusedError:
@@ -240,26 +286,40 @@ def _no_poses(
             labels = f"; sections found: {', '.join(found[:10])}"
     return RefusedError(
         samples.source,
-        f"no pose found: the longest still stretch has {longest:.1f} s{first}{labels}",
+        f"no pose found: the longest still stretch has {longest:.3g} s{first}{labels}",
         expected=f"poses of {layout.still_s:g} s at least",
-        remedy="hold each pose longer, or lower [recording] still_s; "
+        remedy=_wrong_clock(samples, layout)
+        or "hold each pose longer, or lower [recording] still_s; "
         "`triaxcal poses` shows what was found",
     )
 
 
+def _wrong_clock(samples: Samples, layout: RecordingLayout) -> str:
+    """What to do where the whole recording is shorter than a few poses can be; "" where not."""
+    whole = float(samples.time_s[-1]) + samples.step_s
+    if whole > 4.0 * layout.still_s:
+        return ""
+    told = f"the whole recording lasts {whole:.3g} s"
+    if layout.time is None:
+        return f"{told} at {1.0 / samples.step_s:g} Hz: check sample_rate_hz"
+    scale = TIME_UNITS[layout.time_unit]
+    near = [
+        u for u, s in TIME_UNITS.items() if _STEPS_S[0] < samples.step_s / scale * s < _STEPS_S[1]
+    ]
+    return f"{told}: check time_unit" + (f', as time_unit = "{near[0]}"' if near else "")
+
+
 def orientation_groups(directions: FloatArray, angle_deg: float = ALIKE_DEG) -> list[list[int]]:
-    """Indices of poses that point alike: unit vectors (n, 3), chained within `angle_deg`."""
+    """Indices of poses that point alike: those within `angle_deg` of a first one, and so on.
+
+    Not chained: a hundred poses all round must not become one orientation.
+    """
     near = directions @ directions.T >= np.cos(np.radians(angle_deg))
+    left = np.ones(len(directions), dtype=np.bool_)
     groups: list[list[int]] = []
-    left = set(range(len(directions)))
-    while left:
-        front = [min(left)]
-        group = set(front)
-        while front:
-            k = front.pop()
-            new = {int(j) for j in np.flatnonzero(near[k])} - group
-            group |= new
-            front += list(new)
-        left -= group
-        groups.append(sorted(group))
+    for first in range(len(directions)):
+        if left[first]:
+            group = np.flatnonzero(near[first] & left)
+            left[group] = False
+            groups.append(group.tolist())
     return groups

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,11 +13,14 @@ import numpy as np
 from triaxcal.errors import RefusedError
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 from triaxcal.recording.text import TextTable, read_text
-from triaxcal.recordinglayout import POSES, TIME_UNITS, Column, RecordingLayout
+from triaxcal.recordinglayout import SAMPLES, TIME_UNITS, Column, RecordingLayout
 from triaxcal.unitfile import PLAUSIBLE_DEGC, TemperatureSensor
 
 GAP = 5.0
 """Of the median step: a longer step is a gap, and no pose reaches across it."""
+_TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d([.,]\d+)?")
+_SLOW_S = 1.0
+"""Between samples: slower than any logger of poses, and milliseconds taken for seconds look so."""
 _REPEATS_MAX = 0.01
 """Of the rows: repeated rows beyond this are a clock too coarse, not a logger's hiccup."""
 
@@ -90,7 +94,7 @@ def read_samples(folder: Path, layout: RecordingLayout, sensor: TemperatureSenso
         ) * (np.pi / 180.0 if layout.angles.unit == "deg" else 1.0)
     label = columns.labels(layout.section) if layout.section is not None else None
     whole = _complete(reading, time, temp, angles)
-    findings = []
+    findings = [] if columns.table is None else list(columns.table.findings)
     if not whole.all():
         missing = np.flatnonzero(~whole)
         if len(missing) > 0.5 * len(whole):
@@ -124,7 +128,9 @@ def read_samples(folder: Path, layout: RecordingLayout, sensor: TemperatureSenso
         step_s=step,
         findings=tuple(findings),
     )
-    return _with_gaps(samples) if clock and layout.rows != POSES else samples
+    if not clock or layout.rows != SAMPLES:
+        return samples
+    return _with_gaps(_with_slow_clock(samples, layout))
 
 
 @dataclass(frozen=True)
@@ -142,8 +148,21 @@ class _Columns:
 
         if is_mat_file(path):
             mat = MatTable(path, layout.variable)
-            count = len(mat.numbers(layout.acceleration[0].column, "acceleration"))
-            return _Columns(str(path), mat.numbers, np.arange(1, count + 1), None)
+            first = layout.acceleration[0].column
+            count = len(mat.numbers(first, "acceleration"))
+
+            def numbers(column: Column, key: str) -> FloatArray:
+                found = mat.numbers(column, key)
+                if len(found) != count:
+                    raise RefusedError(
+                        str(path),
+                        f"{len(found)} values in {column} ([recording] {key}), {count} in {first}",
+                        expected="one value a sample in each",
+                        remedy="give columns that belong together, or save them at one rate",
+                    )
+                return found
+
+            return _Columns(str(path), numbers, np.arange(1, count + 1), None)
         table = read_text(path, layout)
         return _Columns(
             str(path),
@@ -180,16 +199,23 @@ class _Columns:
         start: datetime.datetime | None = None
         for k, row in enumerate(table.rows):
             try:
-                moment = datetime.datetime.fromisoformat(row[index])
+                moment = _moment(row[index].strip("\"' "))
                 start = start or moment
                 seconds[k] = (moment - start).total_seconds()
             except (ValueError, TypeError) as error:
                 raise RefusedError(
                     f"{table.source}, line {table.lines[k]}",
                     f"found {row[index]!r}",
-                    expected="a date and time, as 2026-03-30T12:00:00.25",
+                    expected="a date and time, as 2026-03-30T12:00:00.25, or a time of day",
                 ) from error
         return seconds
+
+
+def _moment(text: str) -> datetime.datetime:
+    """Moment of ISO 8601, with slashes for dashes, or of a day without a date."""
+    if _TIME_OF_DAY.fullmatch(text):
+        return datetime.datetime.fromisoformat(f"2000-01-01T{text.zfill(8)}")
+    return datetime.datetime.fromisoformat(text.replace("/", "-"))
 
 
 def _complete(
@@ -211,7 +237,7 @@ def _without_repeats(
     columns: _Columns,
 ) -> tuple[BoolArray, str]:
     """Rows with time and readings of the one before left out; time running back is refused."""
-    if layout.time is None or layout.rows == POSES:
+    if layout.time is None or layout.rows != SAMPLES:
         return whole, ""
     index = np.flatnonzero(whole)
     step = np.diff(time[index])
@@ -243,6 +269,16 @@ def _without_repeats(
         f"{len(still)} row{'s' * (len(still) != 1)} with the time of the row before left out "
         f"({same} of them the same in all), the first is line {columns.line[index[still[0] + 1]]}"
     )
+
+
+def _with_slow_clock(samples: Samples, layout: RecordingLayout) -> Samples:
+    if samples.step_s < _SLOW_S or layout.time_unit == "iso":
+        return samples
+    told = (
+        f'a sample every {samples.step_s:.4g} s by time_unit = "{layout.time_unit}": if that is '
+        "not so, correct it"
+    )
+    return replace(samples, findings=(*samples.findings, told))
 
 
 def _with_gaps(samples: Samples) -> Samples:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,12 +10,21 @@ import numpy as np
 
 from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
-from triaxcal.recordinglayout import DELIMITERS, Column, RecordingLayout
+from triaxcal.recording.preamble import Line, find_table
+from triaxcal.recordinglayout import Column, RecordingLayout
 from triaxcal.records_csv import is_number
 from triaxcal.tomltable import did_you_mean, shown
 
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
-_SPACES = re.compile(r"[ \t]+")
+_BINARY = (
+    (b"PK\x03\x04", "a ZIP archive or an Excel workbook"),
+    (b"\xd0\xcf\x11\xe0", "an old Excel workbook"),
+    (b"PAR1", "Parquet"),
+    (b"\x1f\x8b", "packed by gzip"),
+    (b"#ROSBAG", "a ROS bag"),
+    (b"SQLite format 3", "an SQLite database, as ROS 2 writes"),
+    (b"\x93NUMPY", "a NumPy array"),
+)
 
 
 @dataclass(frozen=True)
@@ -33,6 +40,8 @@ class TextTable:
         Line of the file of each row, the first line is 1.
     rows : list of lists of str
     decimal : str
+    findings : tuple of str
+        What was left out above the rows.
     """
 
     source: str
@@ -40,6 +49,7 @@ class TextTable:
     lines: list[int]
     rows: list[list[str]]
     decimal: str
+    findings: tuple[str, ...] = ()
 
     def index(self, column: Column, key: str) -> int:
         """Index of a column by name or number; `key` is its key in unit.toml.
@@ -123,7 +133,7 @@ class TextTable:
 
 
 def read_text(path: Path, layout: RecordingLayout) -> TextTable:
-    """Cells of a text file as its layout says; a delimiter or header left open is found.
+    """Cells of a text file as its layout says; delimiter and header are found where it is silent.
 
     Raises
     ------
@@ -131,23 +141,14 @@ def read_text(path: Path, layout: RecordingLayout) -> TextTable:
         When the file cannot be read, has no rows, or a line has another number of cells.
     """
     source = str(path)
-    kept = _kept_lines(source, _decoded(path), layout)
-    first = kept[0][1]
-    second = kept[1][1] if len(kept) > 1 else first
-    delimiter = layout.delimiter or _delimiter(second, layout.decimal)
-    cells = _split([text for _, text in kept], delimiter)
-    lines = [number for number, _ in kept]
-    header = layout.header
-    if header is None:
-        header = not any(is_number(c.replace(",", ".")) for c in cells[0])
-    names: tuple[str, ...] = ()
-    if header:
-        names = tuple(cell.strip().strip("\"'").strip() for cell in cells[0])
-        cells, lines = cells[1:], lines[1:]
-    if not cells:
+    lines = _lines(source, _decoded(path), layout)
+    found = find_table(lines, layout)
+    if not found.rows:
         raise RefusedError(source, "a header but no rows", expected="rows of numbers")
-    _refuse_ragged(source, names, lines, cells)
-    return TextTable(source, names, lines, cells, layout.decimal)
+    _refuse_ragged(source, found.names, found.lines, found.rows)
+    return TextTable(
+        source, found.names, found.lines, found.rows, layout.decimal, findings=found.findings
+    )
 
 
 def _decoded(path: Path) -> str:
@@ -159,9 +160,23 @@ def _decoded(path: Path) -> str:
             f"cannot be read: {(error.strerror or str(error)).lower()}",
             remedy="put the recording there, or correct [recording] file",
         ) from error
+    wide = _utf_16(data)
+    if wide:
+        try:
+            return data.decode(wide).removeprefix("\ufeff")
+        except UnicodeDecodeError as error:
+            raise RefusedError(
+                str(path),
+                f"begins as UTF-16 text, but byte {error.start} is none",
+                expected="text in one encoding",
+                remedy="save the file as UTF-8",
+            ) from error
     if b"\0" in data[:4096]:
         raise RefusedError(
-            str(path), "a binary file", expected="text, or a MAT-file of MATLAB 5 to 7.2"
+            str(path),
+            f"a binary file{_what_binary(data)}",
+            expected="text, or a MAT-file of MATLAB 5 to 7.2",
+            remedy="export it as CSV",
         )
     # Latin-1 holds every byte: a degree sign in a header must not stop a file of numbers.
     try:
@@ -170,39 +185,40 @@ def _decoded(path: Path) -> str:
         return data.decode("latin-1")
 
 
-def _kept_lines(source: str, text: str, layout: RecordingLayout) -> list[tuple[int, str]]:
-    kept = []
+def _utf_16(data: bytes) -> str:
+    """Codec of UTF-16 text, by its mark or by the zeros of every other byte; "" of all else."""
+    if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
+        return "utf-16"
+    start = data[:4096]
+    even, odd = start[::2].count(0), start[1::2].count(0)
+    if len(start) >= 4 and not even and odd > 0.9 * (len(start) // 2):
+        return "utf-16-le"
+    if len(start) >= 4 and not odd and even > 0.9 * (len(start) // 2):
+        return "utf-16-be"
+    return ""
+
+
+def _what_binary(data: bytes) -> str:
+    """What a well-known binary file is."""
+    for start, name in _BINARY:
+        if data.startswith(start):
+            return f", {name}"
+    return ""
+
+
+def _lines(source: str, text: str, layout: RecordingLayout) -> list[Line]:
+    found = []
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
         if number <= layout.skip_rows or not line.strip():
             continue
-        if layout.comment and line.lstrip().startswith(layout.comment):
-            continue
-        kept.append((number, line))
-    if not kept:
+        bare = line.lstrip()
+        comment = bool(layout.comment) and bare.startswith(layout.comment)
+        found.append(Line(number, bare.removeprefix(layout.comment) if comment else line, comment))
+    if all(line.comment for line in found):
         raise RefusedError(
             source, "no rows", expected="rows of numbers", remedy="check skip_rows and comment"
         )
-    return kept
-
-
-def _delimiter(line: str, decimal: str) -> str:
-    """Delimiter of a line of numbers: the strongest there is, white space being the weakest."""
-    for name in ("tab", "semicolon", "comma"):
-        delimiter = DELIMITERS[name]
-        if delimiter in line and delimiter != decimal:
-            return delimiter
-    return DELIMITERS["space"]
-
-
-def _split(lines: Sequence[str], delimiter: str) -> list[list[str]]:
-    if delimiter == " ":
-        return [_SPACES.split(line.strip()) for line in lines]
-    # Line by line: a stray quotation mark must not join lines.
-    return [
-        [cell.strip() for cell in row]
-        for line in lines
-        for row in csv.reader([line], delimiter=delimiter)
-    ]
+    return found
 
 
 def _refuse_ragged(

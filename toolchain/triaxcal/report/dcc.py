@@ -1,6 +1,7 @@
-"""certificate.dcc.xml: PTB's Digital Calibration Certificate, schema 3.2.0 with D-SI 2.1.
+"""certificate.dcc.xml: PTB's Digital Calibration Certificate, schema 3.2.1 with D-SI 2.1.0.
 
-Values are in SI units: K in V/(m/s^2), U0 in V. What only people know (laboratory, customer,
+Values are in SI units: K in V/(m/s^2), U0 in V; of a recording in its own unit of the readings
+(counts have the unit one, g are turned into m/s^2). What only people know (laboratory, customer,
 dates, signer) stands in [certificate] of unit.toml; without it there is no certificate.
 """
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.certificate import CertificateDetails
+from triaxcal.errors import RefusedError
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.report.passport.content import Passport
@@ -21,12 +23,36 @@ from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
-SCHEMA = "3.2.0"
-_UNITS = [r"\volt\second\tothe{2}\metre\tothe{-1}"] * 9 + [r"\volt"] * 3
+SCHEMA = "3.2.1"
+_VOLT = (r"\volt\second\tothe{2}\metre\tothe{-1}", r"\volt")
+_ACCELERATION = (r"\one", r"\metre\second\tothe{-2}")
+_COUNT = (r"\second\tothe{2}\metre\tothe{-1}", r"\one")
+_UNITS = {
+    "V": (1.0, _VOLT),
+    "mV": (1e-3, _VOLT),
+    "count": (1.0, _COUNT),
+    "m/s^2": (1.0, _ACCELERATION),
+    "g": (STANDARD_GRAVITY_M_PER_S2, _ACCELERATION),
+    "mg": (1e-3 * STANDARD_GRAVITY_M_PER_S2, _ACCELERATION),
+}
+"""Unit of the readings in SI units, and the units of K and U0 then."""
 
 
 def certificate_xml(p: Passport, details: CertificateDetails) -> bytes:
-    """The certificate; without a clock, so equal inputs give equal bytes."""
+    """The certificate; without a clock, so equal inputs give equal bytes.
+
+    Raises
+    ------
+    RefusedError
+        When nothing speaks for the constants but themselves.
+    """
+    if not p.checked:
+        raise RefusedError(
+            f"{p.delivery.unit.name}/unit.toml, [certificate]",
+            "a certificate of constants that nothing checks: there are as many as poses",
+            expected="more poses than constants",
+            remedy="record more poses, or remove the table",
+        )
     for prefix, uri in (("dcc", DCC), ("si", SI), ("xsi", XSI)):
         ET.register_namespace(prefix, uri)
     root = ET.Element(f"{{{DCC}}}digitalCalibrationCertificate", {"schemaVersion": SCHEMA})
@@ -100,24 +126,28 @@ def _statements(data: ET.Element, p: Passport) -> None:
     for limit in p.acceptance:
         statement = _add(statements, "statement")
         _text(statement, "name", f"| |a| - g | {limit.where}, at most {limit.limit_g:g} g")
+        unknown = "".join(f"; not in it: {line.name}" for line in p.length_budget.unknown)
         found = (
             f"largest at the dwells {limit.largest_g:.3g} g, expanded uncertainty of |a| "
-            f"{limit.uncertainty_g:.3g} g ({LEVEL:.0%}), mostly from {limit.cause}"
+            f"{limit.uncertainty_g:.3g} g ({LEVEL:.0%}), mostly from {limit.cause}{unknown}"
         )
         _text(statement, "declaration", found)
-        _add(statement, "conformity", "pass" if limit.shown else "conditionalPass")
+        _add(statement, "conformity", "pass" if limit.shown and not unknown else "conditionalPass")
 
 
 def _measurement_results(root: ET.Element, p: Passport) -> None:
     result = _add(_add(root, "measurementResults"), "measurementResult")
     _text(result, "name", "constants of a triaxial accelerometer over temperature")
     method = _add(_add(result, "usedMethods"), "usedMethod")
-    _text(method, "name", "six positions of a tilter in a thermal chamber")
+    recording = p.delivery.calibration.recording
+    tilter = "six positions of a tilter in a thermal chamber"
+    poses = "" if recording is None else f"{len(recording.poses.poses)} poses, {recording.route}"
+    _text(method, "name", poses or tilter)
     _text(
         method,
         "description",
         "a = K^-1 (U - U0). K_ij is the output of axis i for unit acceleration along axis j, U0_i "
-        "the bias of axis i. Uncertainty by JCGM 100:2008.",
+        "the bias of axis i. Uncertainty by JCGM 100:2008." + _beyond(p),
     )
     software = _add(_add(result, "usedSoftware"), "software")
     _text(software, "name", "triaxcal")
@@ -126,6 +156,14 @@ def _measurement_results(root: ET.Element, p: Passport) -> None:
     results = _add(result, "results")
     for temp in (p.uncertainty.t0_index, 0, len(p.uncertainty.temps_degc) - 1):
         _constants(results, p, temp)
+
+
+def _beyond(p: Passport) -> str:
+    """What the constants alone do not say."""
+    terms = p.delivery.calibration.terms
+    if terms.quadratic_per_g is None:
+        return ""
+    return " The result l is made a = l + Q p(l) by quadratic terms that calibration.json holds."
 
 
 def _gravity(result: ET.Element, p: Passport) -> None:
@@ -147,10 +185,11 @@ def _constants(results: ET.Element, p: Passport, temp: int) -> None:
     quantity = _add(_add(result, "data"), "quantity")
     _text(quantity, "name", ", ".join(CONSTANT_NAMES))
     numbers = ET.SubElement(quantity, f"{{{SI}}}realListXMLList")
-    scale = np.array([1.0 / STANDARD_GRAVITY_M_PER_S2] * 9 + [1.0] * 3)
+    size, (of_gain, of_bias) = _UNITS[p.delivery.calibration.reading_unit]
+    scale = size * np.array([1.0 / STANDARD_GRAVITY_M_PER_S2] * 9 + [1.0] * 3)
     _si(numbers, "labelXMLList", CONSTANT_NAMES)
     _si(numbers, "valueXMLList", _decimals(values * scale))
-    _si(numbers, "unitXMLList", _UNITS)
+    _si(numbers, "unitXMLList", [of_gain] * 9 + [of_bias] * 3)
     expanded = ET.SubElement(numbers, f"{{{SI}}}expandedUncXMLList")
     found = np.array([b.expanded for b in budgets]) * scale
     _si(expanded, "uncertaintyXMLList", _decimals(found))

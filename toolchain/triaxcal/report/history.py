@@ -43,8 +43,15 @@ def history_text(
 
 def contradiction(change: Change) -> str:
     """Warning of a calibration that contradicts the one before."""
+    unit = change.of_unit.replace("µ", "u")
     return (
-        f"warning: calibration {change.name} contradicts the one before: {change.where} differs "
-        f"by {change.en:.2g} times its uncertainty; the unit has aged or was damaged, or one of "
-        "the two is wrong"
-    ).replace("°C", "degC")
+        f"warning: calibration {change.name} contradicts {change.before}: "
+        f"{change.where.replace('°C', 'degC')} changed by {_figure(change.by):+} {unit}, "
+        f"{change.en:.1f} times the {_figure(change.expanded)} {unit} (95 %) that their "
+        "uncertainties allow; the unit has aged or was damaged, or one of the two is wrong"
+    )
+
+
+def _figure(value: float) -> float:
+    """Three figures."""
+    return float(f"{value:.3g}")

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from triaxcal.codegen.render import environment
 from triaxcal.codegen.tryout import BEFORE, MethodResult
 from triaxcal.delivery import Delivery
-from triaxcal.report.temperatures import by_temperature, degrees, position_order
+from triaxcal.report.temperatures import by_temperature, degrees, position_order, with_room
+from triaxcal.unitfile import Limits
 
 WIDTH = 960.0
 LEFT, RIGHT, TOP, GAP = 64.0, 16.0, 84.0, 8.0
 PANEL_HEIGHT, ROW_HEIGHT = 230.0, 290.0
 PANELS_PER_ROW = 8
+LETTER_WIDTH, LABEL_HEIGHT = 4.4, 10.0
+"""Of the labels' letters, 8 px high."""
 FLOOR_MG = 1e-5
 """Errors below this are drawn on the lowest line: a code of a 24-bit converter is more."""
 
@@ -95,11 +98,27 @@ def _row(
             }
             for i, (temp, indices) in enumerate(groups)
         ],
-        "limits": [
-            {"y": scale.y(limits.at_t0_g * 1e3), "label": "limit at T0"},
-            {"y": scale.y(limits.over_range_g * 1e3), "label": "limit over the range"},
-        ],
+        "limits": _limits(limits, scale),
     }
+
+
+def _limits(limits: Limits, scale: _Scale) -> list[dict[str, object]]:
+    """Both limits, or one line where their words would lie on each other."""
+    t0, other = scale.y(limits.at_t0_g * 1e3), scale.y(limits.over_range_g * 1e3)
+    if t0 == other:
+        return [{"y": t0, "label": "limit at T0 and over the range", "shift": -3.0}]
+    # Of two that are near, the lower line has its words below.
+    below = 12.0 if abs(t0 - other) < LABEL_HEIGHT else -3.0
+    return [
+        {"y": t0, "label": "limit at T0", "shift": below if t0 > other else -3.0},
+        {"y": other, "label": "limit over the range", "shift": below if other > t0 else -3.0},
+    ]
+
+
+def _thinned(xs: list[float], labels: list[str], width: float) -> list[tuple[float, str]]:
+    """Labels below a panel, as many as have room."""
+    kept = with_room(labels, width / len(labels), LETTER_WIDTH)
+    return [(x, label) for x, label in zip(xs, kept, strict=True) if label]
 
 
 def _panel(
@@ -123,7 +142,7 @@ def _panel(
         "x": _r(x0),
         "middle": _r(x0 + width / 2),
         "lines": lines,
-        "labels": list(zip(xs, labels, strict=True)),
+        "labels": _thinned(xs, labels, width),
     }
 
 

@@ -45,13 +45,13 @@ def calibration_json(delivery: Delivery) -> bytes:
             {
                 "temp_degc": point.temp_degc,
                 "constants": point.constants.tolist(),
-                "covariance": point.covariance.tolist(),
+                "covariance": _numbers(point.covariance),
                 "position_residual_g": point.position_residual_g,
                 "curve_residual_g": point.curve_residual_g,
             }
             for point in calibration.points
         ],
-        "parameter_covariance": calibration.parameter_covariance.tolist(),
+        "parameter_covariance": _numbers(calibration.parameter_covariance),
         "covariance_source": calibration.covariance_source,
         "covariance_contains": "the noise of the calibration readings alone; rig, gravity, "
         "thermometer and thermal model are in passport.json",
@@ -81,14 +81,17 @@ def _beyond_the_tilter(calibration: Calibration) -> dict[str, Any]:
             "per_g": calibration.terms.quadratic_per_g.tolist(),
         }
     recording = calibration.recording
+    if calibration.notes:
+        found["findings"] = list(calibration.notes)
     if recording is not None:
         found["recording"] = {
             "poses": len(recording.poses.poses),
             "refused": [{"line": r.line, "reason": r.reason} for r in recording.poses.refused],
             "route": recording.route,
             "rms_g": recording.rms_g,
-            "rms_per_degree_of_freedom_g": recording.rms_free_g,
+            "rms_per_degree_of_freedom_g": recording.rms_free_g if recording.checked else None,
             "held_out_g": recording.held_out_g,
+            "left_out_length_g": recording.left_out_length_g,
             "condition_number": recording.condition,
             "findings": list(recording.findings),
         }

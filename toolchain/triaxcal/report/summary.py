@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from triaxcal.delivery import Delivery
 from triaxcal.fit.calibrate import Calibration
+from triaxcal.fit.family.result import RecordingFit
 from triaxcal.fit.selection import Candidate
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
@@ -25,7 +26,7 @@ def summary(made: Passport, files: Iterable[str], where: str) -> str:
         _candidates(delivery.calibration),
         _residuals(delivery),
         _uncertainty(made),
-        _verdict(delivery),
+        _verdict(made),
         _entry("files", f"{where}/", *_wrap("  ".join(sorted(files)))),
     ]
     return "\n\n".join(blocks)
@@ -85,12 +86,20 @@ def _head(delivery: Delivery) -> str:
 def _findings(calibration: Calibration) -> list[str]:
     """What a recording's poses are worth, and what was found in them."""
     recording = calibration.recording
+    found = [_entry("found", *_wrap(finding)) for finding in calibration.findings]
     if recording is None:
-        return []
+        return found
     worth = f"condition number {recording.condition:.3g} (1 is the best)"
     worth += f"; the poses see {recording.weakest} least" if recording.weakest else ""
-    found = [_entry("found", *_wrap(finding)) for finding in recording.findings]
-    return [_entry("observability", *_wrap(worth)), *found]
+    return [_left_out(recording), _entry("observability", *_wrap(worth)), *found]
+
+
+def _left_out(recording: RecordingFit) -> str:
+    """What counts most of a recording: |a| at poses that the fit has not seen."""
+    if recording.left_out_length_g is None:
+        return _entry("left out", "nothing: no pose can be spared to check the others on")
+    rms = recording.left_out_length_g * 1e3
+    return _entry("left out", f"|a| - g: {rms:.4f} mg rms at poses that the fit has not seen")
 
 
 def _thousands(number: int) -> str:
@@ -168,6 +177,9 @@ def _residuals(delivery: Delivery) -> str:
 
 def _uncertainty(made: Passport) -> str:
     """Expanded uncertainty of the acceleration, what it comes from, and limits it does not keep."""
+    if not made.checked:
+        unknown = "unknown: as many constants as poses, so the poses say nothing of it; record more"
+        return _entry("uncertainty", *_wrap(unknown))
     components, length = made.component_budget, made.length_budget
     reached = (
         f"95 %, worst orientation at 1 g: {_small_g(components.expanded)} a component, "
@@ -188,7 +200,8 @@ def _small_g(value_g: float) -> str:
     return f"{value_g * 1e3:.3g} mg" if value_g >= 1e-3 else f"{value_g * 1e6:.3g} micro-g"
 
 
-def _verdict(delivery: Delivery) -> str:
+def _verdict(made: Passport) -> str:
+    delivery = made.delivery
     bound, check, limits = delivery.bound, delivery.check, delivery.unit.limits
     q = delivery.plan.shape.output_q
     chosen = next(m for m in delivery.methods if m.method == delivery.unit.method)
@@ -210,7 +223,7 @@ def _verdict(delivery: Delivery) -> str:
                 "Python = reference C = generated C, bit for bit",
             ),
             _entry(
-                "passed",
+                "passed" if made.checked else "NOT CHECKED",
                 f"{_passed(at_t0, limits.at_t0_g)} at T0, "
                 f"{_passed(by_key.get('limits.over_range_g'), limits.over_range_g)} elsewhere",
             ),

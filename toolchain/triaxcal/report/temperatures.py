@@ -6,6 +6,7 @@ from triaxcal.codegen.tryout import MethodResult
 
 SAME_TEMPERATURE_DEGC = 1.0
 """Dwells nearer than this are shown as one temperature."""
+_STEPS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 10_000)
 
 
 def by_temperature(result: MethodResult, prefix: str) -> list[tuple[float, list[int]]]:
@@ -28,6 +29,14 @@ def position_order(position: str) -> tuple[str, int]:
     """Sort key of a position's name: TP2 before TP10."""
     letters = position.rstrip("0123456789")
     return letters, int(position[len(letters) :] or 0)
+
+
+def with_room(labels: list[str], spacing: float, letter: float) -> list[str]:
+    """Labels so far apart, "" for those that would lie on others: every second, fifth, tenth."""
+    room = max(map(len, labels)) * letter + 3.0
+    step = next(s for s in _STEPS if spacing * s >= room or s == _STEPS[-1])
+    # The last of each step: P5, P10, ... of poses that are numbered from 1.
+    return [label if (n + 1) % step == 0 else "" for n, label in enumerate(labels)]
 
 
 def degrees(temp_degc: float) -> str:

@@ -9,14 +9,15 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
+from triaxcal.codegen.render import assembly
 from triaxcal.resources import shipped
 from triaxcal.targets.bench_case import case_header, floating_macros, floating_tables
 from triaxcal.targets.build import TargetError, Toolset, build, run
 from triaxcal.targets.cores import CORES, Core, install_advice, missing_tools
 from triaxcal.targets.counting import Counts, build_plugin, measure
 from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB1, THUMB2
-from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, QUADRATIC, Case
-from triaxcal.targets.sizes import ACCELEROMETER, FLOATING, GYRO, Flash, Names, flash_of
+from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, GYRO, QUADRATIC, RATE_ALONE, Case
+from triaxcal.targets.sizes import Flash, flash_of
 
 OPTIMISATION = "-O2"
 """gcc -O1 does not fuse the multiply-accumulates."""
@@ -43,11 +44,11 @@ class Subject:
         return f"{self.case.name}, {kind}"
 
     @property
-    def names(self) -> Names:
-        """Names of its functions and constants."""
+    def prefix(self) -> str:
+        """What the names of its functions begin with."""
         if self.real:
-            return FLOATING
-        return GYRO if self.case.plan.shape.gyro else ACCELEROMETER
+            return "floating"
+        return "triax_gyro" if self.case.plan.shape.gyro else "triax"
 
 
 @dataclass(frozen=True)
@@ -62,13 +63,26 @@ class Cost:
 
 
 def subjects(cases: Sequence[Case]) -> list[Subject]:
-    """Every shape in every arithmetic, and the baselines of the cubic."""
-    result = [Subject(case, a, "") for case in cases for a in (PORTABLE, LIMBS, THUMB2, THUMB1)]
+    """Every shape in every arithmetic that it has, and the baselines of the cubic."""
+    result = [
+        Subject(case, form, "")
+        for case in cases
+        for form in (PORTABLE, LIMBS, THUMB2, THUMB1)
+        if _has(case, form)
+    ]
     cubic = next(c for c in cases if c.name == CUBIC)
     return [*result, Subject(cubic, PORTABLE, DOUBLE), Subject(cubic, PORTABLE, FLOAT)]
 
 
-BENCH_SHAPES = (CUBIC, CUBIC_LEFT, "AT-SIM", "AT-CHERNIAK", "inverse", QUADRATIC)
+def _has(case: Case, form: int) -> bool:
+    """Whether a shape has the form; another form would stand for it."""
+    given = assembly(case.plan.shape)
+    return {THUMB2: given["thumb2"] > 0, THUMB1: given["thumb1"] > 0}.get(form, True)
+
+
+BENCH_SHAPES = (
+    CUBIC, CUBIC_LEFT, "AT-SIM", "AT-CHERNIAK", "inverse", QUADRATIC, RATE_ALONE, GYRO,
+)  # fmt: skip
 
 
 def run_bench(
@@ -138,7 +152,7 @@ def cost_of(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
         build(toolset, [*sources, *harness], include, program)
         counts = measure(core, program, plugin)
         small = Toolset(core, "gcc", SIZE_OPTIMISATION, subject.arithmetic, defines)
-        flash = flash_of(small, sources, include, work / "small", subject.names)
+        flash = flash_of(small, sources, include, work / "small", prefix=subject.prefix)
     except TargetError as error:
         return Cost(subject, core, None, None, str(error))
     return Cost(subject, core, counts, flash, "")

@@ -56,7 +56,12 @@ Change = Callable[[UnitDescription], UnitDescription]
 CUBIC = "cubic"
 CUBIC_LEFT = "cubic, left-justified"
 QUADRATIC, RATE, GYRO = "quadratic terms", "dT/dt", "gyro"
-_TERMS = {QUADRATIC: EXAMPLE_TERMS, RATE: replace(EXAMPLE_TERMS, rate=EXAMPLE_RATE)}
+RATE_ALONE = "cubic, dT/dt"
+_TERMS = {
+    QUADRATIC: EXAMPLE_TERMS,
+    RATE: replace(EXAMPLE_TERMS, rate=EXAMPLE_RATE),
+    RATE_ALONE: replace(NO_TERMS, rate=EXAMPLE_RATE),
+}
 
 
 def _order_3(unit: UnitDescription) -> UnitDescription:
@@ -83,6 +88,7 @@ _SHAPES: tuple[tuple[str, str, str, Change], ...] = (
     (QUADRATIC, "AT-SIM", "18 quadratic terms, order 3", _order_3),
     (RATE, "AT-SIM", "a term in dT/dt and quadratic terms, inverse", lambda u: replace(
         u, method="inverse")),
+    (RATE_ALONE, "AT-SIM", "a term in dT/dt, order 3", _order_3),
     (GYRO, "AT-SIM", "a gyro with g-sensitivity, order 3", _order_3),
     ("16 bits", "AT-SIM", "16-bit raw codes", lambda u: replace(u, adc=replace(
         u.adc, bits=16, code_min=-(2**15), code_max=2**15 - 1))),

@@ -33,28 +33,18 @@ class Flash:
         return self.code + self.tables + self.helpers
 
 
-@dataclass(frozen=True)
-class Names:
-    """How functions and constants of a routine begin, and whether it has a loader."""
-
-    functions: str
-    constants: str
-    loads: bool
-
-
-ACCELEROMETER = Names("triax", "TRIAX", loads=True)
-GYRO = Names("triax_gyro", "TRIAX_GYRO", loads=True)
-FLOATING = Names("floating", "FLOATING", loads=False)
-
-
 def flash_of(
     toolset: Toolset,
     sources: Sequence[Path],
     include: Sequence[Path],
     work: Path,
-    names: Names,
+    *,
+    prefix: str,
 ) -> Flash:
-    """Link the routine alone, without start-up code, and take its sections apart."""
+    """Link the routine alone, without start-up code, and take its sections apart.
+
+    `prefix` is that of its names: "triax", "triax_gyro" or "floating".
+    """
     work.mkdir(parents=True)
     objects = []
     for source in sources:
@@ -62,13 +52,12 @@ def flash_of(
         includes = [f"-I{path}" for path in (*include, shipped("firmware_ref") / "target")]
         run([*toolset.command(), *includes, "-c", str(source), "-o", str(made)])
         objects.append(made)
-    prefix = names.functions
     roots = [f"{prefix}_set_temperature", f"{prefix}_apply"]
-    tables_root = f"{names.constants}_CALIB"
+    tables_root = f"{prefix.upper()}_CALIB"
     code, helpers = _text(toolset, objects, roots, work / "routine.elf")
     _, tables = _text(toolset, objects, [tables_root], work / "tables.elf")
     loader = 0
-    if names.loads:
+    if prefix != "floating":
         whole = _text(toolset, objects, [*roots, f"{prefix}_calib_load"], work / "whole.elf")
         loader = sum(whole) - code - helpers
     return Flash(code, tables, helpers, loader)

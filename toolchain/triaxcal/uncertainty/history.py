@@ -58,22 +58,30 @@ class Change:
 
     Attributes
     ----------
-    name : str
-        The later one.
+    name, before : str
+        The later one, and the one it is compared with.
     bias_mg, scale_ppm, cross_axis_micro_rad : float
         Largest change of its kind at T0, with its sign.
     en : float
         Largest En of the 36.
     where : str
         The constant and temperature that has it.
+    by, expanded : float
+        How much that constant changed, and the expanded uncertainty of the difference (95 %).
+    of_unit : str
+        Unit of both: mg, ppm or micro-rad.
     """
 
     name: str
+    before: str
     bias_mg: float
     scale_ppm: float
     cross_axis_micro_rad: float
     en: float
     where: str
+    by: float
+    expanded: float
+    of_unit: str
 
     @property
     def contradicts(self) -> bool:
@@ -146,17 +154,23 @@ def _change(unit: UnitDescription, before: Calibrated, after: Calibrated) -> Cha
         keep = np.isin(u.temps_degc, temps)
         values.append(c.calibration.thermal.constants_at(temps))
         expanded.append(u.constants_u[keep])
-    en = np.abs(values[1] - values[0]) / np.hypot(expanded[0], expanded[1])
-    worst = np.unravel_index(int(en.argmax()), en.shape)
+    difference, its_u = values[1] - values[0], np.hypot(expanded[0], expanded[1])
+    en = np.abs(difference) / its_u
+    row, constant = map(int, np.unravel_index(int(en.argmax()), en.shape))
     at_t0 = [c.calibration.thermal.constants_at(unit.t0_degc) for c in (before, after)]
     bias, scale, cross = _kinds(at_t0[1] - at_t0[0], at_t0[0])
+    scale_of = _scales(at_t0[0])
     return Change(
         name=after.name,
+        before=before.name,
         bias_mg=_largest(bias),
         scale_ppm=_largest(scale),
         cross_axis_micro_rad=_largest(cross),
         en=float(en.max()),
-        where=f"{CONSTANT_NAMES[int(worst[1])]} at {temps[int(worst[0])]:.4g} °C",
+        where=f"{CONSTANT_NAMES[constant]} at {temps[row]:.4g} °C",
+        by=float(difference[row, constant] * scale_of[constant]),
+        expanded=float(its_u[row, constant] * abs(scale_of[constant])),
+        of_unit=_unit_of(constant),
     )
 
 
@@ -167,11 +181,21 @@ def _with_t0(temps_degc: FloatArray, unit: UnitDescription) -> FloatArray:
 
 def _kinds(change: FloatArray, constants: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Changes (..., 12) as bias in mg, scale factor in ppm, cross-axis sensitivity in micro-rad."""
+    scaled = change * _scales(constants)
+    cross = [k for k in range(9) if k not in _OWN_AXIS]
+    return scaled[..., list(BIASES)], scaled[..., list(_OWN_AXIS)], scaled[..., cross]
+
+
+def _scales(constants: FloatArray) -> FloatArray:
+    """What brings a change of each constant to the unit of `_unit_of`, shape (12,)."""
     own = constants[list(_OWN_AXIS)]
-    by_row = change[..., :9].reshape(*change.shape[:-1], 3, 3) / own[:, None]
-    off = ~np.eye(3, dtype=bool)
-    bias = 1e3 * change[..., list(BIASES)] / own
-    return bias, 1e6 * np.diagonal(by_row, axis1=-2, axis2=-1), 1e6 * by_row[..., off]
+    return np.concatenate([1e6 / np.repeat(own, 3), 1e3 / own])
+
+
+def _unit_of(constant: int) -> str:
+    if constant in BIASES:
+        return "mg"
+    return "ppm" if constant in _OWN_AXIS else "µrad"
 
 
 def _largest(values: FloatArray) -> float:

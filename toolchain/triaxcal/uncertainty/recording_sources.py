@@ -27,6 +27,12 @@ def recording_sources(p: Curves, recording: RecordingFit) -> list[Source]:
 
 def _poses(p: Curves, recording: RecordingFit) -> Source:
     """Scatter of the poses: the covariance of the fit."""
+    if not recording.checked:
+        return Source(
+            "poses", "the scatter of the poses", None, "g", "unknown", math.inf,
+            "unknown: as many constants as poses", "record more poses, in other orientations",
+            None, None,
+        )  # fmt: skip
     covariance = p.calibration.constants_covariance(p.temps_degc)
     order = np.empty(12, dtype=np.int64)
     order[list(ROWS)] = np.arange(12)

@@ -15,6 +15,7 @@ LEVEL_ARCSEC = 20.0
 GRAVITY_M_PER_S2 = 5e-5
 THERMOMETER_DEGC = 0.1
 DRIFT_DEGC = 0.02
+_WORTH_TELLING_ARCSEC = 1e-3
 
 
 def noise(p: Propagation, s: Scatter) -> Source:
@@ -81,8 +82,9 @@ def squareness(p: Propagation, s: Scatter) -> Source:
     stated = p.unit.stated.squareness_arcsec
     rad, dof = s.squareness_rad, s.squareness_dof
     origin = "residuals over the positions that stay at all temperatures"
-    if rad <= s.resolution_rad:
-        origin = "not seen in the residuals: what they could not have shown"
+    least = s.resolution_rad / RADIANS_PER_ARCSEC
+    if rad <= s.resolution_rad and least >= _WORTH_TELLING_ARCSEC:
+        origin += f"; below {least:.2g} arcsec it is not told from noise"
     if stated is not None:
         rad, dof = stated * RADIANS_PER_ARCSEC, math.inf
         origin = "unit.toml, [uncertainty] squareness_arcsec"

@@ -38,10 +38,10 @@ class Scatter:
         Whether it is the dwells' own statistics.
     noise_dof : float
     repeatability_rad, squareness_rad : float
-        Standard deviations of the tilts about each axis; the latter at least `resolution_rad`.
+        Standard deviations of the tilts about each axis; zero where noise explains the residuals.
     repeatability_dof, squareness_dof : float
     resolution_rad : float
-        Standard error of a squareness of zero.
+        Standard error of a squareness of zero: a smaller one is not told from noise.
     pattern_g : array, shape (3, 3)
         What stays at all temperatures: half-sum of the pair along x, y, z (row) about the mean of
         the three, in the force's x, y, z. The tilter's own, whatever the unit's constants are.
@@ -88,7 +88,7 @@ def scatter(p: Propagation) -> Scatter:
         noise_dof=noise_dof,
         repeatability_rad=math.sqrt(p_r / g2),
         repeatability_dof=within_dof,
-        squareness_rad=math.sqrt(max(found, resolution, 0.0) / g2),
+        squareness_rad=math.sqrt(max(found, 0.0) / g2),
         squareness_dof=6.0,
         resolution_rad=math.sqrt(resolution / g2),
         pattern_g=pattern,

@@ -26,13 +26,15 @@ NEIGHBOURS = (
     ("p", "q"), ("low", "high"), ("x_low", "x_high"), ("x_low", "y_low", "z_low"),
     ("x_high", "y_high", "z_high"), ("low_low", "low_high", "high_low", "high_high"),
     ("middle", "middle_2"), ("INT32_MIN", "INT32_MAX"), ("below", "above"), ("first", "last"),
-    ("temp_min_code", "temp_max_code"), ("TRIAX_RAW_MIN", "TRIAX_RAW_MAX"),
-    ("first_code", "origin_code"), ("TRIAX_STATUS_TEMP_LOW", "TRIAX_STATUS_TEMP_HIGH"),
+    ("temp_min_code", "temp_max_code"), ("rate_min_code", "rate_max_code"),
+    ("TRIAX_RAW_MIN", "TRIAX_RAW_MAX"), ("first_code", "origin_code"),
+    ("TRIAX_STATUS_TEMP_LOW", "TRIAX_STATUS_TEMP_HIGH"),
 )  # fmt: skip
 """Names that a mistake exchanges."""
 
 _TYPES = {"int32_t", "int64_t", "uint32_t", "uint64_t", "uint8_t", "size_t", "const", "static",
-          "triax_segment_t", "triax_calib_t", "triax_state_t"}  # fmt: skip
+          *(f"triax_{triad}{name}_t" for triad in ("", "gyro_")
+            for name in ("segment", "calib", "state"))}  # fmt: skip
 _FUNCTION = re.compile(r"^(?:[a-z_]\w*[ *]+)+(\w+)\(", re.MULTILINE)
 _DEFINE = re.compile(r"#define (\w+) (.*)")
 

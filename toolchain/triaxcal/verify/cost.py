@@ -6,6 +6,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 
+from triaxcal.codegen.render import assembly
 from triaxcal.targets.bench import Cost, Subject, best_form, compiler_versions, cost_of
 from triaxcal.targets.build import TargetError
 from triaxcal.targets.cores import CORES, install_advice, missing_tools
@@ -60,8 +61,8 @@ def check(work: Workspace) -> Outcome:
 def outcome_of(costs: list[Cost]) -> Outcome:
     """The outcome of what was counted: good when triax_apply costs the same for every input.
 
-    Of a gyro that is not promised on a core that forms its products by a library: it has no
-    assembly there.
+    That is not promised where a library forms the products: on cores without a long multiplication,
+    of shapes that have no assembly for them.
     """
     told, varying, figures = [], [], {}
     failed = False
@@ -72,9 +73,8 @@ def outcome_of(costs: list[Cost]) -> Outcome:
         told.append(f"{name} {_span(n.set)} + {_span(n.apply)}")
         if n.apply.least != n.apply.most:
             varying.append(name)
-            failed = failed or not (
-                cost.subject.case.plan.shape.gyro and cost.core.no_long_multiply
-            )
+            promised = bool(assembly(cost.subject.case.plan.shape)["thumb1"])
+            failed = failed or promised or not cost.core.no_long_multiply
         figures[cost.core.name] = {
             "form": ARITHMETIC_NAMES[cost.subject.arithmetic],
             "set_temperature": [n.set.least, n.set.most],

@@ -20,8 +20,13 @@ OPTIONS = (
     "--template={file}\t{line}\t{id}\t{message}", "--error-exitcode=0",
 )  # fmt: skip
 
-FORMS = tuple(f"-DTRIAX_ARITHMETIC={form}" for form in range(4))
-"""Each form by itself; without them cppcheck looks at the portable one only."""
+FORMS = (
+    ("-DTRIAX_ARITHMETIC=0",), ("-DTRIAX_ARITHMETIC=1",),
+    ("-DTRIAX_ARITHMETIC=2", "-D__thumb__", "-D__thumb2__"),
+    ("-DTRIAX_ARITHMETIC=3", "-D__thumb__"),
+)  # fmt: skip
+"""Each form by itself; without them cppcheck looks at the portable one only. Thumb is claimed, or
+the assembly would be refused."""
 
 _RULE = re.compile(r"misra-c2012-(\d+\.\d+)")
 _MACRO = re.compile(r"#define (\w+)")
@@ -108,7 +113,7 @@ def find_in(folder: Path, routine: str, constants: Sequence[str]) -> list[Findin
     (folder / USER).write_text("".join(f'#include "{name}"\n' for name in constants))
     lines: dict[str, None] = {}
     for form in FORMS:
-        answer = run([CPPCHECK.find(), *OPTIONS, form, routine, USER], folder)
+        answer = run([CPPCHECK.find(), *OPTIONS, *form, routine, USER], folder)
         if answer.code:
             raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
         lines |= dict.fromkeys(answer.text.splitlines())

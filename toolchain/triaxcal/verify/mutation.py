@@ -19,11 +19,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from triaxcal.codegen.compiler import FLAGS as DELIVERY_FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
+from triaxcal.codegen.forces import forces_of, rates_of
 from triaxcal.codegen.image_cases import case_vectors, image_cases
-from triaxcal.codegen.routines import Reference, start_reference
+from triaxcal.codegen.render import gyro_text
+from triaxcal.codegen.routines import (
+    GyroReference,
+    RateReference,
+    Reference,
+    Routine,
+    start_reference,
+)
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.verify.analyzers import GCC, SANITIZERS
 from triaxcal.verify.c_mutants import Mutant, mutants_of
@@ -77,12 +86,16 @@ class Equivalent:
     shapes: tuple[str, ...] = ()
 
     def covers(self, mutant: Mutant, shape: str) -> bool:
-        """Whether the mutant of a shape is this one."""
+        """Whether the mutant of a shape is this one; entries have an accelerometer's names."""
+        function, before, *after = (
+            gyro_text(text) if shape == "gyro" else text
+            for text in (self.function, self.before, *self.after)
+        )
         return (
-            mutant.function == self.function
+            mutant.function == function
             and (not self.shapes or shape in self.shapes)
-            and _like(self.before, mutant.before)
-            and any(_like(after, mutant.after) for after in self.after)
+            and _like(before, mutant.before)
+            and any(_like(text, mutant.after) for text in after)
         )
 
 
@@ -139,7 +152,7 @@ class Bench:
         program = folder / "mutant"
         command = [
             GCC.find(), *flags, f"-I{folder}", "-o", str(program),
-            str(self.harness), str(folder / ROUTINE),
+            str(self.harness), str(folder / self.work.named(ROUTINE)),
         ]  # fmt: skip
         if run(command, folder).code:
             return None
@@ -151,33 +164,34 @@ class Bench:
 
     def is_seen(self, folder: Path) -> bool:
         """Whether a change reaches this host's compiler: assembly for another core does not."""
+        routine = self.work.named(ROUTINE)
         return any(
-            _preprocessed(folder, form) != _preprocessed(self.work.folder, form)
+            _preprocessed(folder, form, routine) != _preprocessed(self.work.folder, form, routine)
             for form in FORMS.values()
         )
 
 
-def _is_clean(folder: Path) -> bool:
+def _is_clean(folder: Path, routine: str) -> bool:
     """Whether the delivery would compile it: there every warning is an error."""
     return not any(
-        run([GCC.find(), *DELIVERY_FLAGS, *form, "-c", "-o", "/dev/null", ROUTINE], folder).code
+        run([GCC.find(), *DELIVERY_FLAGS, *form, "-c", "-o", "/dev/null", routine], folder).code
         for form in FORMS.values()
     )
 
 
-def _preprocessed(folder: Path, form: Sequence[str]) -> str:
-    return run([GCC.find(), "-E", "-P", *form, ROUTINE], folder).text
+def _preprocessed(folder: Path, form: Sequence[str], routine: str) -> str:
+    return run([GCC.find(), "-E", "-P", *form, routine], folder).text
 
 
 def c_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
     """Mutants of triax_comp.c, each `every`-th."""
-    source = (bench.work.folder / ROUTINE).read_text()
+    source = (bench.work.folder / bench.work.named(ROUTINE)).read_text()
     return judge_all(bench, mutants_of(source)[::every], ROUTINE)
 
 
 def constants_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
     """Each integer of triax_calib.h one up and one down."""
-    source = (bench.work.folder / CONSTANTS).read_text()
+    source = (bench.work.folder / bench.work.named(CONSTANTS)).read_text()
     mutants = []
     for match in _INTEGER.finditer(source):
         value = -(2**31) if match.group(1).startswith("(") else int(match.group(1))
@@ -217,7 +231,7 @@ def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
         number, mutant = item
         folder = bench.work.folder / f"mutant_{file}_{number}"
         _fill(folder, bench.work)
-        (folder / file).write_text(mutant.source)
+        (folder / bench.work.named(file)).write_text(mutant.source)
         survives = bench.survives(folder)
         if survives is None:
             fate = STILLBORN
@@ -229,7 +243,7 @@ def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
             fate = ELSEWHERE
         elif not bench.survives(folder, SANITIZED):
             fate = BY_SANITIZER
-        elif file == ROUTINE and not _is_clean(folder):
+        elif file == ROUTINE and not _is_clean(folder, bench.work.named(ROUTINE)):
             fate = BY_COMPILER
         else:
             fate = SURVIVED
@@ -244,7 +258,7 @@ def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
 
 def _fill(folder: Path, work: Workspace) -> None:
     folder.mkdir(exist_ok=True)
-    for name in (ROUTINE, CONSTANTS, "triax_comp.h"):
+    for name in map(work.named, (ROUTINE, CONSTANTS, "triax_comp.h")):
         (folder / name).write_bytes((work.folder / name).read_bytes())
 
 
@@ -257,13 +271,13 @@ def _write_vectors(plan: Plan, vectors: Path, answers: Path) -> None:
     with vectors.open("wb") as given, answers.open("wb") as expected:
         for v in (VectorSet("images", temp, raw), *order):
             accel, status = routine(v.temp, v.raw)
-            given.write(_rows(v.temp, v.raw))
+            given.write(_given(plan, v.temp, v.raw))
             expected.write(_rows(accel, status.view(np.int32)))
 
 
 def _write_images(work: Workspace, path: Path) -> None:
     """Images of the cross-check with the status and the answers of the reference C."""
-    reference = Reference(start_reference(work.folder).load())
+    reference = _reference(work)
     temp, raw = case_vectors(work.plan)
     with path.open("wb") as file:
         file.write(struct.pack("=I", len(temp)))
@@ -272,11 +286,25 @@ def _write_images(work: Workspace, path: Path) -> None:
             file.write(struct.pack("=II", size, 0 if case.accepted else 16))
             file.write(case.image + bytes(-size % 4))
             if case.accepted:
-                accel, status = reference.routine(case.image)(temp, raw)
+                accel, status = reference(case.image)(temp, raw)
                 file.write(_rows(accel, status.view(np.int32)))
 
 
-def _rows(*columns: np.ndarray[tuple[int, ...], np.dtype[np.int32]]) -> bytes:
+def _reference(work: Workspace) -> Callable[[bytes], Routine]:
+    """The handwritten reference of the triad, which binds an image."""
+    library, rate = start_reference(work.folder).load(), work.plan.rate
+    if work.plan.shape.gyro:
+        return GyroReference(library).routine
+    return (Reference(library) if rate is None else RateReference(library, rate)).routine
+
+
+def _given(plan: Plan, temp: npt.NDArray[np.int32], raw: npt.NDArray[np.int32]) -> bytes:
+    """Rows of inputs: the codes, and what else the routine of the plan is given."""
+    more = [] if plan.rate is None else [rates_of(plan.rate, temp)]
+    return _rows(temp, raw, *more, *([forces_of(temp, raw)] if plan.shape.gyro else []))
+
+
+def _rows(*columns: npt.NDArray[np.integer]) -> bytes:
     return np.column_stack(columns).astype(np.int32).tobytes()
 
 

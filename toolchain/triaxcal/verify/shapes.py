@@ -66,19 +66,20 @@ WITH_TERMS = {"quadratic": EXAMPLE_TERMS, "rate": replace(EXAMPLE_TERMS, rate=EX
 """Terms of shapes that have them."""
 
 MORE_SHAPES = {"rate": ("AT-SIM", _as_shipped), "gyro": ("AT-SIM", _as_shipped)}
-"""Shapes that the tools look at besides, but neither mutation testing nor fuzzing: their runners do
-not vary dT/dt and the specific force yet."""
+"""Shapes that fuzzing leaves out: its runner does not vary dT/dt and the specific force."""
+
+ALL_SHAPES = {**SHAPES, **MORE_SHAPES}
 
 
 def subject(name: str, units: Path) -> Subject:
-    """One of `SHAPES`, from the measurements of a unit in the folder `units`.
+    """One of `ALL_SHAPES`, from the measurements of a unit in the folder `units`.
 
     Raises
     ------
     RefusedError
         When the unit's files are refused.
     """
-    unit_name, change = {**SHAPES, **MORE_SHAPES}[name]
+    unit_name, change = ALL_SHAPES[name]
     folder = units / unit_name
     unit = change(read_unit(folder))
     calibration = calibrate(unit, read_measurements(folder / MEASUREMENTS_FILE, unit))

@@ -3,6 +3,7 @@
 A sample stamped t shows the force of t - tau. Gravity turns in the instrument as f' = -w x f, w
 against the Earth, so f(t - tau) = exp(tau [w]) f(t): to first order the error is tau w x f. With
 P2's hat(w) = -[w] the term of y is therefore -L'^T hat(w) f tau; the sign in print is lost.
+What is felt besides gravity, by the lever arms, is late as well: less tau times its change.
 At one constant rate tau cannot be told from a turn of the gyros' axes.
 """
 
@@ -16,8 +17,9 @@ from triaxcal.model.types import FloatArray
 
 
 def rows(signals: Signals) -> FloatArray:
-    """First order: w x f."""
-    return np.cross(signals.turn, signals.force)[:, :, None]
+    """First order: w x f, and what else is felt."""
+    first: FloatArray = np.cross(signals.turn, signals.force)[:, :, None]
+    return first if signals.jerk is None else first - signals.jerk[:, :, None]
 
 
 def curve(signals: Signals, p: FloatArray) -> FloatArray:
@@ -27,6 +29,8 @@ def curve(signals: Signals, p: FloatArray) -> FloatArray:
         angle = angle - signals.acceleration * (p[0] ** 2 / 2)
     turned = rotation_of(angle)
     later: FloatArray = np.einsum("nij,nj->ni", turned, signals.force) - signals.force
+    if signals.jerk is not None:
+        later = later - signals.jerk * p[0]
     return later
 
 

@@ -1,8 +1,9 @@
 """Positions of the proof masses of accelerometers 2 and 3 against that of 1, which is M, P2 (16).
 
-Accelerometer i at rho feels e_i . (w' x rho + w x (w x rho)) more than M, w against inertial space
-and w' its rate of change. Only one component is felt, so this is no change of a velocity as for
-the lever arm; but with C = L^T, dC/dt = C [w_E] (w_E against the Earth) and E_i = e_i e_i^T,
+Accelerometer i at rho feels a_i . (w' x rho + w x (w x rho)) more than M, w against inertial
+space, w' its rate of change, a_i its sensitive axis, row i of A = 1 + Gamma. Only one component is
+felt, so this is no change of a velocity as for the lever arm; but with E_i = A^-1 e_i a_i^T,
+C = L^T and dC/dt = C [w_E] (w_E against the Earth),
 
     integral C E_i [w'] rho = ends of (C E_i [w] rho) - integral C [w_E] E_i [w] rho,
 
@@ -20,21 +21,23 @@ from triaxcal.model.types import FloatArray
 _MASSES = (1, 2)
 
 
-def _felt(matrix: FloatArray) -> FloatArray:
+def _felt(matrix: FloatArray, signals: Signals) -> FloatArray:
     """E_i matrix for each mass side by side, shape (n, 3, 6)."""
-    felt = np.zeros((len(matrix), 3, 6))
-    for place, i in enumerate(_MASSES):
-        felt[:, i, 3 * place : 3 * place + 3] = matrix[:, i]
+    A = np.eye(3) if signals.triad is None else signals.triad
+    out = np.linalg.inv(A)
+    along = A @ matrix
+    each = [out[:, [i]] * along[:, [i]] for i in _MASSES]
+    felt: FloatArray = np.concatenate(each, axis=2)
     return felt
 
 
 def _ends(signals: Signals) -> FloatArray:
-    return _felt(skew(signals.rate))
+    return _felt(skew(signals.rate), signals)
 
 
 def _rest(signals: Signals) -> FloatArray:
     rate = skew(signals.rate)
-    rest: FloatArray = _felt(rate @ rate) - skew(signals.turn) @ _felt(rate)
+    rest: FloatArray = _felt(rate @ rate, signals) - skew(signals.turn) @ _felt(rate, signals)
     return rest
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import permutations, product
 
 import numpy as np
@@ -11,16 +12,29 @@ from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.poses import ALIKE_DEG, PoseSet
 from triaxcal.recording.samples import Samples
-from triaxcal.recordinglayout import RecordingLayout
+from triaxcal.recordinglayout import SAMPLES, RecordingLayout
 
 CONDITION_MAX = 100.0
 """Of the scaled Jacobian: beyond it a hundredth of a constant's effect tells it from the others."""
+_PLANE = 0.02
+"""Rms distance of the poses from a plane, of 1 g: a bias across it has 50 times their noise."""
 _CROWD = 0.6
 """Of the poses in one orientation: a crowd that is told."""
 _HANDED_MIN = 0.35
 """Correlation of the movement with the gyro that can decide: logs turned by hand have about 0.5."""
 _MOVING_MIN = 50
 """Samples of movement that can decide."""
+_COUNTS_MIN = 50.0
+"""Length of 1 g in counts: a code of a 50th of 1 g, 20 mg, is coarser than any sensor."""
+_SIZES = {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3}
+_HANDED_UNKNOWN = (
+    "note: |a| is the same with left-handed axes and with all signs turned, so neither can be seen "
+    "here: an axis that points up must read more than its bias, and x, y, z must be right-handed"
+)
+_SIGN_UNKNOWN = (
+    "note: the axes turn as the gyro says; that all three signs are turned cannot be seen here: an "
+    "axis that points up must read more than its bias"
+)
 
 
 def refuse_wrong_unit(source: str, readings: FloatArray, layout: RecordingLayout) -> None:
@@ -29,13 +43,13 @@ def refuse_wrong_unit(source: str, readings: FloatArray, layout: RecordingLayout
     The median over the poses: biases and scale errors stay far within a factor of two.
     """
     one_g = layout.reading_of_1_g
-    if one_g is None:
-        return
     length = float(np.median(np.linalg.norm(readings, axis=1)))
+    if one_g is None:
+        _refuse_no_counts(source, layout, length)
+        return
     if 0.5 * one_g <= length <= 2.0 * one_g:
         return
-    taken = {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3}
-    near = [u for u, size in taken.items() if 0.7 * size <= length <= 1.4 * size]
+    near = [u for u, size in _SIZES.items() if 0.7 * size <= length <= 1.4 * size]
     remedy = (
         f'{near[0]} taken for {layout.acceleration_unit}? then acceleration_unit = "{near[0]}"'
         if near
@@ -49,14 +63,44 @@ def refuse_wrong_unit(source: str, readings: FloatArray, layout: RecordingLayout
     )
 
 
-def refuse_left_handed(samples: Samples, centre: FloatArray) -> None:
+def _refuse_no_counts(source: str, layout: RecordingLayout, length: float) -> None:
+    """Refuse counts that are so small that they are none: a code would be a big step."""
+    if layout.acceleration_unit != "count" or length > _COUNTS_MIN:
+        return
+    near = [u for u, size in _SIZES.items() if 0.7 * size <= length <= 1.4 * size]
+    raise RefusedError(
+        source,
+        f"the poses' readings are about {length:.4g} counts long",
+        expected=f"more than {_COUNTS_MIN:g}: the firmware computes from whole counts",
+        remedy=f'{near[0]} taken for counts? then acceleration_unit = "{near[0]}"'
+        if near
+        else "give the unit of the readings, acceleration_unit",
+    )
+
+
+def turned_columns(layout: RecordingLayout, order: Sequence[int], turned: Sequence[bool]) -> str:
+    """Line for unit.toml: the layout's own columns in another order, some with the other sign."""
+    words = []
+    for k, negative in zip(order, turned, strict=True):
+        column = layout.acceleration[k]
+        minus = (column.sign < 0) != bool(negative)
+        if isinstance(column.column, int):
+            words.append(str(-column.column if minus else column.column))
+        else:
+            words.append(f'"{"-" * minus}{column.column}"')
+    return f"acceleration = [{', '.join(words)}]"
+
+
+def refuse_left_handed(samples: Samples, layout: RecordingLayout, centre: FloatArray) -> str:
     """Refuse readings that turn the other way than the gyro says; `centre` is a rough bias, (3,).
+
+    What the recording cannot tell of its axes is returned, in words.
 
     A force fixed in the world, seen from the turning unit, obeys da/dt = a x w. Over slow movement
     both sides correlate for one way of naming and signing the axes: it must be theirs.
     """
-    if samples.gyro is None or len(samples.reading) < _MOVING_MIN:
-        return
+    if samples.gyro is None or layout.rows != SAMPLES or len(samples.reading) < _MOVING_MIN:
+        return _HANDED_UNKNOWN
     window = max(1, round(0.1 / samples.step_s))
     force = _smooth(samples.reading - centre, window)
     rate = _smooth(samples.gyro - np.median(samples.gyro, axis=0), window)
@@ -66,22 +110,26 @@ def refuse_left_handed(samples: Samples, centre: FloatArray) -> None:
     # Where |a| is far from 1 g the hand pushes, and it is not gravity that is seen.
     moving = (np.abs(length - middle) < 0.1 * middle) & (speed > np.percentile(speed, 70))
     if moving.sum() < _MOVING_MIN:
-        return
+        return _HANDED_UNKNOWN
     scores = {
         turned: _correlation(change[moving] @ matrix.T, force[moving] @ matrix.T, rate[moving])
         for turned, matrix in _TURNS.items()
     }
     best = max(scores, key=lambda turned: scores[turned])
     own = scores["x, y, z"]
+    if own >= _HANDED_MIN and scores[best] < 2.0 * own:
+        return _SIGN_UNKNOWN
     if scores[best] < _HANDED_MIN or scores[best] < 2.0 * own:
-        return
+        return _HANDED_UNKNOWN
+    matrix = _TURNS[best]
+    order = np.abs(matrix).argmax(axis=1).tolist()
+    columns = turned_columns(layout, order, (matrix.sum(axis=1) < 0.0).tolist())
     raise RefusedError(
         samples.source,
         f"the readings turn with the gyro as x, y, z = {best} would (correlation "
         f"{scores[best]:.2f}; {own:.2f} as they are)",
         expected="da/dt = a x w, right-handed axes for both",
-        remedy='left-handed axes? set signs and columns so, as ["ax", "-ay", "az"]; if only the '
-        "gyro is turned, leave it out",
+        remedy=f"left-handed axes? then {columns}; if only the gyro is turned, leave it out",
     )
 
 
@@ -150,16 +198,29 @@ def refuse_few(poses: PoseSet, orientations: int, needed: int) -> None:
     )
 
 
-def refuse_unseen(poses: PoseSet, condition: float, unseen: str) -> None:
-    """Refuse poses that leave a constant open; tell a plane from another lack."""
-    if condition <= CONDITION_MAX:
+def refuse_plane(poses: PoseSet, radius: float) -> None:
+    """Refuse poses in a plane: no sphere is seen by a circle. `radius` is about that of 1 g."""
+    centred = poses.readings - poses.readings.mean(axis=0)
+    _, singular, directions = np.linalg.svd(centred / radius / np.sqrt(len(centred)))
+    if singular[-1] >= _PLANE:
         return
-    spread = np.linalg.svd(poses.readings - poses.readings.mean(axis=0), compute_uv=False)
-    plane = ", which lie near one plane," if spread[-1] < 0.1 * spread[0] else ""
+    normal = AXES[int(np.abs(directions[-1]).argmax())]
     raise RefusedError(
         poses.source,
-        f"the {len(poses.poses)} poses{plane} leave {unseen} open (condition number "
-        f"{condition:.3g})",
+        f"the {len(poses.poses)} poses, which lie near one plane, leave U0{normal} and what goes "
+        f"with it open (they are within {np.degrees(singular[-1]):.2g} deg of the plane, rms)",
+        expected=f"{np.degrees(_PLANE):.2g} deg at least",
+        remedy=f"add poses with {normal} up and down, and some between",
+    )
+
+
+def refuse_unseen(poses: PoseSet, condition: float, unseen: str) -> None:
+    """Refuse poses that leave a constant open."""
+    if condition <= CONDITION_MAX:
+        return
+    raise RefusedError(
+        poses.source,
+        f"the {len(poses.poses)} poses leave {unseen} open (condition number {condition:.3g})",
         expected=f"a condition number of at most {CONDITION_MAX:g}",
         remedy="add poses with each axis up and down, and some between",
     )

@@ -12,8 +12,9 @@ from triaxcal.fit.grouping import GROUP_GAP_DEGC
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.samples import Samples
-from triaxcal.recordinglayout import RecordingLayout
+from triaxcal.recordinglayout import FACES, RecordingLayout
 from triaxcal.records import Dwell, MeasurementSet
+from triaxcal.tomltable import did_you_mean, shown
 from triaxcal.unitfile import UnitDescription
 
 _MOVING = 0.1
@@ -31,18 +32,12 @@ def face_measurements(
     Raises
     ------
     RefusedError
-        When no section has one of the labels, readings are in another unit, or the unit moved.
+        When a face has no section, readings are in another unit, or the unit moved.
     """
     assert samples.label is not None
     runs = _runs(samples.label)
     faces = [(layout.faces[label], part) for label, part in runs if label in layout.faces]
-    if not faces:
-        found = ", ".join(sorted(set(samples.label))[:10])
-        raise RefusedError(
-            samples.source,
-            f"sections found: {found}",
-            expected="those of [recording] faces: " + ", ".join(layout.faces),
-        )
+    _refuse_missing(unit, layout, samples)
     means = np.array([samples.reading[part].mean(axis=0) for _, part in faces])
     refuse_wrong_unit(samples.source, means, layout)
     one_g = float(np.median(np.linalg.norm(means - means.mean(axis=0), axis=1)))
@@ -56,6 +51,33 @@ def face_measurements(
     return MeasurementSet(
         samples.source, tuple(_dwell(samples, faces, temps, cell) for cell in cells)
     )
+
+
+def _refuse_missing(unit: UnitDescription, layout: RecordingLayout, samples: Samples) -> None:
+    """Refuse a face without a section, by the label that it should have."""
+    assert samples.label is not None
+    unnamed = [face for face in FACES if face not in layout.faces.values()]
+    if unnamed:
+        raise RefusedError(
+            f"{unit.name}/unit.toml, [recording] faces",
+            f"no label for {', '.join(unnamed)}",
+            expected="six faces, +x, -x, +y, -y, +z and -z",
+            remedy='name the sections in which these axes point up, or leave out faces: "|a| = g" '
+            "alone then serves",
+        )
+    present = set(samples.label)
+    for face in FACES:
+        labels = [label for label, up in layout.faces.items() if up == face]
+        if present.isdisjoint(labels):
+            others = sorted(present - set(layout.faces))
+            hint = did_you_mean(labels[0], [label for label in others if label])
+            raise RefusedError(
+                samples.source,
+                f"no section {shown(labels[0])}, {face} up{hint}; sections found: "
+                + ", ".join(sorted(present)[:10]),
+                expected="one of each label in [recording] faces",
+                remedy="correct the label in faces, or record that face",
+            )
 
 
 def _runs(labels: tuple[str, ...]) -> list[tuple[str, slice]]:

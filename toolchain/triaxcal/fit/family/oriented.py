@@ -72,7 +72,7 @@ def inverse_linear(readings: FloatArray, force: FloatArray) -> OrientedFit:
     solution = _solve(design, force)
     C = solution[1:].T / spread
     K = np.linalg.inv(C).astype(np.float64)
-    return OrientedFit(K, middle - K @ solution[0], None, _condition(design))
+    return OrientedFit(K, middle - K @ solution[0], None, scaled_condition(design))
 
 
 def inverse_quadratic(readings: FloatArray, force: FloatArray) -> OrientedFit:
@@ -90,7 +90,7 @@ def inverse_quadratic(readings: FloatArray, force: FloatArray) -> OrientedFit:
         K = (K @ np.linalg.inv(solution[1:4].T)).astype(np.float64)
         U0 = U0 - K @ solution[0]
         Q = solution[4:].T @ TRACELESS
-    return OrientedFit(K, U0, Q, _condition(design))
+    return OrientedFit(K, U0, Q, scaled_condition(design))
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class SerialGrid:
         if quadratic:
             design = np.concatenate([design, products(force) @ TRACELESS.T], axis=1)
         Q, R = np.linalg.qr(design)
-        return SerialGrid(np.linalg.solve(R, Q.T).astype(np.float64), _condition(design))
+        return SerialGrid(np.linalg.solve(R, Q.T).astype(np.float64), scaled_condition(design))
 
     def unknowns(self, readings: FloatArray) -> FloatArray:
         """Unknowns, shape (3, 4 or 9), of readings (n, 3) taken on the grid."""
@@ -167,7 +167,7 @@ def table_error_g(
 
 def design_condition(force: FloatArray) -> float:
     """Condition number of the linear design of forces or directions (n, 3)."""
-    return _condition(_with_one(force))
+    return scaled_condition(_with_one(force))
 
 
 def _with_one(values: FloatArray) -> FloatArray:
@@ -179,7 +179,8 @@ def _solve(design: FloatArray, right: FloatArray) -> FloatArray:
     return solution
 
 
-def _condition(design: FloatArray) -> float:
+def scaled_condition(design: FloatArray) -> float:
+    """Condition number of a design, its columns scaled to length 1 as far as they are seen."""
     # A function that stays below 0.03 g is not brought to length 1: it is not seen.
     length = np.maximum(np.linalg.norm(design, axis=0), 0.03 * np.sqrt(len(design)))
     singular = np.linalg.svd(design / length, compute_uv=False)

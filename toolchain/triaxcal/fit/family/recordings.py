@@ -8,21 +8,37 @@ from itertools import pairwise
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
 from triaxcal.fit.calibrate import Calibration, CalibrationPoint
 from triaxcal.fit.family.checks import (
     crowd_finding,
     refuse_few,
     refuse_left_handed,
+    refuse_plane,
     refuse_unseen,
     refuse_wrong_unit,
 )
 from triaxcal.fit.family.frame import CASE, case_rotation, turned_constants, turned_quadratic
+from triaxcal.fit.family.outliers import worst_outlier
 from triaxcal.fit.family.result import RecordingFit
 from triaxcal.fit.family.scalar import MODELS, NINE, ScalarData, ScalarModel, scalar_data
-from triaxcal.fit.family.trials import Judged, Trial, choose, folds, judge, reason, unscored
+from triaxcal.fit.family.temperatures import (
+    no_temperature,
+    recording_range,
+    temperature_groups,
+    thermal_orders,
+)
+from triaxcal.fit.family.trials import (
+    TURNS_MAX,
+    Judged,
+    Trial,
+    choose,
+    folds,
+    judge,
+    reason,
+    unscored,
+)
 from triaxcal.fit.grouping import GROUP_GAP_DEGC
-from triaxcal.fit.thermal import EDGE_DEGC, POLYNOMIAL, ThermalShape, polynomial_shape
+from triaxcal.fit.thermal import ThermalShape, polynomial_shape
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.types import FloatArray
@@ -33,12 +49,12 @@ from triaxcal.records import Dwell, MeasurementSet
 from triaxcal.unitfile import UnitDescription
 
 ESTIMATOR = "|a| = g"
-THERMAL_SPREAD_DEGC = 5.0
-"""Poses over less than this are at one temperature: an order is not asked of them."""
-ORDER_MAX = 3
+_UNCHECKED = (
+    "NOT CHECKED: {count} constants from {count} poses fit whatever the poses say; the residuals "
+    "are 0 by themselves, and how well the constants are known is unknown; record more poses, in "
+    "other orientations"
+)
 BEYOND_1_G = "quadratic terms were seen at 1 g; beyond it they grow with the square, unchecked"
-_OUTLIER = 6.0
-"""Robust deviations: a pose that stands out by more is told."""
 
 
 def calibrate_poses(
@@ -87,17 +103,16 @@ def _prepared(
     refuse_few(poses, len(poses.poses), MODELS[0].parameters)
     ones = np.ones(len(temps))
     rough = scalar_data(poses.readings, ones[:, None], ones, unit.gravity_g)
-    refuse_left_handed(samples, rough.centre)
+    axes = refuse_left_handed(samples, layout, rough.centre)
     orientations, _ = _groups(rough, temps)
     refuse_few(poses, len(orientations), MODELS[0].parameters)
+    refuse_plane(poses, rough.radius)
     crowd = crowd_finding(orientations, poses)
     if crowd:
         findings.append(crowd)
     if recorded is None:
-        findings.append(
-            f"no temperature in the recording: the constants are taken as those of T0 = "
-            f"{unit.t0_degc:g} degC, and nothing shows how they change"
-        )
+        findings.append(no_temperature(unit))
+    findings.append(axes)
     weight = np.ones(len(temps))
     for group in _cells(orientations, temps):
         weight[group] = 1.0 / math.sqrt(len(group))
@@ -112,13 +127,7 @@ def _directions(data: ScalarData) -> FloatArray:
 
 def _groups(data: ScalarData, temps: FloatArray) -> tuple[list[list[int]], list[list[int]]]:
     """Poses by orientation, and by temperature (rising)."""
-    order = [int(k) for k in np.argsort(temps, kind="stable")]
-    temperatures = [[order[0]]]
-    for before, k in pairwise(order):
-        if temps[k] - temps[before] > GROUP_GAP_DEGC:
-            temperatures.append([])
-        temperatures[-1].append(k)
-    return orientation_groups(_directions(data)), temperatures
+    return orientation_groups(_directions(data)), temperature_groups(temps)
 
 
 def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
@@ -136,40 +145,13 @@ def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
 
 def _trials(unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]) -> list[Trial]:
     """Every model at one temperature, and the nine constants with each thermal order."""
-    spread = float(np.ptp(temps))
-    asked = unit.thermal.order
-    constant = polynomial_shape(temps, unit.t0_degc, 0)
-    where = f"{unit.name}/unit.toml, [thermal]"
-    if unit.thermal.model not in ("auto", POLYNOMIAL):
-        raise RefusedError(
-            f"{where} model",
-            f'"{unit.thermal.model}" for a recording',
-            expected='"polynomial" or "auto"',
-        )
-    if spread < THERMAL_SPREAD_DEGC:
-        if asked:
-            raise RefusedError(
-                f"{where} order",
-                f"order {asked}, but all {len(temps)} poses are at one temperature "
-                f"({temps.min():.4g} to {temps.max():.4g} degC)",
-                expected=f"poses over {THERMAL_SPREAD_DEGC:g} degC at least",
-                remedy="record poses at more temperatures, or order = 0",
-            )
-        return [Trial(model, constant, 1) for model in _models(unit)]
-    trials = [Trial(model, constant, 1) for model in _models(unit)] if not asked else []
-    highest = min(ORDER_MAX, len(temperatures) - 1)
-    if asked and asked > highest:
-        raise RefusedError(
-            f"{where} order",
-            f"order {asked} with poses at {len(temperatures)} temperature"
-            f"{'s' * (len(temperatures) != 1)}",
-            expected=f"{highest} at most",
-        )
-    for order in range(1, highest + 1):
+    trials = []
+    for order in thermal_orders(unit, temps, temperatures):
         shape = polynomial_shape(temps, unit.t0_degc, order)
-        if not asked or asked == order:
-            gains = sorted({1, order, order + 1})
-            trials += [Trial(NINE, shape, g) for g in gains]
+        if order == 0:
+            trials += [Trial(model, shape, 1) for model in _models(unit)]
+        else:
+            trials += [Trial(NINE, shape, g) for g in sorted({1, order, order + 1})]
     return trials
 
 
@@ -180,19 +162,27 @@ def _models(unit: UnitDescription) -> tuple[ScalarModel, ...]:
 
 def _turns(orientations: list[list[int]], temperatures: list[list[int]]) -> str:
     inner = max(len(temperatures) - 2, 0) if len(temperatures) >= 4 else 0
-    words = f"{len(orientations)} orientations"
+    bundles = f" in {TURNS_MAX} bundles" if len(orientations) > TURNS_MAX else ""
+    words = f"{len(orientations)} orientations{bundles}"
     return words + (f" and {inner} temperatures" if inner else "")
 
 
 def _outlier(best: Judged, poses: PoseSet) -> list[str]:
-    errors = best.fit.residual_g
-    usual = 1.4826 * float(np.median(np.abs(errors)))
-    worst = int(np.abs(errors).argmax())
-    if abs(errors[worst]) <= _OUTLIER * usual:
+    """Names a pose that the others contradict, by its leverage in the fit."""
+    fit = best.fit
+    weighted = fit.residual_g * fit.data.weight
+    lever = (np.linalg.qr(fit.jacobian)[0] ** 2).sum(axis=1)
+    left_out = weighted / np.maximum(1.0 - lever, 1e-9)
+    found = worst_outlier(weighted[:, None], left_out[:, None], len(fit.theta))
+    if found is None:
         return []
+    worst = found.indices[0]
+    numbers = " or ".join(f"pose {poses.poses[k].number}" for k in found.indices[:4])
+    error = left_out[worst] / fit.data.weight[worst] * 1e3
     told = (
-        f"pose {poses.poses[worst].number} stands out: {errors[worst] * 1e3:.3g} mg where the "
-        f'others have {usual * 1e3:.2g}; look at it, or set [fit] loss = "huber"'
+        f"{numbers} (line {poses.poses[worst].line}) stands out: |a| is {error:+.3g} mg off by the "
+        f"other poses, which are within {found.others * 1e3:.2g} mg rms; look at it, take it out, "
+        'or set [fit] loss = "huber"'
     )
     return [told]
 
@@ -240,6 +230,9 @@ class _Made:
             turned = [turned_constants(slopes[..., k], rotation) for k in range(slopes.shape[-1])]
             slopes = np.stack(turned, axis=-1)
         covariance = np.einsum("apk,kl,bql->apbq", slopes, fit.covariance, slopes)
+        if len(fit.residual_g) == len(fit.theta):
+            covariance = np.full_like(covariance, np.nan)
+            findings.insert(0, _UNCHECKED.format(count=len(fit.theta)))
         return self._calibration(shape, constants, quadratic, covariance, findings)
 
     def _calibration(
@@ -253,7 +246,7 @@ class _Made:
         fit, t0 = self.best.fit, self.unit.t0_degc
         thermal = shape.model(constants)
         basis = shape.basis(t0)
-        dof = max(len(fit.residual_g) - len(fit.theta), 1)
+        dof = len(fit.residual_g) - len(fit.theta)
         terms = Terms(quadratic_per_g=quadratic) if len(fit.model.quadratic) else NO_TERMS
         result = RecordingFit(
             poses=self.poses,
@@ -261,8 +254,9 @@ class _Made:
             covariance=covariance,
             dof=dof,
             rms_g=fit.rms_g,
-            rms_free_g=math.sqrt(float((fit.residual_g**2).sum()) / dof),
+            rms_free_g=math.sqrt(float((fit.residual_g**2).sum()) / dof) if dof else math.nan,
             held_out_g=self.best.held_out_g,
+            left_out_length_g=self.best.held_out_g,
             condition=fit.condition,
             weakest=fit.unseen(),
             residual_g=fit.residual_g,
@@ -283,7 +277,7 @@ class _Made:
                     curve_residual_g=fit.rms_g,
                 ),
             ),
-            parameter_covariance=_blocks(covariance),
+            parameter_covariance=covariance_blocks(covariance),
             covariance_source="scatter of |a| - g over the poses, "
             f"{dof} degree{'s' * (dof != 1)} of freedom",
             candidates=tuple(
@@ -297,41 +291,7 @@ class _Made:
         )
 
 
-def _blocks(covariance: FloatArray) -> FloatArray:
+def covariance_blocks(covariance: FloatArray) -> FloatArray:
     """The blocks of each output, (3, 4, P, 4, P), of (12, P, 12, P)."""
     rows = np.array([[3 * i, 3 * i + 1, 3 * i + 2, 9 + i] for i in range(3)])
     return np.stack([covariance[r][:, :, r] for r in rows])
-
-
-def recording_range(
-    unit: UnitDescription, poses: PoseSet, temps: FloatArray
-) -> tuple[float, float]:
-    """Working range: that of the poses, outward to 0.1 degC, or the one stated in unit.toml.
-
-    Raises
-    ------
-    RefusedError
-        When the stated range reaches beyond the poses' temperatures. Without any temperature in
-        the recording it is the user's word.
-    """
-    low, high = float(temps.min()), float(temps.max())
-    stated = unit.range_degc
-    if stated is None:
-        if high - low < 2.0 * EDGE_DEGC:
-            middle = (low + high) / 2.0
-            low, high = middle - EDGE_DEGC, middle + EDGE_DEGC
-        # The 1e-6 forgives the rounding of decimal temperatures.
-        return round(math.floor(low * 10.0 + 1e-6) / 10.0, 1), round(
-            math.ceil(high * 10.0 - 1e-6) / 10.0, 1
-        )
-    if poses.temps_degc is not None and (
-        stated[0] < low - EDGE_DEGC or stated[1] > high + EDGE_DEGC
-    ):
-        raise RefusedError(
-            f"{unit.name}/unit.toml, [thermal] range_degc",
-            f"{stated[0]:g} to {stated[1]:g} degC",
-            expected=f"within {EDGE_DEGC:g} degC of the poses' temperatures, {low:.4g} to "
-            f"{high:.4g} degC",
-            remedy="narrow the range, or record poses further out: nothing is extrapolated",
-        )
-    return stated

@@ -19,11 +19,15 @@ class RecordingFit:
         What was known of the poses, in words.
     covariance : array, shape (12, P, 12, P)
         Of the constants' parameters, in the order of `CONSTANT_NAMES`.
+        NaN without any degree of freedom.
     dof : int
-        Degrees of freedom of the residuals.
+        Degrees of freedom of the residuals; 0 where there are as many constants as poses.
     rms_g, rms_free_g : float
-        Rms of |a| - g at the fitted poses, and the same per degree of freedom.
+        Rms of |a| - g (of its components, where angles are known) at the fitted poses, and the
+        same per degree of freedom; the latter NaN without any.
     held_out_g : float or None
+        The same at what was left out in turn: the score of the candidates.
+    left_out_length_g : float or None
         Rms of |a| - g at poses left out in turn.
     condition : float
         Condition number of the scaled Jacobian.
@@ -42,7 +46,13 @@ class RecordingFit:
     rms_g: float
     rms_free_g: float
     held_out_g: float | None
+    left_out_length_g: float | None
     condition: float
     weakest: str
     residual_g: FloatArray
     findings: tuple[str, ...]
+
+    @property
+    def checked(self) -> bool:
+        """Whether anything but the fitted constants themselves speaks for them."""
+        return self.dof > 0

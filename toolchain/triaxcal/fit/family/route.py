@@ -13,6 +13,7 @@ from triaxcal.fit.calibrate import Calibration, calibrate
 from triaxcal.fit.family.faces import face_measurements
 from triaxcal.fit.family.recordings import calibrate_poses
 from triaxcal.fit.family.tables import calibrate_table
+from triaxcal.fit.family.temperatures import no_temperature
 from triaxcal.recording.samples import Samples, read_samples
 from triaxcal.recordinglayout import RecordingLayout
 from triaxcal.records import MeasurementSet
@@ -38,7 +39,14 @@ def calibrate_recording(
         measurements = face_measurements(unit, layout, samples)
         found = calibrate(unit, measurements)
         refuse_unacceptable(unit, found, measurements)
-        return unit, measurements, replace(found, reading_unit=layout.acceleration_unit)
+        notes = list(samples.findings) + list(found.notes)
+        if samples.temp_degc is None:
+            notes.append(no_temperature(unit))
+        return (
+            unit,
+            measurements,
+            replace(found, reading_unit=layout.acceleration_unit, notes=tuple(notes)),
+        )
     if layout.angles is not None:
         measurements, calibration = calibrate_table(unit, layout, layout.angles, samples)
     else:

@@ -31,6 +31,8 @@ _STEPS_MAX = 60
 _STEPS_NEAR = 12
 _SETTLED = 1e-13
 """Of the scaled constants, which are about 1: rounding."""
+_RADIUS_MAX = 4.0
+"""Of the poses' spread: a cap of 20 deg about one direction has 4.2, poses all round have 1."""
 _NINE = (("Kxx", 0, 0), ("Kyy", 1, 1), ("Kzz", 2, 2), ("Kxy", 0, 1), ("Kxz", 0, 2), ("Kyz", 1, 2))
 
 
@@ -151,8 +153,12 @@ def scalar_data(
     v = (readings - middle) / spread
     # |v|^2 = 2 c.v + (r^2 - |c|^2); the minimum-norm solution where poses lie in a plane.
     design = np.concatenate([2.0 * v, np.ones((len(v), 1))], axis=1)
-    solution = np.linalg.lstsq(design, (v**2).sum(axis=1), rcond=1e-6)[0]
-    radius = float(np.sqrt(max(solution[3] + (solution[:3] ** 2).sum(), 1e-12)))
+    for cut in (1e-6, 0.1):
+        solution = np.linalg.lstsq(design, (v**2).sum(axis=1), rcond=cut)[0]
+        radius = float(np.sqrt(max(solution[3] + (solution[:3] ** 2).sum(), 1e-12)))
+        # Near a plane noise alone says where the centre is along its normal: far off.
+        if radius < _RADIUS_MAX:
+            break
     centre = middle + spread * solution[:3]
     return ScalarData(
         reading=(readings - centre) / (spread * radius),
@@ -207,6 +213,8 @@ class ScalarFit:
         # An effect below 0.01 g for a constant of 1 is not brought to length 1: it is not seen.
         floor = 0.01 * np.sqrt(len(self.jacobian))
         scaled = self.jacobian / np.maximum(np.linalg.norm(self.jacobian, axis=0), floor)
+        if len(scaled) > scaled.shape[1]:  # the triangle has the same singular values
+            scaled = np.asarray(np.linalg.qr(scaled, mode="r"))
         _, singular, vt = np.linalg.svd(scaled, full_matrices=True)
         padded = np.zeros(vt.shape[0])
         padded[: len(singular)] = singular
@@ -297,8 +305,12 @@ def fit_scalar(
     def jacobian(theta: FloatArray) -> FloatArray:
         return _residual(model, gain_functions, data, theta)[1] * data.weight[:, None]
 
+    def both(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        errors, slopes = _residual(model, gain_functions, data, theta)
+        return errors * data.weight, slopes * data.weight[:, None]
+
     if start is not None and loss == "linear":
-        theta = _gauss_newton(residual, jacobian, first)
+        theta = _gauss_newton(both, first)
         if theta is not None:
             return _fitted(model, gain_functions, data, theta)
     # trf takes fewer poses than parameters: the minimum-norm step, told by the condition number.
@@ -327,14 +339,13 @@ def _fitted(
 
 
 def _gauss_newton(
-    residual: Callable[[FloatArray], FloatArray],
-    jacobian: Callable[[FloatArray], FloatArray],
-    start: FloatArray,
+    both: Callable[[FloatArray], tuple[FloatArray, FloatArray]], start: FloatArray
 ) -> FloatArray | None:
     """Solution from a near start in a few steps; None when they do not settle."""
     theta = start
     for _ in range(_STEPS_NEAR):
-        step = np.linalg.lstsq(jacobian(theta), -residual(theta), rcond=1e-10)[0]
+        errors, slopes = both(theta)
+        step = np.linalg.lstsq(slopes, -errors, rcond=1e-10)[0]
         theta = (theta + step).astype(np.float64)
         if np.abs(step).max() < _SETTLED:
             return theta
@@ -369,8 +380,10 @@ def _residual(
     """|a| - g (n,) and its derivatives (n, parameters)."""
     n, P = data.basis.shape
     K_p, bias_p, Q = _split(model, gain_functions, P, theta)
-    K = np.einsum("np,pij->nij", data.basis, K_p)
-    N = np.linalg.inv(K)
+    if P == 1:  # one temperature: one matrix
+        N = np.linalg.inv(K_p[0]) / data.basis[:, :, None]
+    else:
+        N = np.linalg.inv(np.einsum("np,pij->nij", data.basis, K_p))
     linear = np.einsum("nij,nj->ni", N, data.reading - data.basis @ bias_p)
     force = linear + products(linear) @ Q.T
     length = np.linalg.norm(force, axis=1)

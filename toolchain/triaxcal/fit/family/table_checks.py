@@ -7,14 +7,16 @@ import math
 import numpy as np
 
 from triaxcal.errors import RefusedError
-from triaxcal.fit.family.checks import CONDITION_MAX
+from triaxcal.fit.family.checks import CONDITION_MAX, turned_columns
 from triaxcal.fit.family.oriented import design_condition, inverse_linear
-from triaxcal.fit.grouping import GROUP_GAP_DEGC
-from triaxcal.model.orientation import gravity_direction
+from triaxcal.fit.family.outliers import worst_outlier
+from triaxcal.fit.family.table_rows import TableRow
+from triaxcal.fit.family.temperatures import temperature_groups
+from triaxcal.model.orientation import angles_from_force, gravity_direction
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.poses import PoseSet
-from triaxcal.recordinglayout import Angles
+from triaxcal.recordinglayout import ANGLE_NAMES, Angles, RecordingLayout
 from triaxcal.unitfile import UnitDescription
 
 
@@ -42,25 +44,11 @@ def refuse_open(poses: PoseSet, direction: FloatArray) -> None:
         )
 
 
-def one_temperature(unit: UnitDescription, poses: PoseSet) -> FloatArray:
-    """Temperatures of the poses, (n,), which must be one; T0 where none was recorded."""
+def pose_temperatures(unit: UnitDescription, poses: PoseSet) -> tuple[FloatArray, list[list[int]]]:
+    """Temperatures of the poses, (n,), T0 where none was recorded; and the poses of each."""
     recorded = poses.temps_degc
     temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
-    if np.ptp(temps) > GROUP_GAP_DEGC:
-        raise RefusedError(
-            poses.source,
-            f"poses with angles at {temps.min():.4g} to {temps.max():.4g} degC",
-            expected=f"one temperature, within {GROUP_GAP_DEGC:g} degC",
-            remedy="make a unit of each temperature, or leave out the angles: the poses are then "
-            "fitted over temperature by |a| = g alone",
-        )
-    if unit.thermal.order:
-        raise RefusedError(
-            f"{unit.name}/unit.toml, [thermal] order",
-            f"order {unit.thermal.order}, but all poses are at one temperature",
-            expected="0",
-        )
-    return temps
+    return temps, temperature_groups(temps)
 
 
 def _linear_residual(readings: FloatArray, force: FloatArray) -> float:
@@ -95,9 +83,15 @@ def refuse_degrees(
 
 
 def known_force(
-    source: str, angles: Angles, readings: FloatArray, table: FloatArray, gravity_g: float
+    source: str,
+    layout: RecordingLayout,
+    readings: FloatArray,
+    table: FloatArray,
+    gravity_g: float,
 ) -> tuple[FloatArray, float]:
     """Known forces, (n, 3), with the sign of the readings; refuses exchanged or turned axes."""
+    angles = layout.angles
+    assert angles is not None
     force = gravity_g * gravity_direction(angles.kind, table)
     K = inverse_linear(readings, force).K
     scaled = K / np.linalg.norm(K, axis=1, keepdims=True)
@@ -111,10 +105,60 @@ def known_force(
     turned = np.zeros((3, 3))
     turned[np.arange(3), along] = signs * (np.sign(signs.sum()) or 1.0)
     handed = "left-handed axes? " if np.linalg.det(turned) < 0.0 else ""
+    columns = ""
+    if sorted(along.tolist()) == [0, 1, 2]:
+        # The output that looks along x of the table is the first column, and so on.
+        where = [int(np.flatnonzero(along == k)[0]) for k in range(3)]
+        columns = turned_columns(layout, where, [turned[i, along[i]] < 0.0 for i in where])
     raise RefusedError(
         source,
         f"the outputs look {told} of the table",
         expected="x along x, y along y, z along z, of one sign",
-        remedy=f"{handed}exchange columns or turn signs in [recording] acceleration, as "
-        '["ay", "-ax", "az"]',
+        remedy=f"{handed}the angles may be of other axes; if they are right, {columns}"
+        if columns
+        else "check the angles and the columns of [recording] acceleration",
+    )
+
+
+def outlier_findings(
+    unit: UnitDescription,
+    angles: Angles,
+    poses: PoseSet,
+    *,
+    table: FloatArray,
+    sign: float,
+    best: TableRow,
+) -> list[str]:
+    """Names a pose whose angles the other poses contradict; refuses it beyond the limit."""
+    count = len(best.own_g)
+    if best.errors_g is None:
+        return []
+    left_out = best.errors_g[:count]
+    found = worst_outlier(best.own_g, left_out, best.trial.parameters)
+    if found is None:
+        return []
+    k = found.indices[0]
+    away = float(np.linalg.norm(left_out[k]))
+    known = unit.gravity_g * gravity_direction(angles.kind, table[k : k + 1])
+    seen = angles_from_force(angles.kind, known + sign * left_out[k : k + 1])[0]
+    words = [name.replace("_", " ") for name in ANGLE_NAMES[angles.kind][:2]]
+    stated = ", ".join(f"{w} {v:.5g}" for w, v in zip(words, np.degrees(table[k, :2]), strict=True))
+    told = ", ".join(f"{w} {v:.5g}" for w, v in zip(words, np.degrees(seen), strict=True))
+    pose = poses.poses[k]
+    rivals = "".join(f" or pose {poses.poses[i].number}" for i in found.indices[1:4])
+    text = (
+        f"pose {pose.number}{rivals} contradicts the others: {stated} deg stand there, by the "
+        f"other poses its readings say {told} deg, {away * 1e3:.3g} mg away, where the others "
+        f"are within {found.others * 1e3:.2g} mg rms"
+    )
+    remedy = "look at its angles and readings, correct the row or take it out"
+    temp = unit.t0_degc if pose.temp_degc is None else pose.temp_degc
+    limit, key = unit.limits.at(temp, unit.t0_degc)
+    if away <= limit:
+        return [f"{text}; {remedy}"]
+    raise RefusedError(
+        f"{poses.source}, line {pose.line}",
+        text,
+        expected=f"at most {limit * 1e3:g} mg ({key})",
+        remedy=remedy,
     )

@@ -24,6 +24,9 @@ from triaxcal.fit.selection import Candidate
 from triaxcal.fit.thermal import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
 
+TURNS_MAX = 60
+"""Of hundreds of poses one more or less left out changes nothing that a rms could show."""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -99,10 +102,14 @@ class Judged:
 def folds(
     orientations: Sequence[Sequence[int]], temperatures: Sequence[Sequence[int]], count: int
 ) -> list[BoolArray]:
-    """Masks of what is left out in turn: orientations, then inner temperatures (rising)."""
+    """Masks of what is left out in turn: orientations, then inner temperatures (rising).
+
+    More than `TURNS_MAX` orientations are left out in so many bundles.
+    """
     inner = temperatures[1:-1] if len(temperatures) >= 4 else ()
+    turns = [[k for g in orientations[n::TURNS_MAX] for k in g] for n in range(TURNS_MAX)]
     masks: list[BoolArray] = []
-    for group in (*(orientations if len(orientations) > 1 else ()), *inner):
+    for group in (*(filter(None, turns) if len(orientations) > 1 else ()), *inner):
         mask = np.zeros(count, dtype=np.bool_)
         mask[list(group)] = True
         masks.append(mask)

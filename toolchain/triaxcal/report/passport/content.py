@@ -135,6 +135,12 @@ class Passport:
         checked = all(a.shown for a in self.acceptance) and not self.unchecked
         return checked and not self.length_budget.unknown
 
+    @property
+    def checked(self) -> bool:
+        """Whether the data say anything of how well the constants are known."""
+        recording = self.delivery.calibration.recording
+        return recording is None or recording.checked
+
     @cached_property
     def worst_over_temperature(self) -> FloatArray:
         """Expanded uncertainty in the worst orientation, (n, 4): a_x, a_y, a_z, |a|, in g."""

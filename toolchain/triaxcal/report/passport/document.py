@@ -29,7 +29,7 @@ def passport_json(p: Passport) -> bytes:
         "serial": d.unit.serial,
         "inputs_sha256": d.inputs_sha256,
         "coverage_probability": LEVEL,
-        "result": "passed" if p.shown else "passed at the dwells, not shown everywhere",
+        "result": _result(p),
         "acceptance": [
             {
                 "where": a.where,
@@ -69,6 +69,12 @@ def passport_json(p: Passport) -> bytes:
         "tools": dict(p.tools),
     }
     return json_bytes(document)
+
+
+def _result(p: Passport) -> str:
+    if not p.checked:
+        return "not checked"
+    return "passed" if p.shown else "passed at the dwells, not shown everywhere"
 
 
 def _budget(b: Budget) -> dict[str, Any]:

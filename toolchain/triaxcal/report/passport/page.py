@@ -33,7 +33,8 @@ def passport_html(p: Passport) -> bytes:
     context = {
         "identity": _identity(p),
         "shown": p.shown,
-        "acceptance": [_acceptance(a) for a in p.acceptance],
+        "checked": p.checked,
+        "acceptance": [_acceptance(a, checked=p.checked) for a in p.acceptance],
         "unchecked": p.unchecked,
         "warnings": (*p.uncertainty.warnings, *_findings(p)),
         "constants": _constants(p),
@@ -78,20 +79,20 @@ def _identity(p: Passport) -> dict[str, Any]:
 
 
 def _findings(p: Passport) -> tuple[str, ...]:
-    """What was found in a recording, for the top of the page."""
-    recording = p.delivery.calibration.recording
-    if recording is None:
-        return ()
-    return tuple(signed(f[0].upper() + f[1:].replace("degC", "°C")) for f in recording.findings)
+    """What was found in the readings, for the top of the page."""
+    found = p.delivery.calibration.findings
+    return tuple(signed(f[0].upper() + f[1:].replace("degC", "°C")) for f in found)
 
 
 def _superscript(number: int) -> str:
     return str(number).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-def _acceptance(a: Acceptance) -> dict[str, Any]:
+def _acceptance(a: Acceptance, *, checked: bool) -> dict[str, Any]:
     factor = significant(a.factor, 2)
-    if a.shown:
+    if not checked:
+        text = "the residuals are 0 by themselves: as many constants as poses"
+    elif a.shown:
         text = "holds with the whole uncertainty inside the limit"
     else:
         text = (
@@ -103,8 +104,8 @@ def _acceptance(a: Acceptance) -> dict[str, Any]:
         "where": a.where[0].upper() + a.where[1:],
         "limit": g_in_words(a.limit_g),
         "largest": g_in_words(a.largest_g),
-        "uncertainty": g_in_words(a.uncertainty_g),
-        "shown": a.shown,
+        "uncertainty": g_in_words(a.uncertainty_g) if checked else "unknown",
+        "shown": a.shown and checked,
         "text": text,
         "largest_width": round(100 * a.largest_g / scale, 2),
         "uncertainty_width": round(100 * a.uncertainty_g / scale, 2),
@@ -120,6 +121,8 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
         name = p.uncertainty.units[c]
         scale, unit = (1e3, f"m{name}") if name.startswith("V") else (1.0, name)
         value, expanded = with_uncertainty(float(at_t0[c]), budget.expanded, scale)
+        if not p.checked:
+            expanded = "unknown"
         worst = next((line for line in budget.lines if line.contribution), None)
         rows.append(
             {

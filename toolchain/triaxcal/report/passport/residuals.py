@@ -9,10 +9,11 @@ from typing import Any
 from triaxcal.codegen.tryout import BEFORE, Residual
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.passport.words import signed
-from triaxcal.report.temperatures import by_temperature, degrees, position_order
+from triaxcal.report.temperatures import by_temperature, degrees, position_order, with_room
 
 WIDTH, LEFT, RIGHT = 700.0, 56.0, 6.0
 PLOT, HEAD, FOOT = 150.0, 24.0, 26.0
+LETTER_WIDTH = 5.6
 FLOOR_MG = 1e-5
 """Errors below this are drawn on the lowest line: a code of a 24-bit converter is more."""
 
@@ -56,6 +57,8 @@ def _row(
         x0 = LEFT + k * span
         step = (span - 10.0) / len(indices)
         ordered = sorted(indices, key=lambda i: position_order(before[i].dwell.position))
+        numbers = [before[i].dwell.position.lstrip("TCP") for i in ordered]
+        labels = with_room(numbers, step, LETTER_WIDTH)
         columns.append(
             {
                 "x": round(x0, 2),
@@ -68,7 +71,7 @@ def _row(
                         "x": round(x0 + 5.0 + step * (n + 0.5), 2),
                         "before": axis.y(before[i].error_g),
                         "after": axis.y(p.delivered.residuals[i].error_g),
-                        "label": before[i].dwell.position.lstrip("TCP"),
+                        "label": labels[n],
                     }
                     for n, i in enumerate(ordered)
                 ],

@@ -1,0 +1,263 @@
+"""Poses that the others contradict, and calibrations that nothing checks: both are told."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from family_cases import COLUMNS, U0, K, directions, log, write_unit
+from test_recordings import WITH_GYRO, calibrated, found, left_handed
+from test_tables import AIR, HEADER, rows_of, table
+
+from triaxcal.cli.main import main
+from triaxcal.delivery import deliver
+from triaxcal.errors import RefusedError
+from triaxcal.fit.family.outliers import worst_outlier
+from triaxcal.model.types import FloatArray
+from triaxcal.report.dcc import certificate_xml
+from triaxcal.report.passport.content import passport
+from triaxcal.report.passport.page import passport_html
+from triaxcal.report.summary import summary
+from triaxcal.report.temperatures import with_room
+
+
+def findings(folder: Path) -> str:
+    return "\n".join(calibrated(folder).findings)
+
+
+# ---- one wrong pose ----
+
+
+def test_the_f_of_a_pose_left_out_is_fishers() -> None:
+    """Of sound data one in a thousand has a pose told, by 20 000 straight lines of ten points."""
+    random = np.random.default_rng(1)
+    x = np.stack([np.ones(10), np.arange(10.0)], axis=1)
+    hat = x @ np.linalg.inv(x.T @ x) @ x.T
+    y = random.standard_normal((20_000, 10, 2))
+    own = y - np.einsum("ij,njk->nik", hat, y)
+    left_out = own / (1.0 - np.diag(hat))[None, :, None]
+    told = sum(worst_outlier(o, d, 4) is not None for o, d in zip(own, left_out, strict=True))
+    # Bonferroni's bound is 20, and near: between its fourfold standard errors.
+    assert 4 <= told <= 38
+
+
+def test_a_row_of_angles_that_is_wrong_is_refused_by_its_line(tmp_path: Path) -> None:
+    rows = rows_of(table())
+    rows[6, 1] += 10.0
+    with pytest.raises(RefusedError) as refusal:
+        calibrated(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
+    told = str(refusal.value)
+    assert "log.csv, line 8: pose 7 contradicts the others: pitch -15, roll -5 deg stand" in told
+    # 10 deg at a pitch of 15 deg: 2 sin 5 deg cos 15 deg.
+    assert re.search(r"readings say pitch -15\.?\d*, roll -1[45]\.?\d* deg, 168 mg away", told)
+    assert "expected at most 20 mg (limits.at_t0_g); look at its angles and readings" in told
+
+
+def test_a_row_within_the_limit_is_told_and_passes(tmp_path: Path) -> None:
+    rows = rows_of(table())
+    rows[6, 1] += 0.5
+    told = findings(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
+    assert "pose 7 contradicts the others: pitch -15, roll -14.5 deg stand there" in told
+    assert "contradicts" not in findings(
+        write_unit(tmp_path / "V", rows_of(table()), AIR, header=HEADER)
+    )
+
+
+def test_one_of_six_faces_on_the_table_is_told_with_its_rival(tmp_path: Path) -> None:
+    """Opposite faces have equal residuals: which of them is wrong nobody can say."""
+    angles = np.radians([[0, 0], [0, 90], [0, 180], [0, -90], [90, 0], [-90, 0]])
+    rows = rows_of(angles, error_arcsec=20.0)
+    rows[1, 2:] += [0.0, 0.0, 1.0]
+    with pytest.raises(RefusedError, match="line 3: pose 2 or pose 4 contradicts"):
+        calibrated(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
+
+
+def test_a_pose_whose_length_is_wrong_is_told(tmp_path: Path) -> None:
+    poses = directions(20)
+    poses[8] *= 1.004
+    told = findings(write_unit(tmp_path / "U", log(poses)))
+    # 4 mg, by a pose that the rest determine to 0.2 mg.
+    size = re.search(r"pose 9 \(line \d+\) stands out: \|a\| is \+([\d.]+) mg off by", told)
+    assert size is not None
+    assert float(size[1]) == pytest.approx(4.0, abs=0.6)
+    assert "stands out" not in findings(write_unit(tmp_path / "V", log(directions(20))))
+
+
+LABELS = ("top", "front", "bottom", "back", "left", "right")
+FACES = (
+    'section = "part"\nfaces = {top = "+z", bottom = "-z", front = "-y", back = "+y", '
+    'left = "-x", right = "+x"}'
+)
+
+
+def labelled(turn_deg: float = 0.0, labels: tuple[str, ...] = LABELS) -> str:
+    """Six faces, the second of them turned by an angle about z; placement of 0.01 deg."""
+    random = np.random.default_rng(5)
+    faces = directions(6) + 2e-4 * random.standard_normal((6, 3))
+    t = np.radians(turn_deg)
+    faces[1] = [np.sin(t), -np.cos(t), 0.0]
+    lines = ["t,ax,ay,az,part"]
+    for k, (face, label) in enumerate(zip(faces, labels, strict=True)):
+        reading = face @ K.T + U0
+        lines += [f"{k * 10 + n},{','.join(f'{v:.7f}' for v in reading)},{label}" for n in range(5)]
+    return "\n".join(lines) + "\n"
+
+
+def test_a_face_that_is_turned_is_told_with_the_face_opposite(tmp_path: Path) -> None:
+    folder = write_unit(tmp_path / "U", labelled(5.0), f"{COLUMNS}\n{FACES}")
+    told = findings(folder)
+    assert "TP2 (-y up, row 7) or TP4 (+y up, row 17) at 20 degC contradicts" in told
+    # 5 deg are 87.2 mg; the placement of the others, 0.2 mg, reaches it through the constants.
+    size = re.search(r"contradicts the other positions by ([\d.]+) mg", told)
+    assert size is not None
+    assert float(size[1]) == pytest.approx(87.2, abs=1.5)
+    assert "no temperature in the recording" in told
+    assert "contradicts" not in findings(
+        write_unit(tmp_path / "V", labelled(), f"{COLUMNS}\n{FACES}")
+    )
+
+
+# ---- labels and columns ----
+
+
+def test_a_label_that_is_misspelt_is_told_as_a_label(tmp_path: Path) -> None:
+    text = labelled(labels=("top", "front", "bottom", "back", "lefft", "right"))
+    with pytest.raises(RefusedError) as refusal:
+        calibrated(write_unit(tmp_path / "U", text, f"{COLUMNS}\n{FACES}"))
+    assert "no section 'left', -x up (did you mean \"lefft\"?); sections found: back" in str(
+        refusal.value
+    )
+    short = FACES.replace(', right = "+x"', "")
+    with pytest.raises(RefusedError, match=r"\[recording\] faces: no label for \+x; expected six"):
+        calibrated(write_unit(tmp_path / "V", labelled(), f"{COLUMNS}\n{short}"))
+
+
+def test_columns_are_given_as_they_should_stand(tmp_path: Path) -> None:
+    folder = write_unit(
+        tmp_path / "U",
+        left_handed(),
+        WITH_GYRO.replace('"ax"', '"-ax"'),
+        header="t,ax,ay,az,wx,wy,wz",
+    )
+    with pytest.raises(RefusedError, match=r'then acceleration = \["ax", "ay", "az"\]; if only'):
+        calibrated(folder)
+    turned = rows_of(table())[:, [0, 1, 3, 2, 4]] * [1, 1, 1, -1, 1]
+    with pytest.raises(RefusedError, match=r'acceleration = \["-uy", "ux", "uz"\]') as refusal:
+        calibrated(write_unit(tmp_path / "V", turned, AIR, header=HEADER))
+    assert "left-handed" not in str(refusal.value)
+    columns = AIR.replace('["ux", "uy", "uz"]', '["-uy", "ux", "uz"]')
+    calibrated(write_unit(tmp_path / "W", turned, columns, header=HEADER))
+
+
+def test_what_length_alone_cannot_tell_is_told_once(tmp_path: Path) -> None:
+    told = findings(write_unit(tmp_path / "U", log(directions(12))))
+    assert told.count("left-handed axes and with all signs turned, so neither can be seen") == 1
+    rows = left_handed()
+    told = findings(write_unit(tmp_path / "V", rows, WITH_GYRO, header="t,ax,ay,az,wx,wy,wz"))
+    assert "the axes turn as the gyro says; that all three signs are turned cannot" in told
+
+
+def test_readings_that_are_no_counts_are_refused(tmp_path: Path) -> None:
+    counts = COLUMNS.replace('"m/s^2"', '"count"')
+    with pytest.raises(RefusedError, match=r"m/s\^2 taken for counts\? then acceleration_unit = "):
+        calibrated(write_unit(tmp_path / "U", log(directions(12)), counts))
+
+
+# ---- poses in a plane ----
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-3, 5e-3])
+@pytest.mark.parametrize("normal", [0, 1, 2])
+def test_poses_in_a_plane_are_called_so(tmp_path: Path, noise: float, normal: int) -> None:
+    """Noise along the normal must not make the centre, and with it one orientation of all."""
+    t = np.arange(0.0, 6.2, 0.5)
+    flat = np.stack([np.cos(t), np.sin(t), noise * np.random.default_rng(2).standard_normal(13)])
+    poses = np.roll(flat, normal + 1, axis=0).T
+    rows = np.column_stack([poses @ K.T + U0])
+    recording = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "m/s^2"'
+    with pytest.raises(RefusedError, match="13 poses, which lie near one plane, leave"):
+        calibrated(write_unit(tmp_path / "U", rows, recording, header="a,b,c"))
+
+
+# ---- nothing to check on ----
+
+
+def exact(count: int) -> FloatArray:
+    tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+    poses = directions(6) if count == 6 else tetrahedron
+    return poses @ K.T + U0
+
+
+@pytest.mark.parametrize("count", [4, 6])
+def test_as_many_constants_as_poses_are_not_called_passed(tmp_path: Path, count: int) -> None:
+    recording = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "m/s^2"'
+    delivery = deliver(write_unit(tmp_path / "U", exact(count), recording, header="a,b,c"))
+    made = passport(delivery, {})
+    told = summary(made, ["a"], "build")
+    assert f"NOT CHECKED: {count} constants from {count} poses fit whatever" in " ".join(
+        told.split()
+    )
+    assert "\nNOT CHECKED " in told
+    assert "\npassed" not in told
+    assert "uncertainty     unknown: as many constants as poses" in told
+    assert "left out        nothing: no pose can be spared" in told
+    assert b"NOT CHECKED<small>as many constants as poses" in passport_html(made)
+    assert not made.shown
+    assert np.isnan(delivery.calibration.constants_covariance(20.0)).any()
+
+
+CERTIFICATE = """[certificate]
+identifier = "C-1"
+laboratory = "L"
+city = "Kyiv"
+country = "UA"
+customer = "C"
+signer = "S"
+manufacturer = "M"
+begin = 2026-03-30
+end = 2026-03-31
+
+"""
+
+
+def test_a_recording_gets_its_certificate_in_its_own_units(tmp_path: Path) -> None:
+    delivery = deliver(write_unit(tmp_path / "U", log(directions(12)), more=CERTIFICATE))
+    made = passport(delivery, {})
+    assert delivery.unit.certificate is not None
+    text = certificate_xml(made, delivery.unit.certificate).decode()
+    assert "12 poses, only |a| = g known; frame: sensor" in text
+    assert r"\one \one \one \one \one \one \one \one \one \metre\second\tothe{-2}" in text
+    values = re.findall(r"<si:valueXMLList>([^<]*)", text)[0].split()
+    matrix, bias = found(delivery.calibration)
+    expected = np.concatenate([matrix.ravel() / 9.80665, bias])
+    # Twelve digits are printed.
+    assert np.allclose(np.array(values, dtype=float), expected, rtol=1e-11)
+    # Nothing is known of the change with temperature: no unconditional conformity.
+    assert "not in it: the change with temperature" in text
+    assert "conditionalPass" in text
+    assert ">pass<" not in text
+
+
+def test_a_certificate_of_what_nothing_checks_is_refused(tmp_path: Path) -> None:
+    folder = write_unit(tmp_path / "U", log(directions(6)), more=CERTIFICATE)
+    result = CliRunner().invoke(main, ["calib", str(folder), "--build", str(tmp_path / "b")])
+    assert isinstance(result.exception, RefusedError)
+    assert "a certificate of constants that nothing checks" in str(result.exception)
+    assert not (tmp_path / "b").exists()
+
+
+# ---- pictures ----
+
+
+def test_labels_have_room_however_many_poses() -> None:
+    labels = [f"P{n}" for n in range(1, 401)]
+    kept = with_room(labels, 2.2, 4.4)
+    shown = [n for n, label in enumerate(kept) if label]
+    assert [labels[n] for n in shown[:3]] == ["P10", "P20", "P30"]
+    widest = max(len(labels[n]) for n in shown) * 4.4
+    assert all((b - a) * 2.2 > widest for a, b in pairwise(shown))
+    assert with_room(labels[:6], 17.0, 4.4) == labels[:6]

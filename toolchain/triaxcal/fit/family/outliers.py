@@ -1,0 +1,80 @@
+"""Poses that the others contradict: externally studentised residuals.
+
+With e the residual of pose k in the fit and d its error when it is left out, e.d is what the
+squares of the fit lose without it (exactly for least squares). Of n poses of c components and p
+constants, pose k alone being good,
+
+    F = (e.d / c) / ((sum e^2 - e.d) / (c (n - 1) - p))
+
+follows Fisher's F with c and c (n - 1) - p degrees of freedom. A pose is told when its chance,
+times the number of poses that were looked at (Bonferroni), is below `CHANCE`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.model.types import FloatArray
+
+CHANCE = 1e-3
+"""With which a sound recording has a pose told."""
+_NEVER = 5.0
+"""An F below this has a chance above `CHANCE` with up to three components: chi2(3) / 3 is 5.4."""
+_ALIKE = 0.9
+"""Of the largest loss: poses that cannot be told from the worst, as opposite faces."""
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """Poses of which one contradicts the others.
+
+    Attributes
+    ----------
+    indices : tuple of int
+        The worst first; more than one where the poses cannot tell which it is.
+    chance : float
+        With which a sound recording has as bad a pose.
+    others : float
+        Rms residual a component without it, in the residuals' unit.
+    """
+
+    indices: tuple[int, ...]
+    chance: float
+    others: float
+
+
+def worst_outlier(own: FloatArray, left_out: FloatArray, parameters: int) -> Outlier | None:
+    """The pose that fits worst, when that is no chance.
+
+    Parameters
+    ----------
+    own, left_out : arrays, shape (n, c)
+        Residuals in the fit of all poses, and with each pose left out in turn.
+    parameters : int
+        Constants of the fit.
+    """
+    count, components = own.shape
+    dof = components * (count - 1) - parameters
+    if dof < 1:
+        return None
+    loss = np.maximum((own * left_out).sum(axis=1), 0.0)
+    total = float((own**2).sum())
+    # Of residuals that are all rounding nothing is left; the tiniest part stands for it.
+    rest = np.maximum(total - loss, 1e-24 * total)
+    worst = int(loss.argmax())
+    if not loss[worst] > 0.0:
+        return None
+    ratio = float(loss[worst] / components / (rest[worst] / dof))
+    if ratio < _NEVER:
+        return None
+    from scipy.special import fdtrc  # noqa: PLC0415  a tilter's calibration seldom needs SciPy
+
+    chance = float(fdtrc(components, dof, ratio)) * count
+    if chance > CHANCE:
+        return None
+    alike = np.flatnonzero(loss >= _ALIKE * loss[worst])
+    near = loss >= (1.0 - 1e-6) * loss[worst]  # equal but for rounding: the first row is the worst
+    indices = sorted(alike.tolist(), key=lambda k: (not near[k], k))
+    return Outlier(tuple(indices), chance, float(np.sqrt(rest[worst] / dof)))

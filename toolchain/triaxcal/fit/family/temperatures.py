@@ -1,0 +1,111 @@
+"""Temperatures of a recording's poses: groups of them, the orders they carry, the range."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from triaxcal.errors import RefusedError
+from triaxcal.fit.grouping import GROUP_GAP_DEGC
+from triaxcal.fit.thermal import EDGE_DEGC, POLYNOMIAL
+from triaxcal.model.types import FloatArray
+from triaxcal.recording.poses import PoseSet
+from triaxcal.unitfile import UnitDescription
+
+THERMAL_SPREAD_DEGC = 5.0
+"""Poses over less than this are at one temperature: an order is not asked of them."""
+ORDER_MAX = 3
+
+
+def no_temperature(unit: UnitDescription) -> str:
+    """What a recording without a temperature cannot say."""
+    return (
+        f"no temperature in the recording: the constants are taken as those of T0 = "
+        f"{unit.t0_degc:g} degC, and nothing shows how they change"
+    )
+
+
+def temperature_groups(temps_degc: FloatArray) -> list[list[int]]:
+    """Indices of the poses at each temperature, rising."""
+    order = [int(k) for k in np.argsort(temps_degc, kind="stable")]
+    groups = [[order[0]]]
+    for before, k in pairwise(order):
+        if temps_degc[k] - temps_degc[before] > GROUP_GAP_DEGC:
+            groups.append([])
+        groups[-1].append(k)
+    return groups
+
+
+def thermal_orders(
+    unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]
+) -> tuple[int, ...]:
+    """Orders of the polynomials in temperature that are tried: 0 for one temperature.
+
+    Raises
+    ------
+    RefusedError
+        When unit.toml asks for what the poses' temperatures do not carry.
+    """
+    asked = unit.thermal.order
+    where = f"{unit.name}/unit.toml, [thermal]"
+    if unit.thermal.model not in ("auto", POLYNOMIAL):
+        raise RefusedError(
+            f"{where} model",
+            f'"{unit.thermal.model}" for a recording',
+            expected='"polynomial" or "auto"',
+        )
+    if float(np.ptp(temps)) < THERMAL_SPREAD_DEGC:
+        if asked:
+            raise RefusedError(
+                f"{where} order",
+                f"order {asked}, but all {len(temps)} poses are at one temperature "
+                f"({temps.min():.4g} to {temps.max():.4g} degC)",
+                expected=f"poses over {THERMAL_SPREAD_DEGC:g} degC at least",
+                remedy="record poses at more temperatures, or order = 0",
+            )
+        return (0,)
+    highest = min(ORDER_MAX, len(temperatures) - 1)
+    if asked and asked > highest:
+        raise RefusedError(
+            f"{where} order",
+            f"order {asked} with poses at {len(temperatures)} temperature"
+            f"{'s' * (len(temperatures) != 1)}",
+            expected=f"{highest} at most",
+        )
+    return (asked,) if asked else tuple(range(highest + 1))
+
+
+def recording_range(
+    unit: UnitDescription, poses: PoseSet, temps: FloatArray
+) -> tuple[float, float]:
+    """Working range: that of the poses, outward to 0.1 degC, or the one stated in unit.toml.
+
+    Raises
+    ------
+    RefusedError
+        When the stated range reaches beyond the poses' temperatures. Without any temperature in
+        the recording it is the user's word.
+    """
+    low, high = float(temps.min()), float(temps.max())
+    stated = unit.range_degc
+    if stated is None:
+        if high - low < 2.0 * EDGE_DEGC:
+            middle = (low + high) / 2.0
+            low, high = middle - EDGE_DEGC, middle + EDGE_DEGC
+        # The 1e-6 forgives the rounding of decimal temperatures.
+        return round(math.floor(low * 10.0 + 1e-6) / 10.0, 1), round(
+            math.ceil(high * 10.0 - 1e-6) / 10.0, 1
+        )
+    if poses.temps_degc is not None and (
+        stated[0] < low - EDGE_DEGC or stated[1] > high + EDGE_DEGC
+    ):
+        raise RefusedError(
+            f"{unit.name}/unit.toml, [thermal] range_degc",
+            f"{stated[0]:g} to {stated[1]:g} degC",
+            expected=f"within {EDGE_DEGC:g} degC of the poses' temperatures, {low:.4g} to "
+            f"{high:.4g} degC",
+            remedy="narrow the range, or record poses further out: nothing is extrapolated",
+        )
+    return stated
