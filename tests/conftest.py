@@ -35,6 +35,7 @@ LONG = {
     "rig/test_session.py",
     "targets/test_targets.py",
     "test_batch.py",
+    "test_imu_delivery_thermal.py",
     "test_dynamic_calibrate.py",
     "test_dynamic_equations.py",
     "test_dynamic_plan.py",

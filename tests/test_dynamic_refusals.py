@@ -13,6 +13,7 @@ from triaxcal.dynamic.recording import ImuRecording, ImuSamples
 from triaxcal.dynamic.survey import survey
 from triaxcal.errors import RefusedError
 from triaxcal.simulation.imu import simulate_imu
+from triaxcal.simulation.imu_motion import three_axes
 
 
 def _samples() -> ImuSamples:
@@ -26,6 +27,25 @@ def _with(**columns: np.ndarray) -> ImuRecording:
 def _no_still() -> ImuRecording:
     time = _samples().time_s
     return part(mems_short()[1], time > 9.0)
+
+
+def _turning() -> ImuRecording:
+    """From the middle of an even turn on: no gyro tells it from a bias."""
+    recording = held(simulate_imu(mems_short()[0], three_axes(1.5, still_s=12.0), 50.0, 1))
+    samples = recording.all()
+    return part(recording, samples.time_s > 14.0)
+
+
+def _lost(count: int) -> ImuRecording:
+    """So many samples are missing in an even turn."""
+    recording = held(simulate_imu(mems_short()[0], three_axes(1.5, still_s=12.0), 50.0, 1))
+    number = np.arange(len(recording.all().time_s))
+    return part(recording, (number < 800) | (number >= 800 + count))
+
+
+def _cut_at_rest() -> ImuRecording:
+    time = _samples().time_s
+    return part(mems_short()[1], (time < 3.0) | (time > 4.0))
 
 
 def _gap() -> ImuRecording:
@@ -47,6 +67,30 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
     "no stand-still": (
         _no_still,
         ("stands still for", "then turns at", "at least 5 s at rest at the start"),
+    ),
+    "starts in an even turn": (
+        _turning,
+        ("14.0 s: does not stand still: turns at 30.", "at least 5 s at rest at the start"),
+    ),
+    "one sample lost in a turn": (
+        lambda: _lost(1),
+        ("16.1 s: after a gap the unit does not stand still: turns at 30.", "lose no samples"),
+    ),
+    "a gap after three seconds": (
+        _cut_at_rest,
+        ("0.0 s: stands still for 3.0 s, then the recording ends or has a gap; expected",),
+    ),
+    "deg/h for deg/s": (
+        lambda: _with(rate=_samples().rate / 36000),
+        ("gravity turns in the unit by 1", "but the gyros turn by 0.", "rate_unit"),
+    ),
+    "other columns for the gyros": (
+        lambda: _with(rate=np.zeros_like(_samples().rate)),
+        ("but the gyros turn by 0 deg in all", "rate_columns"),
+    ),
+    "milliseconds for seconds": (
+        lambda: changed(replace(mems_short()[1], rate_hz=0.05), time_s=_samples().time_s * 1000),
+        ("0.00", "(milliseconds taken for seconds?)", "time_unit"),
     ),
     "degrees for radians": (
         lambda: _with(rate=np.degrees(_samples().rate)),

@@ -42,17 +42,19 @@ GYRO_ADC = Adc(24, 500.0 * DEGREE, -(2**23), 2**23 - 1)
 G = EXAMPLE_SENSITIVITY
 
 
-def triad(seed: int, bias: float) -> ThermalModel:
-    """P2's errors at 20 degC, and their temperature coefficients, (23), (24)."""
+def triad(seed: int, bias: float, *, flat: bool = False) -> ThermalModel:
+    """P2's errors at 20 degC, and their temperature coefficients, (23), (24), unless `flat`."""
     rng = np.random.default_rng(seed)
     constant = constants_from_errors(rng.normal(0, bias, 3), rng.normal(0, 0.01, (3, 3)))
     slopes = np.concatenate([rng.normal(0, 1e-4, 9), rng.normal(0, bias / 50, 3)])
-    lines = np.stack([constant, slopes], axis=1)[None]
+    lines = np.stack([constant, slopes * (not flat)], axis=1)[None]
     return ThermalModel("polynomial", 20.0, PiecewisePolynomial(RANGE, (20.0,), lines))
 
 
-def imu_of(method: str = "matrix", g: np.ndarray = G, terms: Terms = NO_TERMS) -> ImuCompensation:
-    model = ImuModel(triad(1, 0.05), triad(2, 0.5 * DEGREE), g, terms)
+def imu_of(
+    method: str = "matrix", g: np.ndarray = G, terms: Terms = NO_TERMS, *, flat: bool = False
+) -> ImuCompensation:
+    model = ImuModel(triad(1, 0.05, flat=flat), triad(2, 0.5 * DEGREE, flat=flat), g, terms)
     readings = 16.0, 500.0 * DEGREE
     return compensate_imu(model, method, RANGE, readings, (1e-7, 1e-8))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import html
 import json
 import shutil
 from dataclasses import dataclass, replace
@@ -21,6 +23,7 @@ from triaxcal.imudelivery import ImuC, ImuDelivery, deliver_imu
 from triaxcal.model.imu import ImuModel, compensate_imu
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
+from triaxcal.report.dynamicpage import digits, dynamic_page
 from triaxcal.report.imuc import C_FILES
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
 from triaxcal.simulation.unit import write_simulated_unit
@@ -80,6 +83,10 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
     c = seen[0].c
     assert c is not None
     return Ran(done.output, folder, seen[0], c, GeneratedImu(library))
+
+
+def sha256_of(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def exact(model: ImuModel, accel_g: np.ndarray, gyro: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -171,16 +178,57 @@ def test_what_is_written_and_said(ran: Ran) -> None:
         f"  gyro          LSB 2^-19 deg/s; proven within {gyro_words}",
         f"  checked       {checked:,} vectors: Python".replace(",", " "),
         "  not corrected delay of the accelerometers behind the gyros",
-        '  constant      gyro over temperature: [dynamic] blocks has no "gyro-thermal"',
+        "  constant      gyro over temperature: [dynamic] blocks has no\n",
+        '                "gyro-thermal"\n',
     ):
         assert line in ran.output
+    summary = dynamic_summary(ran.made, dynamic_files(ran.made), "build/IMU-SIM")
+    assert max(map(len, summary.splitlines())) <= 80
     stated = json.loads((ran.folder / "verification.json").read_text(encoding="utf-8"))
     assert stated["accelerometer"]["bound_lsb"] == accel
+    fitted = json.loads((ran.folder / "calibration.json").read_text(encoding="utf-8"))
+    files = ran.made.done.unit.path, ran.made.done.unit.recording
+    digests = b"".join(hashlib.sha256(file.read_bytes()).digest() for file in files)
+    assert fitted["inputs_sha256"] == stated["inputs_sha256"] == hashlib.sha256(digests).hexdigest()
+    page = (ran.folder / "dynamic.html").read_text(encoding="utf-8")
+    for name in (*build.files, *map(sha256_of, build.files.values())):
+        assert name in page
+    assert f"≤ {accel:.3f} LSB" in page
+    assert f"carried along ≤ {gyro:.3f} LSB" in page
+    assert "not run on this delivery (triaxcal verify)" in page
     assert stated["gyro"]["with_accelerometer_lsb"] == list(build.rate_bound_lsb)
     header = (ran.folder / "triax_calib.h").read_text(encoding="utf-8")
     assert f"inputs sha256 {stated['inputs_sha256'][:16]}." in header
     assert "accelerometer code: 21 bits for 10.48576 g full scale" in header
     assert "not corrected: delay of the accelerometers behind the gyros" in header
+
+
+def test_the_page_warns_of_what_was_left_out(ran: Ran) -> None:
+    """An effect that shows, and more noise than stated."""
+    made, (first, *others) = ran.made, ran.made.done.off
+    page = dynamic_page(made, {}).decode()
+    assert '<div class="badge">CONSISTENT<small>innovations ' in page
+    assert '<p class="warning">' not in page
+    shown = replace(made.done, off=(replace(first, chi_square=900.0, shown=True), *others))
+    page = html.unescape(dynamic_page(replace(made, done=shown), {}).decode())
+    assert '<div class="badge warn">AN EFFECT IS MISSING<small>' in page
+    assert (
+        "The recording shows an effect that is switched off, "
+        f'{first.title}: switch on "{first.name}" in [dynamic] blocks.</p>'
+    ) in page
+    last = made.done.result.passes[-1]
+    noisy = replace(last, chi_square=4.0 * last.freedom)
+    result = replace(made.done.result, passes=(*made.done.result.passes[:-1], noisy))
+    page = dynamic_page(replace(made, done=replace(made.done, result=result)), {}).decode()
+    assert "NOT CONSISTENT<small>innovations 2.00 times the stated noise" in page
+    assert '<p class="warning">The innovations 2.00 times the stated noise' in page
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "text"), [(-0.3, 108.0, "0"), (-7.4, 98.0, "-7"), (1.23456, 0.021, "1.235")]
+)
+def test_digits(value: float, sd: float, text: str) -> None:
+    assert digits(value, sd) == text
 
 
 @pytest.mark.parametrize(
@@ -245,6 +293,7 @@ def test_without_a_device_no_c_is_written_and_it_is_said(ran: Ran) -> None:
     made = replace(ran.made, c=None)
     files = dynamic_files(made)
     assert set(files) == {"calibration.json", "dynamic.html"}
+    assert b"No C: unit.toml has no [device]" in files["dynamic.html"]
     assert (
         "C               none: unit.toml has no [device]; add it with accel_bits, "
         "accel_full_scale_g, gyro_bits, gyro_full_scale_deg_per_s, degc_per_code, range_degc\n"
@@ -255,7 +304,11 @@ def test_a_simulated_unit_without_its_recording_says_how_to_make_it(tmp_path: Pa
     unit = copied(tmp_path / "IMU-SIM")
     done = CliRunner().invoke(main, ["calib", str(unit), "--build", str(tmp_path / "build")])
     assert str(done.exception) == (
-        f"{unit / 'recording.csv'}: no such file; expected the recording that unit.toml names; put "
-        f"it there; of a simulated unit, `triaxcal simulate {unit}` makes it"
+        f"{unit / 'recording.csv'}: no such file; expected the recording that unit.toml names; "
+        f"make simulate UNIT=IMU-SIM, or triaxcal simulate {unit}, writes it"
     )
+    assert not done.output  # no bar of work that has not begun
+    (unit / "imu_truth.toml").unlink()
+    done = CliRunner().invoke(main, ["calib", str(unit), "--build", str(tmp_path / "build")])
+    assert str(done.exception).endswith("names; put it there, or correct [dynamic] recording")
     assert not (tmp_path / "build").exists()

@@ -8,15 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from triaxcal.dynamic.description import read_dynamic
+from triaxcal.dynamic.description import _LAYOUT, read_dynamic
 from triaxcal.dynamic.reading import read_recording
+from triaxcal.dynamic.registry import extensions
 from triaxcal.errors import RefusedError
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
 from triaxcal.simulation.imu_motion import three_axes
 from triaxcal.simulation.unit import write_simulated_unit
 
-SIM = Path(__file__).parent.parent / "units" / "IMU-SIM"
+REPO = Path(__file__).parent.parent
+SIM = REPO / "units" / "IMU-SIM"
 
 
 @pytest.fixture
@@ -103,3 +105,34 @@ def test_too_short_a_recording_is_refused(unit: Path) -> None:
         "motion of a simulated IMU: 0.6 min an axis, 30 s of it at rest; expected time for at "
         "least three moves"
     )
+
+
+def test_the_docs_name_every_key_of_an_imu_with_its_table() -> None:
+    text = (REPO / "docs/file-formats.md").read_text(encoding="utf-8")
+    section = text.split("## unit.toml of an IMU")[1].split("\n## ")[0]
+    table, documented = "", set()
+    for line in section.splitlines():
+        cells = [cell.strip() for cell in line.split("|")]
+        if len(cells) > 2 and cells[2].startswith("`"):
+            table = cells[1].strip("`[]") or table
+            documented.add((table, cells[2].strip("`")))
+    assert documented == {(name, key) for name, keys in _LAYOUT.items() for key in keys}
+
+
+def test_the_docs_name_every_extension() -> None:
+    text = (REPO / "docs/dynamic.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1] for line in text.splitlines() if line.count("|") == 4]
+    named = {name.strip() for row in rows for name in row.split(",")}
+    assert set(extensions()) <= named, set(extensions()) - named
+
+
+def test_the_example_of_the_docs_is_read(tmp_path: Path) -> None:
+    """The two examples of docs/dynamic.md with [table] and [device], joined."""
+    blocks = (REPO / "docs/dynamic.md").read_text(encoding="utf-8").split("```toml\n")[1:]
+    (tmp_path / "IMU-001").mkdir()
+    text = "".join(block.split("```")[0] for block in blocks)
+    (tmp_path / "IMU-001" / "unit.toml").write_text(text, encoding="utf-8")
+    unit = read_dynamic(tmp_path / "IMU-001")
+    assert (unit.serial, unit.blocks) == ("IMU-001", ("delay", "g-drift"))
+    assert unit.table is not None
+    assert unit.device is not None

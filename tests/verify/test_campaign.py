@@ -12,7 +12,7 @@ from triaxcal.jsontext import json_bytes
 from triaxcal.verify import campaign
 from triaxcal.verify.campaign import CHECKS, exit_code, verify_files
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
-from triaxcal.verify.record import FILE, is_delivered, record
+from triaxcal.verify.record import FILE, entries, is_delivered, record
 from triaxcal.verify.shapes import Subject
 from triaxcal.verify.table import table
 from triaxcal.verify.tools import BrokenToolError, MissingToolError, Tool, run
@@ -89,7 +89,7 @@ def content(document: dict[str, object]) -> bytes:
 
 def test_record_keeps_every_other_byte(tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(content(BASE))
-    record(tmp_path, [PASS, LEFT])
+    record(tmp_path, entries([PASS, LEFT]))
     written = (tmp_path / FILE).read_bytes()
     base = content(BASE).decode().rstrip("}\n")
     assert written.decode().startswith(base)
@@ -97,7 +97,7 @@ def test_record_keeps_every_other_byte(tmp_path: Path) -> None:
         "a": {"result": "passed", "finding": "0 alarms", "alarms": 0},
         "c": {"result": "not done", "finding": LEFT.finding},
     }
-    record(tmp_path, [PASS, LEFT])
+    record(tmp_path, entries([PASS, LEFT]))
     assert (tmp_path / FILE).read_bytes() == written
     assert [p.name for p in tmp_path.iterdir()] == [FILE]
 
@@ -108,7 +108,7 @@ def test_delivered_means_the_same_files_whatever_was_added(tmp_path: Path) -> No
     for name, text in files.items():
         (tmp_path / name).write_bytes(text)
     assert is_delivered(tmp_path, files)
-    record(tmp_path, [PASS])
+    record(tmp_path, entries([PASS]))
     assert is_delivered(tmp_path, files)
     assert not is_delivered(tmp_path, {**files, "triax_comp.c": b"int y;\n"})
     assert not is_delivered(tmp_path, {**files, FILE: content({**BASE, "limit": 0.2})})
@@ -117,4 +117,4 @@ def test_delivered_means_the_same_files_whatever_was_added(tmp_path: Path) -> No
 def test_a_damaged_record_is_refused(tmp_path: Path) -> None:
     (tmp_path / FILE).write_text("[]")
     with pytest.raises(RefusedError, match="is no JSON object; run triaxcal calib again"):
-        record(tmp_path, [PASS])
+        record(tmp_path, entries([PASS]))

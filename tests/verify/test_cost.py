@@ -40,6 +40,13 @@ def test_cost_that_depends_on_the_input_fails(plant: Planter) -> None:
     assert varying.figures["cores"]["Cortex-M0"]["flash_bytes"]["total"] == 494
 
 
+def test_on_a_core_with_assembly_for_the_shape_a_cost_that_varies_fails(plant: Planter) -> None:
+    """Cortex-M0: without assembly, as for a gyro, it is told only (test_imu_tools)."""
+    outcome = cost.outcome_of([counted(plant("direct-two-segments"), 0, 31)])
+    assert outcome.result == FAILED
+    assert outcome.finding.endswith("apply depends on its input on M0")
+
+
 def test_each_core_has_its_fastest_form() -> None:
     names = {"Cortex-M0": 3, "Cortex-M3": 2, "Cortex-M4F": 2, "Cortex-M7": 2, "Cortex-M33": 2}
     assert {core.name: best_form(core) for core in BARE} == {**names, "RV32IM": 0}

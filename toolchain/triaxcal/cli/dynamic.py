@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.termui import progressbar
 
 from triaxcal.cli.options import unit_and_build
+
+if TYPE_CHECKING:
+    from triaxcal.imudelivery import ImuDelivery
 
 
 @click.command()
@@ -40,25 +44,37 @@ def tell_plan(unit: Path) -> None:
 
 def calibrate_imu(unit: Path, build: Path) -> None:
     """Do the work of `triaxcal dynamic`, and of `triaxcal calib` for a unit with [dynamic]."""
-    from triaxcal.imudelivery import deliver_imu  # noqa: PLC0415
     from triaxcal.publish import publish  # noqa: PLC0415
     from triaxcal.report.dynamic import dynamic_files, dynamic_summary  # noqa: PLC0415
     from triaxcal.report.imuc import C_FILES  # noqa: PLC0415
 
-    with _bar() as progress:
-        made = deliver_imu(unit, progress)
+    made = delivered_imu(unit)
     files = dynamic_files(made)
     target = build / made.done.unit.name
     publish(files, target, C_FILES)
     click.echo(dynamic_summary(made, files, str(target)))
 
 
+def delivered_imu(unit: Path) -> ImuDelivery:
+    """Calibrate the IMU and make its C, with a bar of progress."""
+    from triaxcal.imudelivery import deliver_imu  # noqa: PLC0415
+
+    with _bar() as progress:
+        return deliver_imu(unit, progress)
+
+
 @contextmanager
 def _bar() -> Iterator[Callable[[str, float], None]]:
     """Progress on the screen, by the name of a step and the part of it that is done."""
-    with progressbar(length=1000, label="pass 1", file=sys.stderr) as bar:
+    with ExitStack() as stack:
+        bars: list[Any] = []
 
         def progress(step: str, part: float) -> None:
+            if not bars:  # nothing is drawn for what is refused at the door
+                bars.append(
+                    stack.enter_context(progressbar(length=1000, label=step, file=sys.stderr))
+                )
+            bar = bars[0]
             if bar.label != step:
                 bar.label = step
                 bar.pos = 0

@@ -19,6 +19,16 @@ def verify(unit: Path, build: Path) -> None:
     UNIT is calibrated as by `calib`; the results go into its verification.json. Exit code 1 when
     a check failed; tools that are not installed are named, and their checks count as not done.
     """
+    from triaxcal.tomltable import has_table  # noqa: PLC0415
+    from triaxcal.unitfile import find_unit  # noqa: PLC0415
+
+    run = _verify_imu if has_table(find_unit(unit), "dynamic") else _verify_accelerometer
+    target, code = run(unit, build)
+    click.echo(f"\nresults in {target / 'verification.json'}; what they mean: docs/verification.md")
+    sys.exit(code)
+
+
+def _verify_accelerometer(unit: Path, build: Path) -> tuple[Path, int]:
     from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.publish import publish, renew  # noqa: PLC0415
     from triaxcal.report.files import SOMETIMES, all_files, passport_files  # noqa: PLC0415
@@ -28,7 +38,7 @@ def verify(unit: Path, build: Path) -> None:
         exit_code,
         verify_files,
     )
-    from triaxcal.verify.record import is_delivered, record  # noqa: PLC0415
+    from triaxcal.verify.record import entries, is_delivered, record  # noqa: PLC0415
     from triaxcal.verify.table import table  # noqa: PLC0415
 
     delivery = deliver(unit)
@@ -38,10 +48,40 @@ def verify(unit: Path, build: Path) -> None:
         publish(files, target, SOMETIMES)
     with tempfile.TemporaryDirectory(prefix="triaxcal-verify-") as folder:
         outcomes = verify_files(Path(folder), delivery.files, delivery.plan, delivery.bound)
-    record(target, outcomes)
-    made = passport(delivery, {outcome.key: outcome.json() for outcome in outcomes})
-    renew(passport_files(made), target)
+    tools = entries(outcomes)
+    record(target, tools)
+    renew(passport_files(passport(delivery, tools)), target)
     click.echo(f"unit {delivery.unit.name}\n")
     click.echo(table([*delivery_outcomes(delivery.bound, delivery.check), *outcomes]))
-    click.echo(f"\nresults in {target / 'verification.json'}; what they mean: docs/verification.md")
-    sys.exit(exit_code(outcomes))
+    return target, exit_code(outcomes)
+
+
+def _verify_imu(unit: Path, build: Path) -> tuple[Path, int]:
+    from triaxcal.cli.dynamic import delivered_imu  # noqa: PLC0415
+    from triaxcal.dynamic.description import read_dynamic  # noqa: PLC0415
+    from triaxcal.publish import publish, renew  # noqa: PLC0415
+    from triaxcal.report.dynamic import dynamic_files  # noqa: PLC0415
+    from triaxcal.report.dynamicpage import dynamic_page  # noqa: PLC0415
+    from triaxcal.report.imuc import C_FILES, refuse_no_device  # noqa: PLC0415
+    from triaxcal.verify.campaign import exit_code  # noqa: PLC0415
+    from triaxcal.verify.imu import imu_delivery_outcomes, verify_imu  # noqa: PLC0415
+    from triaxcal.verify.record import entries, is_delivered, record  # noqa: PLC0415
+    from triaxcal.verify.table import grouped_table  # noqa: PLC0415
+
+    refuse_no_device(read_dynamic(unit))
+    made = delivered_imu(unit)
+    assert made.c is not None
+    target = build / made.done.unit.name
+    files = dynamic_files(made)
+    if not is_delivered(target, files):
+        publish(files, target, C_FILES)
+    with tempfile.TemporaryDirectory(prefix="triaxcal-verify-") as folder:
+        groups = verify_imu(Path(folder), made.c.build)
+    tools = {name: entries(outcomes) for name, outcomes in groups.items()}
+    record(target, tools)
+    renew({"dynamic.html": dynamic_page(made, tools)}, target)
+    before = imu_delivery_outcomes(made.c.build)
+    shown = {name.replace("_", " "): [*before[name], *groups[name]] for name in groups}
+    click.echo(f"unit {made.done.unit.name}\n")
+    click.echo(grouped_table(shown))
+    return target, exit_code([o for outcomes in groups.values() for o in outcomes])

@@ -24,6 +24,10 @@ GRAVITY_TOLERANCE = 0.25
 FACTOR_LIMITS = (0.6, 1.6)
 """M of a unit with errors below ten per cent, and of handling in between, stays well within."""
 START_S = 2.0
+LEAST_TURN_RAD = 0.01
+"""Below it M is noise."""
+TURNED_COSINE = math.cos(math.radians(30.0))
+"""Gravity that moved so far in the unit was turned by somebody."""
 
 
 def refuse_wrong_units(recording: ImuRecording, windows: Windows) -> None:
@@ -77,9 +81,24 @@ def rate_matrix(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatAr
     return matrix, turned
 
 
+def _refuse_gyros_that_miss_the_turn(name: str, windows: Windows, turned: FloatArray) -> None:
+    """Refuse forces that turn while the gyros stand: by far the wrong unit, or other columns."""
+    direction = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
+    least = float((direction @ direction[0]).min())
+    if least < TURNED_COSINE:
+        raise RefusedError(
+            name,
+            f"gravity turns in the unit by {math.degrees(math.acos(max(least, -1.0))):.0f} deg, "
+            f"but the gyros turn by {math.degrees(turned.max()):.2g} deg in all",
+            expected="gyros that turn as the unit does",
+            remedy="look at rate_columns and rate_unit in [dynamic]",
+        )
+
+
 def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
     matrix, turned = rate_matrix(windows, bias)
-    if turned.max() < 0.01:
+    if turned.max() < LEAST_TURN_RAD:
+        _refuse_gyros_that_miss_the_turn(name, windows, turned)
         return
     best = 0.0
     order: tuple[int, ...] = (0, 1, 2)
@@ -106,11 +125,12 @@ def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
         hints = {
             math.pi / 180: " (degrees taken for radians?)",
             180 / math.pi: " (radians taken for degrees?)",
+            1e-3: " (milliseconds taken for seconds?)",
         }
         hint = next((h for k, h in hints.items() if abs(math.log(size / k)) < 0.5), "")
         raise RefusedError(
             name,
             f"gravity turns in the unit {size:.3g} times as fast as the gyros say{hint}",
             expected="once",
-            remedy="look at rate_unit and rate_samples in [dynamic]",
+            remedy="look at rate_unit, rate_samples and time_unit in [dynamic]",
         )

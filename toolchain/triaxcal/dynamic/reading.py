@@ -44,8 +44,7 @@ def read_recording(unit: DynamicDescription) -> ImuRecording:
             str(path),
             "no such file",
             expected="the recording that unit.toml names",
-            remedy="put it there; of a simulated unit, "
-            f"`triaxcal simulate {unit.path.parent}` makes it",
+            remedy=_how_to_get_it(unit.path.parent),
         )
     names = _names(unit)
     tables: Callable[[], Iterator[FloatArray]]
@@ -68,6 +67,12 @@ def read_recording(unit: DynamicDescription) -> ImuRecording:
         force_convention=unit.force_convention,
         table=unit.table,
     )
+
+
+def _how_to_get_it(folder: Path) -> str:
+    if (folder / "imu_truth.toml").is_file():
+        return f"make simulate UNIT={folder.name}, or triaxcal simulate {folder}, writes it"
+    return "put it there, or correct [dynamic] recording"
 
 
 def _names(unit: DynamicDescription) -> list[str]:

@@ -23,6 +23,10 @@ AXIS_COSINE = np.cos(np.radians(25.0))
 """A turn counts as one about an instrument axis within 25 deg."""
 AXIS_TURN_MIN_RAD = 2 * np.pi
 """An axis that turned less in all was never put on the table."""
+REST_MAX_RAD_PER_S = np.radians(25.0)
+"""Data sheets of the coarsest gyros allow 20 deg/s at rest: a section that starts faster turns."""
+REST_FORCE_COSINE = np.cos(np.radians(5.0))
+"""Gravity leans by less at rest: 1 deg/s about a level axis shows in `STILL_MIN_S`."""
 STAGE_TURN_RAD = np.pi
 """Less than half a turn about an axis is handling, not a stage."""
 STILL_SD = 5.0
@@ -138,17 +142,32 @@ def _section(
     standing: BoolArray = np.abs(rate - reference).max(axis=1) < limit
     run = len(standing) if standing.all() else int(np.argmin(standing))
     length_s = float(windows.duration_s[inside][:run].sum())
+    found = ""
     if length_s < STILL_MIN_S:
-        speed = np.degrees(np.linalg.norm(rate[run] - reference)) if run < len(rate) else 0.0
+        found = f"stands still for {length_s:.1f} s, then " + (
+            f"turns at {np.degrees(np.linalg.norm(rate[run] - reference)):.1f} deg/s"
+            if run < len(rate)
+            else "the recording ends or has a gap"
+        )
+    elif _turns_evenly(reference, windows.force[inside][: round(STILL_MIN_S / WINDOW_S)]):
+        found = f"does not stand still: turns at {np.degrees(np.linalg.norm(reference)):.1f} deg/s"
+    if found:
         raise RefusedError(
             f"{name}, {start[0]:.1f} s",
-            f"stands still for {length_s:.1f} s, then turns at {speed:.1f} deg/s",
+            found if first == 0 else f"after a gap the unit {found}",
             expected=f"at least {STILL_MIN_S:.0f} s at rest at the start and after each gap",
-            remedy="let the unit stand before the first turn",
+            remedy="let the unit stand before the first turn, and lose no samples while it turns",
         )
     kept = slice(0, max(1, run - 1))
     mean_rate, mean_force = rate[kept].mean(axis=0), windows.force[inside][kept].mean(axis=0)
     return Section(first, last, float(start[0]), length_s, mean_rate, mean_force), standing
+
+
+def _turns_evenly(rate: FloatArray, force: FloatArray) -> bool:
+    """Whether a section starts in an even turn, which to the gyros alone looks like a bias."""
+    direction = force / np.linalg.norm(force, axis=1)[:, None]
+    leans = bool((direction @ direction[0]).min() < REST_FORCE_COSINE)
+    return leans or float(np.linalg.norm(rate)) > REST_MAX_RAD_PER_S
 
 
 def _stages(

@@ -11,29 +11,26 @@ from typing import Any
 import numpy as np
 
 from triaxcal import __version__
-from triaxcal.codegen.render import environment
 from triaxcal.dynamic.calibrate import DynamicResult
-from triaxcal.dynamic.observability import Observability, Weak
+from triaxcal.dynamic.observability import Observability
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.imudelivery import ImuDelivery
+from triaxcal.report.dynamicpage import digits, dynamic_page, verdict, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
 
 FORMAT = 1
-PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
-BAND = 10.0
-"""Panels show so many final standard deviations on each side."""
 
 
 def dynamic_files(made: ImuDelivery) -> dict[str, bytes]:
     """Name and content of everything that build/<UNIT>/ receives."""
     return {
-        "calibration.json": _calibration_json(made.done),
-        "dynamic.html": _page(made.done),
+        "calibration.json": _calibration_json(made.done, made.inputs_sha256),
+        "dynamic.html": dynamic_page(made, {}),
         **imu_c_files(made),
     }
 
 
-def _calibration_json(done: DynamicUnit) -> bytes:
+def _calibration_json(done: DynamicUnit, inputs_sha256: str) -> bytes:
     unit, result, seen = done.unit, done.result, done.seen
     layout, last = result.layout, result.passes[-1]
     document: dict[str, Any] = {
@@ -42,6 +39,7 @@ def _calibration_json(done: DynamicUnit) -> bytes:
         "triaxcal": __version__,
         "unit": unit.name,
         "serial": unit.serial,
+        "inputs_sha256": inputs_sha256,
         "recording": unit.recording.name,
         "reference_degc": unit.reference_degc,
         "local_gravity_m_per_s2": unit.gravity_m_per_s2,
@@ -94,41 +92,11 @@ def _calibration_json(done: DynamicUnit) -> bytes:
     return (json.dumps(document, indent=1) + "\n").encode()
 
 
-def verdict(result: DynamicResult) -> str:
-    """Whether the innovations are what the stated noise gives; one sentence."""
-    last = result.passes[-1]
-    ratio = last.chi_square / last.freedom
-    if ratio > 1.1:
-        return (
-            f"innovations {math.sqrt(ratio):.2f} times the stated noise: an effect that is not "
-            "switched on, or more noise than stated"
-        )
-    if ratio < 0.5:
-        return f"innovations {math.sqrt(ratio):.2f} times the stated noise: less noise than stated"
-    return f"innovations {math.sqrt(ratio):.2f} times the stated noise: consistent"
-
-
-def weak_words(weak: Weak) -> str:
-    """One direction that a motion hardly shows, for people."""
-    common = " and ".join(weak.names)
-    text = (
-        f"{common} in common to {_digits(weak.sd_each, weak.sd_each)} {weak.unit} each (sd); "
-        f"every other combination to {_digits(weak.sd_next, weak.sd_next)} or better"
-    )
-    return f"{text}: {weak.why}." if weak.why else f"{text}."
-
-
 def axis_up(result: DynamicResult) -> str:
     """The instrument axis that pointed up most at the start, by the force: "+z"."""
     force = result.survey.sections[0].force
     axis = int(np.argmax(np.abs(force)))
     return f"{'+' if force[axis] > 0 else '-'}{'xyz'[axis]}"
-
-
-def _digits(value: float, sd: float) -> str:
-    """Value to the second digit of its standard deviation."""
-    places = max(0, 1 - math.floor(math.log10(sd))) if sd > 0 else 3
-    return f"{value:.{min(places, 9)}f}"
 
 
 def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str:
@@ -160,8 +128,8 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
         place = layout.place(block.name)
         for i, state in enumerate(block.states, start=place.start):
             value, sd = result.p[i] / state.per_unit, result.sd[i] / state.per_unit
-            found_sd = f"{_digits(sd, sd):<10s} {state.unit}"
-            lines.append(f"  {state.name:9s} {_digits(value, sd):>14s} +- {found_sd}")
+            found_sd = f"{digits(sd, sd):<10s} {state.unit}"
+            lines.append(f"  {state.name:9s} {digits(value, sd):>14s} +- {found_sd}")
     if done.off:
         lines += ["", "effects switched off, chi-square of their states in this recording:"]
         for effect in done.off:
@@ -169,7 +137,7 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
             size = f"{effect.chi_square:.1f} of {effect.states}"
             lines.append(f"  {effect.name:24s} {size:>14s}{call}")
             lines += textwrap.wrap(
-                effect.hint, 92, initial_indent=" " * 8, subsequent_indent=" " * 8
+                effect.hint, 80, initial_indent=" " * 8, subsequent_indent=" " * 8
             )
     lines += _seen_lines(seen)
     lines += ["", *imu_c_lines(made), "", f"files           {target}/"]
@@ -193,7 +161,7 @@ def plan_summary(done: DynamicUnit) -> str:
         lines.append(block.title)
         for i, state in enumerate(block.states, start=layout.place(block.name).start):
             sd = result.sd[i] / state.per_unit
-            lines.append(f"  {state.name:9s} {_digits(sd, sd):>10s} {state.unit}")
+            lines.append(f"  {state.name:9s} {digits(sd, sd):>10s} {state.unit}")
     return "\n".join([*lines, *_seen_lines(done.seen)])
 
 
@@ -205,96 +173,8 @@ def _seen_lines(seen: Observability) -> list[str]:
         lines += ["  " + " with ".join(names) for names in seen.unseen]
     for weak in seen.weak:
         lines += ["", "known badly:"]
-        lines += textwrap.wrap(weak_words(weak), 92, initial_indent="  ", subsequent_indent="  ")
+        lines += textwrap.wrap(weak_words(weak), 80, initial_indent="  ", subsequent_indent="  ")
     if seen.together:
         lines += ["", "known only together:"]
         lines += [f"  {a} and {b}, correlation {c:+.4f}" for a, b, c in seen.together]
     return lines
-
-
-def _page(done: DynamicUnit) -> bytes:
-    unit, result, seen = done.unit, done.result, done.seen
-    layout = result.layout
-    context = {
-        "unit": unit,
-        "result": result,
-        "verdict": verdict(result),
-        "samples": f"{result.survey.sections[-1].last + 1:_}".replace("_", " "),
-        "stages": [
-            {
-                "axis": "xyz"[s.axis],
-                "start": f"{s.start_s:.0f}",
-                "end": f"{s.end_s:.0f}",
-                "turns": f"{s.turned_rad / 2 / math.pi:.1f}",
-            }
-            for s in result.survey.stages
-        ],
-        "blocks": [
-            {
-                "title": block.title,
-                "panels": [_panel(result, i) for i in _range(layout.place(block.name))],
-            }
-            for block in layout.blocks
-        ],
-        "innovations": _innovations(result),
-        "off": [
-            (e.title, f"{e.chi_square:.1f}", e.states, e.name, e.shown, e.hint) for e in done.off
-        ],
-        "unseen": seen.unseen,
-        "weak": [weak_words(w) for w in seen.weak],
-        "together": [(a, b, f"{c:+.4f}") for a, b, c in seen.together],
-        "width": PANEL_WIDTH,
-        "height": PANEL_HEIGHT,
-        "version": __version__,
-    }
-    return environment().get_template("dynamic.html.j2").render(context).encode()
-
-
-def _range(place: slice) -> range:
-    return range(place.start, place.stop)
-
-
-def _panel(result: DynamicResult, i: int) -> dict[str, str]:
-    """Estimate and its three standard deviations over time, about the final estimate."""
-    state, history = result.layout.states[i], result.passes[-1].history
-    time = np.array(history.time_s)
-    p = np.array([row[i] for row in history.p])
-    sd = np.array([row[i] for row in history.sd])
-    final, unit_sd = result.p[i] / state.per_unit, result.sd[i] / state.per_unit
-    span = BAND * result.sd[i]
-    x = PANEL_WIDTH * (time - time[0]) / max(time[-1] - time[0], 1e-9)
-
-    def y(values: Any) -> Any:
-        return PANEL_HEIGHT / 2 * (1 - np.clip((values - result.p[i]) / span, -1, 1))
-
-    upper = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p + 3 * sd), strict=True)]
-    lower = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p - 3 * sd), strict=True)]
-    return {
-        "name": state.name,
-        "value": f"{_digits(final, unit_sd)} ± {_digits(unit_sd, unit_sd)} {state.unit}",
-        "scale": f"± {_digits(BAND * unit_sd, BAND * unit_sd)}",
-        "band": " ".join(upper + lower[::-1]),
-        "line": " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p), strict=True)),
-    }
-
-
-def _innovations(result: DynamicResult) -> dict[str, Any]:
-    """Chi-square per degree of freedom between checkpoints, with the band that noise fills."""
-    history = result.passes[-1].history
-    chi, freedom = np.array(history.chi_square), np.array(history.freedom, dtype=float)
-    time = np.array(history.time_s)
-    step = np.diff(freedom)
-    keep = step > 0
-    ratio = np.diff(chi)[keep] / step[keep]
-    width, height, top = 4 * PANEL_WIDTH, PANEL_HEIGHT, max(2.0, float(ratio.max(initial=0)) * 1.05)
-    x = width * (time[1:][keep] - time[0]) / max(time[-1] - time[0], 1e-9)
-    band = 3 * np.sqrt(2 / step[keep])
-    return {
-        "width": width,
-        "points": [
-            {"x": f"{a:.1f}", "y": f"{height * (1 - r / top):.1f}", "out": bool(abs(r - 1) > b)}
-            for a, r, b in zip(x, ratio, band, strict=True)
-        ],
-        "one": f"{height * (1 - 1 / top):.1f}",
-        "top": f"{top:.1f}",
-    }

@@ -8,11 +8,15 @@ from triaxcal import __version__
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import CrossCheck
 from triaxcal.codegen.render import shape_id
+from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.device import REQUIRED
+from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
 from triaxcal.imudelivery import METHOD, ImuC, ImuDelivery
 from triaxcal.jsontext import json_bytes
+from triaxcal.report.firmware import checked_words, proven_words
+from triaxcal.report.passport.words import g_in_words, significant, thousands
 
 VERIFICATION_FILE = "verification.json"
 C_FILES = (
@@ -22,6 +26,22 @@ C_FILES = (
 """What a unit with [device] receives besides."""
 NO_C = "none: unit.toml has no [device]; add it with " + ", ".join(REQUIRED)
 FORMAT = 1
+
+
+def refuse_no_device(unit: DynamicDescription) -> None:
+    """Refuse a unit that gets no C where C is asked for.
+
+    Raises
+    ------
+    RefusedError
+    """
+    if unit.device is None:
+        raise RefusedError(
+            str(unit.path),
+            "has no [device], and so the unit gets no C",
+            expected="[device] with " + ", ".join(REQUIRED),
+            remedy="add it: docs/dynamic.md",
+        )
 
 
 def imu_c_files(made: ImuDelivery) -> dict[str, bytes]:
@@ -78,6 +98,51 @@ def _deg_per_h(gyro: Plan, lsb: float) -> float:
     return lsb * 2.0**-gyro.shape.output_q * 3600
 
 
+def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
+    """What the delivery has shown of its C: rows for the page, nothing where there is no C."""
+    if made.c is None:
+        return []
+    c, build = made.c, made.c.build
+    accel_g = build.accel_bound.lsb * 2.0**-build.accel.shape.output_q
+    own = significant(_deg_per_h(build.gyro, build.gyro_bound.lsb), 3)
+    carried = max(build.rate_bound_lsb)
+    gyro_model = f"{significant(c.gyro_model_error_deg_per_h)} °/h"
+    model = f"{g_in_words(c.accel_model_error_g)} and {gyro_model}"
+    rows = [
+        (
+            "Accelerometer: proven arithmetic error",
+            proven_words(build.accel_bound, build.accel_check, g_in_words(accel_g)),
+        ),
+        (
+            "Gyro: proven arithmetic error",
+            proven_words(build.gyro_bound, build.gyro_check, f"{own} °/h")
+            + f"; with the accelerometer's error carried along ≤ {carried:.3f} LSB = "
+            f"{significant(_deg_per_h(build.gyro, carried), 3)} °/h",
+        ),
+        (
+            "Method against the fitted model",
+            f"≤ {model} at every temperature code and any raw code",
+        ),
+        ("Accelerometer: cross-check", checked_words(build.accel_check)),
+        ("Gyro: cross-check", checked_words(build.gyro_check)),
+        (
+            "Both together",
+            f"{thousands(build.vectors)} vectors, constants and image: Python = generated C",
+        ),
+        ("Not corrected", "; ".join(c.left_out) or "nothing that was estimated"),
+    ]
+    constant = constant_triads(made)
+    if constant:
+        rows.append(("Constant over temperature", f"{' and '.join(constant)}: no block is on"))
+    return rows
+
+
+def constant_triads(made: ImuDelivery) -> list[str]:
+    """Triads whose constants are the same over the whole range."""
+    names = {block.name for block in made.done.result.layout.blocks}
+    return [what for what in ("accelerometer", "gyro") if f"{what}-thermal" not in names]
+
+
 def imu_c_lines(made: ImuDelivery) -> list[str]:
     """Lines of the summary."""
     if made.c is None:
@@ -102,12 +167,11 @@ def imu_c_lines(made: ImuDelivery) -> list[str]:
         f"  checked       {agree}",
     ]
     lines += [f"  not corrected {title}" for title in c.left_out]
-    names = {block.name for block in made.done.result.layout.blocks}
-    for what in ("accelerometer", "gyro"):
-        if f"{what}-thermal" not in names:
-            lines.append(
-                f'  constant      {what} over temperature: [dynamic] blocks has no "{what}-thermal"'
-            )
+    for what in constant_triads(made):
+        lines += [
+            f"  constant      {what} over temperature: [dynamic] blocks has no",
+            f'                "{what}-thermal"',
+        ]
     return lines
 
 

@@ -57,11 +57,16 @@ SANITIZERS = (
 
 def check_gcc_analyzer(work: Workspace) -> Outcome:
     """gcc -fanalyzer with every warning an error, on both forms."""
+    return analyse_with_gcc(work.folder, work.named(ROUTINE))
+
+
+def analyse_with_gcc(folder: Path, routine: str) -> Outcome:
+    """The same for a file of a folder."""
     complaints: list[str] = []
     good = True
     for name, form in FORMS.items():
         flags = [*FLAGS, *form, "-fanalyzer", "-c", "-o", f"verify_analyzer_{name}.o"]
-        answer = run([GCC.find(), *flags, work.named(ROUTINE)], work.folder)
+        answer = run([GCC.find(), *flags, routine], folder)
         complaints += complaints_of(answer)
         good = good and answer.code == 0
     figures = {"version": GCC.version(), "findings": len(complaints)}
@@ -83,16 +88,45 @@ def check_sanitizer(work: Workspace, sanitizer: Sanitizer) -> Outcome:
     MissingToolError
         When the compiler, or its sanitizer's library, is not installed.
     """
-    _probe(work, sanitizer)
     vectors = vector_sets(work.plan, RANDOM_VECTORS)
     count = sum(len(v.temp) for v in vectors)
-    given = work.folder / f"verify_{sanitizer.key}.in"
-    given.write_bytes(b"".join(rows_of(work.plan, v) for v in vectors))
-    expected = _expected(work, vectors)
+    batch = shipped("firmware_ref") / work.named("triax_batch.c")
+    subject = Subject(
+        work.folder,
+        work.render(f"verify_{sanitizer.key}.c", "verify_driver.c.j2", {}),
+        (work.named(ROUTINE), str(batch)),
+        work.named(IMAGE),
+        b"".join(rows_of(work.plan, v) for v in vectors),
+        _expected(work, vectors),
+    )
+    return run_sanitizer(sanitizer, subject, count)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What runs under a sanitizer: a driver and files, an image, vectors and the right answers."""
+
+    folder: Path
+    driver: Path
+    sources: tuple[str, ...]
+    image: str
+    vectors: bytes
+    answers: bytes
+
+
+def run_sanitizer(sanitizer: Sanitizer, subject: Subject, count: int) -> Outcome:
+    """Run both forms on `count` vectors.
+
+    Raises
+    ------
+    MissingToolError
+        When the compiler, or its sanitizer's library, is not installed.
+    """
+    _probe(subject.folder, sanitizer)
     complaints = [
         f"{name} form: {complaint}"
         for name, form in FORMS.items()
-        for complaint in _run_form(work, sanitizer, form, given, expected)
+        for complaint in _run_form(subject, sanitizer, form)
     ]
     figures = {"version": sanitizer.tool.version(), "vectors": count, "findings": len(complaints)}
     return judged(
@@ -105,28 +139,25 @@ def check_sanitizer(work: Workspace, sanitizer: Sanitizer) -> Outcome:
     )
 
 
-def _run_form(
-    work: Workspace, sanitizer: Sanitizer, form: tuple[str, ...], given: Path, expected: bytes
-) -> list[str]:
+def _run_form(subject: Subject, sanitizer: Sanitizer, form: tuple[str, ...]) -> list[str]:
     """Complaints of one form, or that its answers differ."""
-    program = work.folder / f"verify_{sanitizer.key}"
-    driver = work.render(f"{program.name}.c", "verify_driver.c.j2", {})
-    batch = shipped("firmware_ref")
+    folder = subject.folder
+    program = folder / f"verify_{sanitizer.key}"
+    given, found = program.with_suffix(".in"), program.with_suffix(".out")
+    given.write_bytes(subject.vectors)
     command = [
         sanitizer.tool.find(), "-std=c99", "-O1", "-g", *form, *sanitizer.flags,
-        f"-I{work.folder}", f"-I{batch}",
-        "-o", str(program), driver.name, work.named(ROUTINE),
-        str(batch / work.named("triax_batch.c")),
+        f"-I{folder}", f"-I{shipped('firmware_ref')}",
+        "-o", str(program), subject.driver.name, *subject.sources,
     ]  # fmt: skip
-    built = run(command, work.folder)
+    built = run(command, folder)
     if built.code:
         return complaints_of(built) or [built.text[-200:]]
-    found = given.with_suffix(".out")
-    answer = run([str(program), given.name, found.name, work.named(IMAGE)], work.folder)
+    answer = run([str(program), given.name, found.name, subject.image], folder)
     complaints = complaints_of(answer)
     if not complaints and answer.code:
         return [f"exit code {answer.code}: {answer.text.strip()[-200:]}"]
-    if not complaints and found.read_bytes() != expected:
+    if not complaints and found.read_bytes() != subject.answers:
         return ["answers differ from those of the Python model"]
     return complaints
 
@@ -137,13 +168,13 @@ def complaints_of(answer: Answer) -> list[str]:
     return [match.group() for match in found if match]
 
 
-def _probe(work: Workspace, sanitizer: Sanitizer) -> None:
+def _probe(folder: Path, sanitizer: Sanitizer) -> None:
     """Link nothing but the sanitizer's own library."""
     compiler = sanitizer.tool.find()
-    probe = work.folder / f"verify_{sanitizer.key}_probe.c"
+    probe = folder / f"verify_{sanitizer.key}_probe.c"
     probe.write_text("int main(void) { return 0; }\n")
     program = str(probe.with_suffix(""))
-    if run([compiler, *sanitizer.flags, "-o", program, probe.name], work.folder).code:
+    if run([compiler, *sanitizer.flags, "-o", program, probe.name], folder).code:
         raise MissingToolError(
             f"{sanitizer.tool.program} has no {sanitizer.flags[0]}; "
             f"sudo apt-get install {sanitizer.tool.package}"

@@ -36,7 +36,9 @@ def verify_files(
     """Run every check on delivered files; `folder` is for the work and stays behind."""
     work = Workspace.create(folder, files, plan, bound)
     with ThreadPoolExecutor(2) as pool:
-        return tuple(pool.map(lambda check: _run(work, *check), CHECKS))
+        return tuple(
+            pool.map(lambda check: guarded(check[0], check[1], lambda: check[2](work)), CHECKS)
+        )
 
 
 def delivery_outcomes(bound: Bound, check: CrossCheck) -> tuple[Outcome, ...]:
@@ -66,9 +68,10 @@ def exit_code(outcomes: Sequence[Outcome]) -> int:
     return int(any(o.result == FAILED for o in outcomes))
 
 
-def _run(work: Workspace, key: str, title: str, check: Check) -> Outcome:
+def guarded(key: str, title: str, check: Callable[[], Outcome]) -> Outcome:
+    """The outcome of a check; not done where its tool is missing, failed where it breaks."""
     try:
-        return check(work)
+        return check()
     except MissingToolError as missing:
         return Outcome(key, title, NOT_DONE, str(missing))
     except BrokenToolError as broken:

@@ -63,7 +63,11 @@ class Deviation:
 
 def check(work: Workspace) -> Outcome:
     """The routine, and a file that includes the constants as firmware does."""
-    findings = find_all(work)
+    return judge(find_all(work))
+
+
+def judge(findings: Sequence[Finding]) -> Outcome:
+    """Good when the findings are none but the deviations on file."""
     deviations = read_deviations()
     left = [f for f in findings if not any(d.covers(f) for d in deviations)]
     deviated = sorted({f.rule for f in findings} - {f.rule for f in left})
@@ -96,10 +100,20 @@ def find_all(work: Workspace) -> list[Finding]:
     ------
     MissingToolError, BrokenToolError
     """
-    (work.folder / USER).write_text(f'#include "{work.named(CONSTANTS)}"\n')
+    return find_in(work.folder, work.named(ROUTINE), (work.named(CONSTANTS),))
+
+
+def find_in(folder: Path, routine: str, constants: Sequence[str]) -> list[Finding]:
+    """Every complaint about a routine of a folder, and about the constants as firmware sees them.
+
+    Raises
+    ------
+    MissingToolError, BrokenToolError
+    """
+    (folder / USER).write_text("".join(f'#include "{name}"\n' for name in constants))
     lines: dict[str, None] = {}
     for form in FORMS:
-        answer = run([CPPCHECK.find(), *OPTIONS, *form, work.named(ROUTINE), USER], work.folder)
+        answer = run([CPPCHECK.find(), *OPTIONS, *form, routine, USER], folder)
         if answer.code:
             raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
         lines |= dict.fromkeys(answer.text.splitlines())
@@ -111,7 +125,7 @@ def find_all(work: Workspace) -> list[Finding]:
         if file == USER:
             continue
         rule = _RULE.fullmatch(identity)
-        source = (work.folder / file).read_text().splitlines()
+        source = (folder / file).read_text().splitlines()
         place = place_of(source, int(number))
         findings.append(
             Finding(file, int(number), rule.group(1) if rule else "", place, f"{identity}: {text}")

@@ -11,7 +11,10 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 from triaxcal.codegen.render import int32_literal
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
@@ -58,20 +61,50 @@ def raw_ranges(plan: Plan) -> list[tuple[int, int]]:
     return [(low, high - 1) for low, high in pairwise(starts)]
 
 
+def range_literals(plan: Plan) -> list[tuple[str, str]]:
+    """`raw_ranges` as C."""
+    return [(int32_literal(low), int32_literal(high)) for low, high in raw_ranges(plan)]
+
+
 def _check(work: Workspace, key: str, title: str, entry: str, form: tuple[str, ...]) -> Outcome:
-    program = FRAMA_C.find()
+    FRAMA_C.find()
     # Two analyses may run at once: each has its own driver and report.
-    ranges = [(int32_literal(low), int32_literal(high)) for low, high in raw_ranges(work.plan)]
-    driver = work.render(f"{key}_{DRIVER}", "verify_eva.c.j2", {"ranges": ranges})
-    report = work.folder / f"{key}.csv"
-    chosen = [f"-cpp-extra-args={flag}" for flag in form]
-    command = [program, *OPTIONS, *chosen, "-main", entry, work.named(ROUTINE), driver.name]
-    answer = run([*command, "-then", "-report-csv", report.name], work.folder)
+    driver = work.render(
+        f"{key}_{DRIVER}", "verify_eva.c.j2", {"ranges": range_literals(work.plan)}
+    )
+    sources = (work.named(ROUTINE), driver.name)
+    return analyse(work.folder, Analysis(key, title, entry, ENTRIES[entry], sources, form))
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """One run of Eva: the function it starts from, those whose ends it has to reach, the files."""
+
+    key: str
+    title: str
+    entry: str
+    ends: set[str]
+    sources: Sequence[str]
+    form: Sequence[str]
+
+
+def analyse(folder: Path, asked: Analysis) -> Outcome:
+    """Run Eva on files of a folder.
+
+    Raises
+    ------
+    MissingToolError, BrokenToolError
+    """
+    key, title = asked.key, asked.title
+    report = folder / f"{key}.csv"
+    chosen = [f"-cpp-extra-args={flag}" for flag in asked.form]
+    command = [FRAMA_C.find(), *OPTIONS, *chosen, "-main", asked.entry, *asked.sources]
+    answer = run([*command, "-then", "-report-csv", report.name], folder)
     if answer.code or not report.exists():
         raise BrokenToolError(f"frama-c: {answer.text.strip()[-200:]}")
     alarms, reached = read_report(report.read_text())
     counted = _ALARMS.findall(answer.text)
-    missed = sorted(ENTRIES[entry] - reached)
+    missed = sorted(asked.ends - reached)
     if not counted or int(counted[-1]) != len(alarms):
         raise BrokenToolError(f"frama-c: {counted} alarms counted, {len(alarms)} reported")
     finding = f"{len(alarms)} alarms"

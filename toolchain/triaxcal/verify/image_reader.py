@@ -46,6 +46,12 @@ class Image:
     sensitivity: tuple[tuple[int, ...], ...] = ()
 
 
+def image_length(image: bytes) -> int:
+    """Bytes of the image that `image` begins with, as its header says; an IMU's has two."""
+    length: int = struct.unpack_from("<i", image, 8)[0]
+    return length
+
+
 def read_image(image: bytes) -> Image:
     """Read an image.
 

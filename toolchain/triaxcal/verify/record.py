@@ -15,7 +15,7 @@ from triaxcal.verify.outcome import Outcome
 
 FILE = "verification.json"
 SECTION = "tools"
-RENEWED = ("passport.html", "passport.json")
+RENEWED = ("passport.html", "passport.json", "dynamic.html")
 """Written again with the outcomes."""
 
 
@@ -37,7 +37,12 @@ def is_delivered(target: Path, files: Mapping[str, bytes]) -> bool:
     return True
 
 
-def record(target: Path, outcomes: Sequence[Outcome]) -> None:
+def entries(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Outcomes as verification.json keeps them."""
+    return {outcome.key: outcome.json() for outcome in outcomes}
+
+
+def record(target: Path, section: Mapping[str, Any]) -> None:
     """Set the section of the tools in verification.json; everything else keeps its bytes.
 
     The new file is written beside the old one and takes its place when it is complete.
@@ -49,7 +54,7 @@ def record(target: Path, outcomes: Sequence[Outcome]) -> None:
     """
     path = target / FILE
     document = _load(path.read_bytes(), path)
-    document[SECTION] = {outcome.key: outcome.json() for outcome in outcomes}
+    document[SECTION] = dict(section)
     content = json_bytes(document)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{FILE}.", dir=target)

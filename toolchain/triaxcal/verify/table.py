@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 
-WIDTH = 100
+WIDTH = 80
 SHOWN_DETAILS = 10
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Title, result and finding of each check, complaints of those that failed, and the count."""
+    return "\n".join([*_rows(outcomes), "", _count(outcomes)])
+
+
+def grouped_table(groups: Mapping[str, Sequence[Outcome]]) -> str:
+    """The same of several groups, each below its name."""
+    lines: list[str] = []
+    for name, outcomes in groups.items():
+        lines += [name, *_rows(outcomes), ""]
+    return "\n".join([*lines, _count([o for outcomes in groups.values() for o in outcomes])])
+
+
+def _rows(outcomes: Sequence[Outcome]) -> list[str]:
     left = max(len(o.title) for o in outcomes) + 2
     lines: list[str] = []
     for outcome in outcomes:
@@ -24,11 +36,11 @@ def table(outcomes: Sequence[Outcome]) -> str:
             lines += [f"  {detail}" for detail in outcome.details[:SHOWN_DETAILS]]
             if len(outcome.details) > SHOWN_DETAILS:
                 lines.append(f"  and {len(outcome.details) - SHOWN_DETAILS} more")
-    return "\n".join([*lines, "", _count(outcomes)])
+    return lines
 
 
 def _count(outcomes: Sequence[Outcome]) -> str:
     counts = {r: sum(o.result == r for o in outcomes) for r in (PASSED, FAILED, NOT_DONE)}
     text = f"{counts[PASSED]} passed, {counts[FAILED]} failed, {counts[NOT_DONE]} not done"
-    names = [o.title for o in outcomes if o.result == NOT_DONE]
+    names = dict.fromkeys(o.title for o in outcomes if o.result == NOT_DONE)
     return f"{text}: {', '.join(names)}" if names else text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import Any
 
 from triaxcal import __version__
@@ -10,6 +9,7 @@ from triaxcal.codegen.render import environment
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.fit.calibrate import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
+from triaxcal.report.firmware import checked_words, file_rows, proven_words, tool_rows
 from triaxcal.report.measured import measured_words
 from triaxcal.report.passport.content import Acceptance, Passport
 from triaxcal.report.passport.curves import HEIGHT, LEFT, WIDTH, curve_panels, uncertainty_panel
@@ -21,7 +21,6 @@ from triaxcal.report.passport.words import (
     percent,
     signed,
     significant,
-    thousands,
     with_uncertainty,
 )
 from triaxcal.uncertainty.budget import Budget, Line
@@ -54,14 +53,8 @@ def passport_html(p: Passport) -> bytes:
         "candidates": _candidates(p),
         "selection_reason": p.delivery.calibration.selection_reason,
         "verification": _verification(p),
-        "tools": [
-            {"name": name, "result": str(entry["result"]), "finding": str(entry["finding"])}
-            for name, entry in p.tools.items()
-        ],
-        "files": [
-            {"name": name, "sha256": hashlib.sha256(content).hexdigest()}
-            for name, content in p.delivery.files.items()
-        ],
+        "tools": tool_rows(p.tools),
+        "files": file_rows(p.delivery.files),
     }
     return environment().get_template("passport.html.j2").render(context).encode()
 
@@ -226,19 +219,12 @@ def _candidates(p: Passport) -> list[dict[str, Any]]:
 def _verification(p: Passport) -> list[tuple[str, str]]:
     d = p.delivery
     lsb_g = 2.0**-d.plan.shape.output_q
-    sets = "; ".join(f"{thousands(count)} {name}" for name, count in d.check.vectors.items())
-    proven = (
-        f"≤ {d.bound.lsb:.3f} LSB = {g_in_words(d.bound.lsb * lsb_g)} at every one of "
-        f"{thousands(d.bound.codes)} temperature codes and any raw code; "
-        f"largest seen {d.check.largest_error_lsb:.3f} LSB"
-    )
-    checked = (
-        f"{thousands(d.check.total)} vectors ({sets}): Python = reference C = generated C, "
-        "bit for bit, no mismatch"
-    )
     method = f"≤ {g_in_words(d.model_error_g)} at every temperature code and any raw code"
     return [
-        ("Proven arithmetic error", proven),
+        (
+            "Proven arithmetic error",
+            proven_words(d.bound, d.check, g_in_words(d.bound.lsb * lsb_g)),
+        ),
         ("Method against the fitted model", method),
-        ("Cross-check", checked),
+        ("Cross-check", checked_words(d.check)),
     ]

@@ -1,0 +1,217 @@
+"""dynamic.html: how the constants of an IMU were found, and what was shown of its C."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from triaxcal import __version__
+from triaxcal.codegen.render import environment
+from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.observability import Weak
+from triaxcal.imudelivery import ImuDelivery
+from triaxcal.report.firmware import file_rows, tool_rows
+from triaxcal.report.imuc import NO_C, imu_verification
+from triaxcal.report.passport.words import signed, thousands
+
+PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
+BAND = 10.0
+"""Panels show so many final standard deviations on each side."""
+LEAST_RATIO, MOST_RATIO = 0.5, 1.1
+"""Mean square of the innovations over that of the stated noise, where they agree."""
+PLOT_LEFT, PLOT_WIDTH = 30.0, 670.0
+
+
+def verdict(result: DynamicResult) -> str:
+    """Whether the innovations are what the stated noise gives; one sentence."""
+    last = result.passes[-1]
+    ratio = last.chi_square / last.freedom
+    if ratio > MOST_RATIO:
+        return (
+            f"innovations {math.sqrt(ratio):.2f} times the stated noise: an effect that is not "
+            "switched on, or more noise than stated"
+        )
+    if ratio < LEAST_RATIO:
+        return f"innovations {math.sqrt(ratio):.2f} times the stated noise: less noise than stated"
+    return f"innovations {math.sqrt(ratio):.2f} times the stated noise: consistent"
+
+
+def digits(value: float, sd: float) -> str:
+    """Value to the second digit of its standard deviation."""
+    places = min(max(0, 1 - math.floor(math.log10(sd))) if sd > 0 else 3, 9)
+    return f"{round(value, places) + 0.0:.{places}f}"  # no minus before a nought
+
+
+def weak_words(weak: Weak) -> str:
+    """One direction that a motion hardly shows, for people."""
+    common = " and ".join(weak.names)
+    text = (
+        f"{common} in common to {digits(weak.sd_each, weak.sd_each)} {weak.unit} each (sd); "
+        f"every other combination to {digits(weak.sd_next, weak.sd_next)} or better"
+    )
+    return f"{text}: {weak.why}." if weak.why else f"{text}."
+
+
+def consistent(result: DynamicResult) -> bool:
+    """Whether the innovations are what the stated noise gives."""
+    last = result.passes[-1]
+    return LEAST_RATIO <= last.chi_square / last.freedom <= MOST_RATIO
+
+
+def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> bytes:
+    """HTML without network, clock or script.
+
+    `tools` is the section of that name in verification.json: outcomes of each triad, and of both.
+    """
+    done = made.done
+    result, seen = done.result, done.seen
+    layout, time = result.layout, result.passes[-1].history.time_s
+    context = {
+        "unit": done.unit,
+        "badge": _badge(made),
+        "facts": _facts(made),
+        "warnings": _warnings(made),
+        "stages": [
+            {
+                "axis": "xyz"[s.axis],
+                "start": f"{s.start_s:.0f}",
+                "end": f"{s.end_s:.0f}",
+                "turns": f"{s.turned_rad / 2 / math.pi:.1f}",
+            }
+            for s in result.survey.stages
+        ],
+        "blocks": [
+            {
+                "title": block.title[0].upper() + block.title[1:],
+                "panels": [_panel(result, i) for i in _range(layout.place(block.name))],
+            }
+            for block in layout.blocks
+        ],
+        "innovations": _innovations(result),
+        "minutes": f"{(time[-1] - time[0]) / 60:.0f}",
+        "off": [
+            (e.title, f"{e.chi_square:.1f}", e.states, e.name, e.shown, e.hint) for e in done.off
+        ],
+        "unseen": seen.unseen,
+        "weak": [weak_words(w) for w in seen.weak],
+        "together": [(a, b, signed(f"{c:+.4f}")) for a, b, c in seen.together],
+        "width": PANEL_WIDTH,
+        "height": PANEL_HEIGHT,
+        "no_c": f"No C: {NO_C.removeprefix('none: ')}",
+        "verification": imu_verification(made),
+        "tools": [
+            row
+            for group, entries in tools.items()
+            for row in tool_rows(entries, f"{group.replace('_', ' ')}: ")
+        ],
+        "files": [] if made.c is None else file_rows(made.c.build.files),
+    }
+    return environment().get_template("dynamic.html.j2").render(context).encode()
+
+
+def _badge(made: ImuDelivery) -> tuple[bool, str, str]:
+    """Whether all is well, and the words for it."""
+    last = made.done.result.passes[-1]
+    words = f"innovations {math.sqrt(last.chi_square / last.freedom):.2f} times the stated noise"
+    if not consistent(made.done.result):
+        return False, "NOT CONSISTENT", words
+    if any(effect.shown for effect in made.done.off):
+        return False, "AN EFFECT IS MISSING", "it shows and is switched off, see below"
+    return True, "CONSISTENT", words
+
+
+def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
+    unit, result = made.done.unit, made.done.result
+    sections = len(result.survey.sections)
+    recording = f"{unit.recording.name}: {thousands(result.survey.sections[-1].last + 1)} samples"
+    freedom = thousands(result.passes[-1].freedom)
+    states, passes = len(result.layout) + 3, len(result.passes)
+    facts = [
+        ("Serial number", unit.serial),
+        ("Recording", recording + (f" in {sections} sections" if sections > 1 else "")),
+        ("Place", signed(f"latitude {unit.latitude_deg:g}°, {unit.gravity_m_per_s2:.6g} m/s²")),
+        ("Filter", f"{states} states, {passes} passes, {freedom} measurements"),
+        ("Extensions", ", ".join(unit.blocks) or "none"),
+    ]
+    if made.c is not None:
+        low, high = made.c.device.range_degc
+        q = _raised(-made.c.device.accel_q), _raised(-made.c.device.gyro_rate_q)
+        facts += [
+            ("Working range", signed(f"{low:g} to {high:g} °C")),
+            ("Firmware", f"LSB 2{q[0]} g, 2{q[1]} °/s"),
+        ]
+    return [
+        *facts,
+        ("Made by", f"triaxcal {__version__}"),
+        ("Inputs", f"sha256 {made.inputs_sha256[:16]}…"),
+    ]
+
+
+def _raised(number: int) -> str:
+    return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def _warnings(made: ImuDelivery) -> list[str]:
+    """What must be seen before the constants are used."""
+    found = [] if consistent(made.done.result) else [f"The {verdict(made.done.result)}."]
+    for effect in made.done.off:
+        if effect.shown:
+            found.append(
+                f"The recording shows an effect that is switched off, {effect.title}: switch on "
+                f'"{effect.name}" in [dynamic] blocks.'
+            )
+    return found
+
+
+def _range(place: slice) -> range:
+    return range(place.start, place.stop)
+
+
+def _panel(result: DynamicResult, i: int) -> dict[str, str]:
+    """Estimate and its three standard deviations over time, about the final estimate."""
+    state, history = result.layout.states[i], result.passes[-1].history
+    time = np.array(history.time_s)
+    p = np.array([row[i] for row in history.p])
+    sd = np.array([row[i] for row in history.sd])
+    final, unit_sd = result.p[i] / state.per_unit, result.sd[i] / state.per_unit
+    span = BAND * result.sd[i]
+    x = PANEL_WIDTH * (time - time[0]) / max(time[-1] - time[0], 1e-9)
+
+    def y(values: Any) -> Any:
+        return PANEL_HEIGHT / 2 * (1 - np.clip((values - result.p[i]) / span, -1, 1))
+
+    upper = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p + 3 * sd), strict=True)]
+    lower = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p - 3 * sd), strict=True)]
+    return {
+        "name": state.name,
+        "unit": state.unit.replace("^2", "²"),
+        "value": signed(f"{digits(final, unit_sd)} ± {digits(unit_sd, unit_sd)}"),
+        "scale": digits(BAND * unit_sd, BAND * unit_sd),
+        "band": " ".join(upper + lower[::-1]),
+        "line": " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p), strict=True)),
+    }
+
+
+def _innovations(result: DynamicResult) -> dict[str, Any]:
+    """Chi-square per degree of freedom between checkpoints, with the band that noise fills."""
+    history = result.passes[-1].history
+    chi, freedom = np.array(history.chi_square), np.array(history.freedom, dtype=float)
+    time = np.array(history.time_s)
+    step = np.diff(freedom)
+    keep = step > 0
+    ratio = np.diff(chi)[keep] / step[keep]
+    height, top = PANEL_HEIGHT, max(2.0, float(ratio.max(initial=0)) * 1.05)
+    x = PLOT_LEFT + PLOT_WIDTH * (time[1:][keep] - time[0]) / max(time[-1] - time[0], 1e-9)
+    band = 3 * np.sqrt(2 / step[keep])
+    return {
+        "height": height,
+        "points": [
+            {"x": f"{a:.1f}", "y": f"{height * (1 - r / top):.1f}", "out": bool(abs(r - 1) > b)}
+            for a, r, b in zip(x, ratio, band, strict=True)
+        ],
+        "one": round(height * (1 - 1 / top), 1),
+        "top": f"{top:.1f}",
+    }

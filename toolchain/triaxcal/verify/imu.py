@@ -1,0 +1,144 @@
+"""Every check of the C of an IMU: of each triad by itself, and of both together.
+
+The routines of the triads are those of one template, so each goes through the checks of an
+accelerometer's delivery. triax_imu.c calls them one after the other; what it adds is analysed here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from triaxcal.codegen.imu import IMU_FILES, IMU_IMAGE_FILE, ImuBuild, imu_answers, imu_vectors
+from triaxcal.codegen.render import environment, gyro_text
+from triaxcal.resources import shipped
+from triaxcal.verify import analyzers, cppcheck, eva
+from triaxcal.verify.campaign import delivery_outcomes, guarded, verify_files
+from triaxcal.verify.image_reader import image_length
+from triaxcal.verify.outcome import Outcome
+from triaxcal.verify.workspace import CONSTANTS, IMAGE, LIMBS, PORTABLE, ROUTINE
+
+ACCELEROMETER, GYRO, BOTH = "accelerometer", "gyro", "both_triads"
+ROUTINES = ("triax_imu.c", ROUTINE, gyro_text(ROUTINE))
+_DRIVER = "verify_eva_imu.c"
+
+
+@dataclass(frozen=True)
+class Both:
+    """Files of an IMU on disk, and its plans."""
+
+    folder: Path
+    build: ImuBuild
+
+    @classmethod
+    def create(cls, folder: Path, build: ImuBuild) -> Both:
+        """Write the delivered files into `folder`."""
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in build.files.items():
+            (folder / name).write_bytes(content)
+        return cls(folder, build)
+
+    def render(self, name: str, template: str, context: Mapping[str, object]) -> Path:
+        """Write a template's text under `name` and return its path."""
+        path = self.folder / name
+        path.write_text(environment().get_template(template).render(context))
+        return path
+
+
+def verify_imu(folder: Path, build: ImuBuild) -> dict[str, tuple[Outcome, ...]]:
+    """Run every check on the C of an IMU; `folder` is for the work and stays behind.
+
+    Returns
+    -------
+    dict
+        Outcomes of `ACCELEROMETER`, `GYRO` and `BOTH`.
+    """
+    image = build.files[IMU_IMAGE_FILE]
+    length = image_length(image)
+    accel = {**build.files, IMAGE: image[:length]}
+    gyro = {**build.files, gyro_text(IMAGE): image[length:]}
+    return {
+        ACCELEROMETER: verify_files(folder / "accel", accel, build.accel, build.accel_bound),
+        GYRO: verify_files(folder / "gyro", gyro, build.gyro, build.gyro_bound),
+        BOTH: _verify_both(folder / "both", build),
+    }
+
+
+def imu_delivery_outcomes(build: ImuBuild) -> dict[str, tuple[Outcome, ...]]:
+    """What the delivery itself has proven and compared, of each triad."""
+    return {
+        ACCELEROMETER: delivery_outcomes(build.accel_bound, build.accel_check),
+        GYRO: delivery_outcomes(build.gyro_bound, build.gyro_check),
+        BOTH: (),
+    }
+
+
+def _verify_both(folder: Path, build: ImuBuild) -> tuple[Outcome, ...]:
+    work = Both.create(folder, build)
+    with ThreadPoolExecutor(2) as pool:
+        return tuple(pool.map(lambda c: guarded(c[0], c[1], lambda: c[2](work)), CHECKS))
+
+
+def _eva(work: Both, key: str, title: str, entry: str, form: tuple[str, ...]) -> Outcome:
+    driver = work.render(f"{key}_{_DRIVER}", f"{_DRIVER}.j2", _ranges(work.build))
+    ends = {entry, "sample" if entry == "verify_imu_codes" else "accepted"}
+    asked = eva.Analysis(key, title, entry, ends, (*ROUTINES, driver.name), form)
+    return eva.analyse(work.folder, asked)
+
+
+def _ranges(build: ImuBuild) -> dict[str, object]:
+    """Ranges of both triads, in equal number: the shorter list repeats its last one."""
+    lists = [eva.range_literals(plan) for plan in (build.accel, build.gyro)]
+    count = max(map(len, lists))
+    accel, gyro = (ranges + ranges[-1:] * (count - len(ranges)) for ranges in lists)
+    return {"accel_ranges": accel, "gyro_ranges": gyro, "count": count}
+
+
+def _cppcheck(work: Both) -> Outcome:
+    """triax_imu.c and its header; the findings in the files of the triads are theirs."""
+    constants = (CONSTANTS, gyro_text(CONSTANTS))
+    found = cppcheck.find_in(work.folder, ROUTINES[0], constants)
+    return cppcheck.judge([finding for finding in found if finding.file in IMU_FILES])
+
+
+def _sanitizer(work: Both, sanitizer: analyzers.Sanitizer) -> Outcome:
+    build = work.build
+    temp, raw_accel, raw_gyro = imu_vectors(build.accel, build.gyro)
+    accel, rate, status = imu_answers(build.accel, build.gyro, temp, raw_accel, raw_gyro)
+    answers = np.column_stack([accel, rate, status.view(np.int32)]).astype(np.int32).tobytes()
+    subject = analyzers.Subject(
+        work.folder,
+        work.render(f"verify_{sanitizer.key}.c", "verify_driver_imu.c.j2", {}),
+        (*ROUTINES, str(shipped("firmware_ref") / "triax_imu_batch.c")),
+        IMU_IMAGE_FILE,
+        np.column_stack([temp, raw_accel, raw_gyro]).astype(np.int32).tobytes(),
+        answers * 2,
+    )
+    return analyzers.run_sanitizer(sanitizer, subject, len(temp))
+
+
+CHECKS: tuple[tuple[str, str, Callable[[Both], Outcome]], ...] = (
+    *(
+        (key, title, lambda w, k=key, t=title, e=entry, f=form: _eva(w, k, t, e, f))
+        for key, title, entry, form in (
+            ("eva_codes", "Eva: any int32 codes", "verify_imu_codes", PORTABLE),
+            ("eva_codes_limbs", "Eva: any codes, limbs", "verify_imu_codes", LIMBS),
+            ("eva_image", "Eva: any image", "verify_imu_image", PORTABLE),
+        )
+    ),
+    ("cppcheck", "cppcheck: MISRA C:2012", _cppcheck),
+    (
+        "gcc_analyzer",
+        "gcc -fanalyzer",
+        lambda w: analyzers.analyse_with_gcc(w.folder, ROUTINES[0]),
+    ),
+    *(
+        (sanitizer.key, sanitizer.title, lambda w, s=sanitizer: _sanitizer(w, s))
+        for sanitizer in analyzers.SANITIZERS
+    ),
+)
+"""Key, title and function of each check of both triads together."""
