@@ -109,8 +109,8 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
     lines = [
         f"unit            {unit.name}  (serial {unit.serial})",
         f"recording       {unit.recording.name}: {found.sections[-1].last + 1:_} samples, "
-        f"{len(found.sections)} section{'s' * (len(found.sections) > 1)}, first "
-        f"{found.sections[0].still_s:.0f} s at rest, {axis_up(result)} up".replace("_", " "),
+        f"{len(found.sections)} section{'s' * (len(found.sections) > 1)}".replace("_", " "),
+        f"                first {found.sections[0].still_s:.0f} s at rest, {axis_up(result)} up",
     ]
     for stage in found.stages:
         lines.append(
