@@ -40,6 +40,8 @@ LONG = {
     "test_dynamic_equations.py",
     "test_dynamic_plan.py",
     "test_dynamic_together.py",
+    "test_exact.py",
+    "test_imu_delivery.py",
     "test_uncertainty.py",
     "test_uncertainty_coverage.py",
 }

@@ -7,11 +7,14 @@ from functools import cache
 
 import numpy as np
 
-from dynamic_cases import aviation, changed, mems_short, sheet
+from dynamic_cases import aviation, changed, held, mems_short, sheet
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.missing import missing_effects
 from triaxcal.dynamic.observability import observability
 from triaxcal.dynamic.registry import extensions
+from triaxcal.simulation.imu import simulate_imu
+from triaxcal.simulation.imu_grades import MEMS, draw_truth
+from triaxcal.simulation.imu_motion import three_axes
 from triaxcal.simulation.imu_truth import ImuTruth
 
 
@@ -74,6 +77,17 @@ def test_mems_grade_and_pieces_of_any_length() -> None:
     )
     again = calibrate_dynamic(chopped, sheet(truth))
     assert np.array_equal(again.p, result.p)  # the same arithmetic in the same order
+
+
+def test_a_heading_known_to_tens_of_degrees_settles() -> None:
+    """Whole steps swing ever wider here: 0.2, 0.3, 0.5, 0.7, 1.05, 1.1 sd, and so on."""
+    truth = draw_truth(MEMS, 20240229, ("delay", "g-drift"))
+    recording = held(simulate_imu(truth, three_axes(1.5, still_s=12.0), 50.0, 20240229))
+    blocks = extensions()["delay"].blocks + extensions()["g-drift"].blocks
+    result = calibrate_dynamic(recording, sheet(truth), blocks)
+    worst, chi = normalised(result, truth)
+    assert worst < 4.0
+    assert chi < 46.8
 
 
 def test_a_missing_effect_is_named() -> None:

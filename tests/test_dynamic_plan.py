@@ -12,7 +12,7 @@ from dynamic_cases import UNIT_TOML
 from triaxcal.cli.main import main
 from triaxcal.dynamic.unit import calibrate_unit
 from triaxcal.errors import RefusedError
-from triaxcal.simulation.imu_plan import plan_unit
+from triaxcal.imuplan import plan_unit
 from triaxcal.simulation.imu_unit import planned_motion, write_simulated_recording
 
 TRUTH = """\

@@ -26,6 +26,7 @@ ROOM_OF_MODULE = {
     "__main__": "cli",
     "delivery": "delivery",
     "imudelivery": "delivery",
+    "imuplan": "imuplan",
     "publish": "publish",
 }
 """Modules beside the rooms. `ground` is below every room."""
@@ -43,6 +44,7 @@ MAY_IMPORT = {
     "publish": {"ground"},
     "delivery": {"ground", "model", "records", "fit", "dynamic", "fixedpoint", "codegen"},
     "design": {"ground", "model", "records"},
+    "imuplan": {"ground", "model", "records", "dynamic", "simulation"},
     "targets": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery"},
     "uncertainty": {"ground", "model", "records", "fit", "fixedpoint"},
     "verify": {"ground", "model", "records", "fit", "fixedpoint", "codegen", "delivery", "targets"},

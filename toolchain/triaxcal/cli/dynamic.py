@@ -34,8 +34,8 @@ def dynamic(unit: Path, build: Path, plan: bool) -> None:
 
 def tell_plan(unit: Path) -> None:
     """Print what a planned motion will let see; nothing is written."""
+    from triaxcal.imuplan import plan_unit  # noqa: PLC0415
     from triaxcal.report.dynamic import plan_summary  # noqa: PLC0415
-    from triaxcal.simulation.imu_plan import plan_unit  # noqa: PLC0415
 
     with _bar() as progress:
         done = plan_unit(unit, progress)

@@ -26,9 +26,12 @@ BLOCK_TURN_RAD = 0.2
 BLOCK_MAX_S = 0.5
 HEADING_SD_MAX_RAD = 0.3
 """Where the Earth's horizontal rate is known better than this, its direction is the heading."""
-PASSES_MAX = 8
+PASSES_MAX = 12
 SETTLED_SD = 0.05
 """A pass that moves no constant by more than this part of its standard deviation is the last."""
+DAMPED = 0.5
+"""Part of a step that is taken once steps turn back on themselves: where the heading is known to
+some ten degrees only, whole ones may swing wider and wider about the minimum."""
 
 Progress = Callable[[int, float], None]
 """Number of the pass and the part of it that is done."""
@@ -83,6 +86,7 @@ def calibrate_dynamic(
     size = _block_size(recording, found)
     start = _first_reference(searching, recording, found)
     passes: list[PassResult] = []
+    part_of_step, step = 1.0, np.zeros(0)
     for number in range(PASSES_MAX):
         layout = searching if start.heading_rad is None else wanted
         frame = Frame(
@@ -104,9 +108,12 @@ def calibrate_dynamic(
         passes.append(done)
         n = len(wanted)
         sd = np.sqrt((done.root**2).sum(axis=1))
-        moved = float(np.max(np.abs(done.p - start.p)[:n] / sd[:n]))
+        last_step, step = step, (done.p - start.p)[:n] / sd[:n]
+        moved = float(np.abs(step).max())
         before = start.heading_rad
-        start = _next_reference(start, done, n, recording)
+        if number >= 2 and before is not None and step @ last_step < -0.25 * last_step @ last_step:
+            part_of_step = DAMPED
+        start = _next_reference(start, done, n, recording, part_of_step)
         same_kind = (before is None) == (start.heading_rad is None)
         if number >= 2 and moved < SETTLED_SD and same_kind:
             return DynamicResult(
@@ -148,12 +155,16 @@ def _first_reference(layout: Layout, recording: ImuRecording, found: Survey) -> 
 
 
 def _next_reference(
-    start: Reference, done: PassResult, n: int, recording: ImuRecording
+    start: Reference, done: PassResult, n: int, recording: ImuRecording, part: float
 ) -> Reference:
+    """Where the next pass linearises: the `part` of the way to what this one found."""
     horizontal = EARTH_RATE_RAD_PER_S * math.cos(math.radians(recording.latitude_deg))
     if start.heading_rad is not None:
-        heading = start.heading_rad + done.heading_change_rad
-        return Reference(done.p, done.stage_p, heading)
+        return Reference(
+            start.p + part * (done.p - start.p),
+            start.stage_p + part * (done.stage_p - start.stage_p),
+            start.heading_rad + part * done.heading_change_rad,
+        )
     rate, sd = done.north[:, 0], done.north[:, 1]
     if float(sd.max()) > HEADING_SD_MAX_RAD * horizontal:
         return Reference(done.p, done.stage_p, None)
