@@ -108,16 +108,16 @@ def test_too_few_positions_and_half_a_turn_are_refused() -> None:
         (
             lambda a, b: (9.80665 * a, b),
             (
-                "p, column a_g: the readings swing by 9.807 g over a turn (m/s^2?); expected about 1 "
-                "g; give them in g"
+                "p, column a_g: the readings swing by 9.807 g over a turn (m/s^2?); expected about "
+                "1 g; give them in g"
             ),
         ),
         (
             lambda a, b: (b, a),
             (
                 "p, column a_g: the readings swing as -cos(theta) turned by +90 deg; expected "
-                "-cos(theta), within 15 deg; look at the order of the columns, at their signs, and at "
-                "the head's zero: at theta = 0 A reads -1 g, at 90 deg B reads +1 g"
+                "-cos(theta), within 15 deg; look at the order of the columns, at their signs, and "
+                "at the head's zero: at theta = 0 A reads -1 g, at 90 deg B reads +1 g"
             ),
         ),
         (

@@ -14,7 +14,7 @@ from triaxcal.model.types import FloatArray
 SIZE_MAX = 1.5
 """A sensitivity further from 1 than by this factor is another unit, no scale error."""
 TURNED_MAX_DEG = 15.0
-"""P3 is of first order in the coefficients and in the head's zero: beyond are other axes or signs."""
+"""P3 is of first order in the coefficients and the head's zero: beyond are other axes or signs."""
 _UNITS = {9.80665: "m/s^2", 1000.0: "mg"}
 
 
