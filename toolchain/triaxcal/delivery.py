@@ -39,7 +39,7 @@ from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
-from triaxcal.model.terms import Terms
+from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.records import MEASUREMENTS_FILE, Dwell, MeasurementSet, read_measurements
 from triaxcal.unitfile import METHODS, UNIT_FILE, UnitDescription, read_unit
 
@@ -158,15 +158,16 @@ def _calibrated(
 
         return calibrate_recording(unit, unit.recording, folder)
     measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
-    calibration = calibrate(unit, measurements)
-    refuse_unacceptable(unit, calibration, measurements)
+    terms = NO_TERMS
+    told: tuple[str, ...] = ()
     if unit.pair is not None:
         from triaxcal.fit.family.cross_coupling import stated_terms  # noqa: PLC0415
 
         known, told = stated_terms(unit, folder)
-        notes = (*calibration.notes, *told)
-        calibration = replace(calibration, terms=Terms(known), notes=notes)
-    return unit, measurements, calibration
+        terms = Terms(known)
+    calibration = calibrate(unit, measurements, terms)
+    refuse_unacceptable(unit, calibration, measurements)
+    return unit, measurements, replace(calibration, notes=(*calibration.notes, *told))
 
 
 def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:

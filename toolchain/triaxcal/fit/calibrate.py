@@ -167,8 +167,13 @@ class Calibration:
         return curve_covariance(self.shape, self.parameter_covariance, temp_degc)
 
 
-def calibrate(unit: UnitDescription, measurements: MeasurementSet) -> Calibration:
+def calibrate(
+    unit: UnitDescription, measurements: MeasurementSet, terms: Terms = NO_TERMS
+) -> Calibration:
     """Fit the constants at each temperature, choose thermal function and estimator, fit curves.
+
+    `terms` holds the quadratic terms that are known beforehand, in products of two axes: they
+    vanish in the six positions, and act in the check dwells.
 
     Raises
     ------
@@ -189,14 +194,18 @@ def calibrate(unit: UnitDescription, measurements: MeasurementSet) -> Calibratio
     ]
     data = TilterData(readings, np.stack(operators), unit.gravity_g)
     checks = check_position_dwells(measurements)
-    selection = _select(unit, data, estimators, checks)
+    selection = _select(unit, data, estimators, checks, terms)
     chosen = data.only(estimators.index(selection.estimator))
-    found = _calibration(unit, measurements, chosen, selection, range_degc)
+    found = _calibration(unit, measurements, chosen, selection, range_degc, terms=terms)
     return replace(found, notes=contradiction(unit, groups))
 
 
 def _select(
-    unit: UnitDescription, data: TilterData, estimators: tuple[str, ...], checks: tuple[Dwell, ...]
+    unit: UnitDescription,
+    data: TilterData,
+    estimators: tuple[str, ...],
+    checks: tuple[Dwell, ...],
+    terms: Terms,
 ) -> Selection:
     temps = data.readings.temps_degc
     where = f"{unit.name}/unit.toml"
@@ -212,7 +221,13 @@ def _select(
     if asked_for:
         refuse_undetermined(where, shapes[0], temps)
     return select(
-        data, estimators, shapes, checks, asked_for=asked_for, limit_g=unit.limits.over_range_g
+        data,
+        estimators,
+        shapes,
+        checks,
+        asked_for=asked_for,
+        limit_g=unit.limits.over_range_g,
+        terms=terms,
     )
 
 
@@ -222,13 +237,15 @@ def _calibration(
     data: TilterData,
     selection: Selection,
     range_degc: tuple[float, float],
+    *,
+    terms: Terms,
 ) -> Calibration:
     shape, readings = selection.shape, data.readings
     parameters = fit_curves(data, shape)
     shifted = shifted_voltage(readings, shape, parameters[0], unit.gravity_g)
     variance, source = _variance(measurements, readings, shifted)
     checks = check_position_dwells(measurements)
-    errors = check_errors(shape, parameters, checks, unit.gravity_g)[0]
+    errors = check_errors(shape, parameters, checks, unit.gravity_g, terms)[0]
     return Calibration(
         serial=unit.serial,
         estimator=selection.estimator,
@@ -243,6 +260,7 @@ def _calibration(
         check_dwells=tuple(
             CheckResult(dwell, float(error)) for dwell, error in zip(checks, errors, strict=True)
         ),
+        terms=terms,
     )
 
 

@@ -40,14 +40,14 @@ def calibrate_recording(
     unit = replace(unit, adc=_wide_enough(unit, layout, samples))
     if layout.faces:
         measurements = face_measurements(unit, layout, samples)
-        found = calibrate(unit, measurements)
+        terms = Terms(known) if known.any() else NO_TERMS
+        found = calibrate(unit, measurements, terms)
         refuse_unacceptable(unit, found, measurements)
         unseen = [no_temperature(unit)] if samples.temp_degc is None else []
         calibration = replace(
             found,
             reading_unit=layout.acceleration_unit,
             notes=(*samples.findings, *found.notes, *unseen, *told),
-            terms=Terms(known) if known.any() else NO_TERMS,
         )
         return unit, measurements, calibration
     if layout.angles is not None:
