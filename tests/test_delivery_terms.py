@@ -27,7 +27,7 @@ def made() -> Delivery:
     """AT-CHERNIAK with terms that its readings do not have."""
 
     def with_terms(
-        unit: UnitDescription, measurements: MeasurementSet, _known: Terms
+        unit: UnitDescription, measurements: MeasurementSet, _pair: object
     ) -> Calibration:
         return replace(calibrate(unit, measurements), terms=SMALL)
 

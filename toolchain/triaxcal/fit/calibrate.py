@@ -16,7 +16,7 @@ from triaxcal.fit.curves import (
     parameter_covariance,
     shifted_voltage,
 )
-from triaxcal.fit.family.result import RecordingFit
+from triaxcal.fit.family.result import PairTerms, RecordingFit
 from triaxcal.fit.grouping import (
     GroupedReadings,
     TemperatureGroup,
@@ -126,6 +126,8 @@ class Calibration:
         constants at T0 alone, and `parameter_covariance` only the blocks of each output.
     reading_unit : str
         Unit of U0; K has it per g. That of the recording, where there is one.
+    pair : PairTerms or None
+        Part of `terms` that a pair on a dividing head has shown.
     notes : tuple of str
         What the user should know of the readings, where they are no `recording`'s.
     """
@@ -144,6 +146,7 @@ class Calibration:
     terms: Terms = NO_TERMS
     recording: RecordingFit | None = None
     reading_unit: str = "V"
+    pair: PairTerms | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -168,12 +171,12 @@ class Calibration:
 
 
 def calibrate(
-    unit: UnitDescription, measurements: MeasurementSet, terms: Terms = NO_TERMS
+    unit: UnitDescription, measurements: MeasurementSet, pair: PairTerms | None = None
 ) -> Calibration:
     """Fit the constants at each temperature, choose thermal function and estimator, fit curves.
 
-    `terms` holds the quadratic terms that are known beforehand, in products of two axes: they
-    vanish in the six positions, and act in the check dwells.
+    The products of two axes that a `pair` has shown vanish in the six positions, and act in the
+    check dwells.
 
     Raises
     ------
@@ -181,6 +184,7 @@ def calibrate(
         When the measurements are incomplete, contradict themselves or the unit's description, or
         do not determine what it asks for.
     """
+    terms = NO_TERMS if pair is None else Terms(pair.quadratic)
     groups = group_dwells(measurements, unit.t0_degc)
     refuse_mistaken_units(measurements)
     refuse_exchanged_positions(measurements.source, groups, unit.polarity)
@@ -197,7 +201,8 @@ def calibrate(
     selection = _select(unit, data, estimators, checks, terms)
     chosen = data.only(estimators.index(selection.estimator))
     found = _calibration(unit, measurements, chosen, selection, range_degc, terms=terms)
-    return replace(found, notes=contradiction(unit, groups))
+    told = () if pair is None else pair.findings
+    return replace(found, pair=pair, notes=(*contradiction(unit, groups), *told))
 
 
 def _select(
