@@ -185,19 +185,24 @@ def stated_pair(unit: UnitDescription, folder: Path) -> PairTerms | None:
         return None
     path = folder / unit.pair.file
     fit = fit_pair(str(path), *read_pair(path), unit.gravity_g)
+    return pair_terms(unit.pair.file, fit, unit.pair.axes)
+
+
+def pair_terms(file: str, fit: PairFit, axes: tuple[int, int]) -> PairTerms:
+    """The coefficients of a fit as quadratic terms, with what is told of them."""
     kip_a, kip_b = (float(v) for v in fit.values[4:6])
-    Q = terms_of_pair(kip_a, kip_b, unit.pair.axes).quadratic_per_g
+    Q = terms_of_pair(kip_a, kip_b, axes).quadratic_per_g
     assert Q is not None
     # Q is linear in the two coefficients.
-    slopes = [terms_of_pair(*one, unit.pair.axes).quadratic_per_g for one in ((1, 0), (0, 1))]
+    slopes = [terms_of_pair(*one, axes).quadratic_per_g for one in ((1, 0), (0, 1))]
     J = np.stack([np.zeros(18) if s is None else s.ravel() for s in slopes], axis=1)
-    first, second = ("xyz"[k] for k in unit.pair.axes)
+    first, second = ("xyz"[k] for k in axes)
     told = (
-        f"cross-coupling of {unit.pair.file} is taken off: KipA {kip_a:.3g} (sd {fit.sd[4]:.1g}), "
+        f"cross-coupling of {file} is taken off: KipA {kip_a:.3g} (sd {fit.sd[4]:.1g}), "
         f"KipB {kip_b:.3g} (sd {fit.sd[5]:.1g}) g/g^2, A along {first} and B along {second}"
     )
     covariance = (J @ fit.covariance[4:6, 4:6] @ J.T).astype(np.float64)
-    findings = (told, *_insignificant(unit.pair.file, fit))
+    findings = (told, *_insignificant(file, fit))
     return PairTerms(Q, covariance, len(fit.residual_g2) - len(NAMES), findings)
 
 
