@@ -26,7 +26,9 @@ SMALL = Terms(EXAMPLE_TERMS.quadratic_per_g / 100, EXAMPLE_RATE)
 def made() -> Delivery:
     """AT-CHERNIAK with terms that its readings do not have."""
 
-    def with_terms(unit: UnitDescription, measurements: MeasurementSet) -> Calibration:
+    def with_terms(
+        unit: UnitDescription, measurements: MeasurementSet, _pair: object
+    ) -> Calibration:
         return replace(calibrate(unit, measurements), terms=SMALL)
 
     with pytest.MonkeyPatch.context() as patch:

@@ -32,6 +32,7 @@ from triaxcal.codegen.tryout import MethodResult, model_error_g, run_on_dwells
 from triaxcal.errors import RefusedError
 from triaxcal.fit.acceptance import dwells_in_range, refuse_unacceptable
 from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.fit.family.cross_coupling import stated_pair
 from triaxcal.fixedpoint.arithmetic import INT32_MAX
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
@@ -39,7 +40,6 @@ from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
-from triaxcal.model.terms import Terms
 from triaxcal.records import MEASUREMENTS_FILE, Dwell, MeasurementSet, read_measurements
 from triaxcal.unitfile import METHODS, UNIT_FILE, UnitDescription, read_unit
 
@@ -158,14 +158,8 @@ def _calibrated(
 
         return calibrate_recording(unit, unit.recording, folder)
     measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
-    calibration = calibrate(unit, measurements)
+    calibration = calibrate(unit, measurements, stated_pair(unit, folder))
     refuse_unacceptable(unit, calibration, measurements)
-    if unit.pair is not None:
-        from triaxcal.fit.family.cross_coupling import stated_terms  # noqa: PLC0415
-
-        known, told = stated_terms(unit, folder)
-        notes = (*calibration.notes, *told)
-        calibration = replace(calibration, terms=Terms(known), notes=notes)
     return unit, measurements, calibration
 
 

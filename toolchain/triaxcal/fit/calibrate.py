@@ -16,7 +16,7 @@ from triaxcal.fit.curves import (
     parameter_covariance,
     shifted_voltage,
 )
-from triaxcal.fit.family.result import RecordingFit
+from triaxcal.fit.family.result import PairTerms, RecordingFit
 from triaxcal.fit.grouping import (
     GroupedReadings,
     TemperatureGroup,
@@ -126,6 +126,8 @@ class Calibration:
         constants at T0 alone, and `parameter_covariance` only the blocks of each output.
     reading_unit : str
         Unit of U0; K has it per g. That of the recording, where there is one.
+    pair : PairTerms or None
+        Part of `terms` that a pair on a dividing head has shown.
     notes : tuple of str
         What the user should know of the readings, where they are no `recording`'s.
     """
@@ -144,6 +146,7 @@ class Calibration:
     terms: Terms = NO_TERMS
     recording: RecordingFit | None = None
     reading_unit: str = "V"
+    pair: PairTerms | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -167,8 +170,13 @@ class Calibration:
         return curve_covariance(self.shape, self.parameter_covariance, temp_degc)
 
 
-def calibrate(unit: UnitDescription, measurements: MeasurementSet) -> Calibration:
+def calibrate(
+    unit: UnitDescription, measurements: MeasurementSet, pair: PairTerms | None = None
+) -> Calibration:
     """Fit the constants at each temperature, choose thermal function and estimator, fit curves.
+
+    The products of two axes that a `pair` has shown vanish in the six positions, and act in the
+    check dwells.
 
     Raises
     ------
@@ -176,6 +184,7 @@ def calibrate(unit: UnitDescription, measurements: MeasurementSet) -> Calibratio
         When the measurements are incomplete, contradict themselves or the unit's description, or
         do not determine what it asks for.
     """
+    terms = NO_TERMS if pair is None else Terms(pair.quadratic)
     groups = group_dwells(measurements, unit.t0_degc)
     refuse_mistaken_units(measurements)
     refuse_exchanged_positions(measurements.source, groups, unit.polarity)
@@ -189,14 +198,19 @@ def calibrate(unit: UnitDescription, measurements: MeasurementSet) -> Calibratio
     ]
     data = TilterData(readings, np.stack(operators), unit.gravity_g)
     checks = check_position_dwells(measurements)
-    selection = _select(unit, data, estimators, checks)
+    selection = _select(unit, data, estimators, checks, terms)
     chosen = data.only(estimators.index(selection.estimator))
-    found = _calibration(unit, measurements, chosen, selection, range_degc)
-    return replace(found, notes=contradiction(unit, groups))
+    found = _calibration(unit, measurements, chosen, selection, range_degc, terms=terms)
+    told = () if pair is None else pair.findings
+    return replace(found, pair=pair, notes=(*contradiction(unit, groups), *told))
 
 
 def _select(
-    unit: UnitDescription, data: TilterData, estimators: tuple[str, ...], checks: tuple[Dwell, ...]
+    unit: UnitDescription,
+    data: TilterData,
+    estimators: tuple[str, ...],
+    checks: tuple[Dwell, ...],
+    terms: Terms,
 ) -> Selection:
     temps = data.readings.temps_degc
     where = f"{unit.name}/unit.toml"
@@ -212,7 +226,13 @@ def _select(
     if asked_for:
         refuse_undetermined(where, shapes[0], temps)
     return select(
-        data, estimators, shapes, checks, asked_for=asked_for, limit_g=unit.limits.over_range_g
+        data,
+        estimators,
+        shapes,
+        checks,
+        asked_for=asked_for,
+        limit_g=unit.limits.over_range_g,
+        terms=terms,
     )
 
 
@@ -222,13 +242,15 @@ def _calibration(
     data: TilterData,
     selection: Selection,
     range_degc: tuple[float, float],
+    *,
+    terms: Terms,
 ) -> Calibration:
     shape, readings = selection.shape, data.readings
     parameters = fit_curves(data, shape)
     shifted = shifted_voltage(readings, shape, parameters[0], unit.gravity_g)
     variance, source = _variance(measurements, readings, shifted)
     checks = check_position_dwells(measurements)
-    errors = check_errors(shape, parameters, checks, unit.gravity_g)[0]
+    errors = check_errors(shape, parameters, checks, unit.gravity_g, terms)[0]
     return Calibration(
         serial=unit.serial,
         estimator=selection.estimator,
@@ -243,6 +265,7 @@ def _calibration(
         check_dwells=tuple(
             CheckResult(dwell, float(error)) for dwell, error in zip(checks, errors, strict=True)
         ),
+        terms=terms,
     )
 
 

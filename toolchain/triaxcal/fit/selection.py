@@ -33,6 +33,7 @@ from triaxcal.fit.thermal import (
     without_temperature,
 )
 from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.types import FloatArray
 from triaxcal.records import Dwell
 from triaxcal.unitfile import ThermalChoice
@@ -121,6 +122,7 @@ def select(
     *,
     asked_for: bool,
     limit_g: float,
+    terms: Terms = NO_TERMS,
 ) -> Selection:
     """Score every shape with every estimator and choose.
 
@@ -135,11 +137,17 @@ def select(
     limit_g : float
         A candidate that misses its own fitted readings by more (rms) would be refused afterwards,
         P1 (13), and is not chosen while another is left.
+    terms : Terms
+        Quadratic terms that are known; products of the axes vanish in the six positions.
     """
     low, high = data.readings.temps_degc[0], data.readings.temps_degc[-1]
     scored = [d for d in checks if low - EDGE_DEGC <= d.temp_degc <= high + EDGE_DEGC]
     folds = _folds(data)
-    rows = [row for shape in shapes for row in _score_shape(data, estimators, shape, folds, scored)]
+    rows = [
+        row
+        for shape in shapes
+        for row in _score_shape(data, estimators, shape, folds, scored, terms=terms)
+    ]
     values = 18 * len(folds) + len(scored)
     able = [r for r in rows if r.fit_residual_g <= limit_g] or rows
     best = _choose(able, values)
@@ -244,11 +252,13 @@ def _score_shape(
     shape: ThermalShape,
     folds: Sequence[_Fold],
     checks: Sequence[Dwell],
+    *,
+    terms: Terms,
 ) -> list[_Row]:
     parameters = fit_curves(data, shape)
     fit_error = _vector_errors(data.readings, shape, parameters, data.design)
     held_out = [_fold_errors(fold, shape, data.design) for fold in folds]
-    held_out += [check_errors(shape, parameters, checks, data.gravity_g)]
+    held_out += [check_errors(shape, parameters, checks, data.gravity_g, terms)]
     values = np.concatenate([part.reshape(len(estimators), -1) for part in held_out], axis=1)
     rows = []
     for e, estimator in enumerate(estimators):
@@ -287,13 +297,17 @@ def _vector_errors(
 
 
 def check_errors(
-    shape: ThermalShape, parameters: FloatArray, checks: Sequence[Dwell], gravity_g: float
+    shape: ThermalShape,
+    parameters: FloatArray,
+    checks: Sequence[Dwell],
+    gravity_g: float,
+    terms: Terms,
 ) -> FloatArray:
     """|a| - g of P1 (13) at check dwells, shape (E, dwells), g; parameters (E, 12, P)."""
     temps = np.array([d.temp_degc for d in checks], dtype=np.float64)
     voltage = np.array([d.voltage_v for d in checks], dtype=np.float64).reshape(-1, 3)
     constants = shape.basis(temps) @ np.swapaxes(parameters, -1, -2)
-    force = force_from_voltage(constants, voltage)
+    force = terms.force_g(force_from_voltage(constants, voltage))
     error: FloatArray = np.linalg.norm(force, axis=-1) - gravity_g
     return error
 

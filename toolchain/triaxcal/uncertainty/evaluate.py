@@ -38,6 +38,7 @@ from triaxcal.uncertainty.rig_sources import (
 )
 from triaxcal.uncertainty.scatter import Scatter, scatter
 from triaxcal.uncertainty.source import Source
+from triaxcal.uncertainty.terms_sources import pair_source
 from triaxcal.unitfile import UnitDescription
 
 TEMPERATURES = 23
@@ -83,9 +84,8 @@ class Uncertainty:
         The four are its components x, y, z and its length; directions are `DIRECTIONS`.
         """
         sources = [s for s in self.sources if s.force is not None]
-        covariances = np.stack([s.force for s in sources if s.force is not None])
-        variance = force_variance(covariances, DIRECTIONS)
-        each = np.sqrt(np.maximum(variance, 0.0))
+        variance = [force_variance(s.force, DIRECTIONS) for s in sources if s.force is not None]
+        each = np.sqrt(np.maximum(np.stack(variance), 0.0))
         return _expanded(each, [s.dof for s in sources])
 
     def _of_constants(self) -> list[Source]:
@@ -106,12 +106,12 @@ class Uncertainty:
 
     def force_budget(self, quantity: int, temp: int, direction: FloatArray) -> Budget:
         """Budget of a component of the force (0 to 2), or of its length (3), at 1 g."""
-        w = weights(direction[None])[0, quantity]
         lines: list[tuple[Line, float | None]] = []
         for s in self.sources:
             if s.unknown:
                 lines.append((_line(s), None))
             elif s.force is not None:
+                w = weights(direction[None], s.force.shape[-1] // 3)[0, quantity]
                 lines.append((_line(s), math.sqrt(max(float(w @ s.force[temp] @ w), 0.0))))
         name = f"{QUANTITIES[quantity]} at {self.temps_degc[temp]:.4g} °C"
         return budget(name, "g", lines)
@@ -149,7 +149,7 @@ def uncertainty(
         return Uncertainty(
             temps,
             t0_index,
-            (*found, *_of_device(curves, device)),
+            (*found, *pair_source(curves), *_of_device(curves, device)),
             None,
             (),
             units,
@@ -165,6 +165,7 @@ def uncertainty(
         thermometer(p),
         thermometer_drift(p),
         thermal_model(p, s),
+        *pair_source(p),
         *_of_device(p, device),
     ]
     return Uncertainty(temps, t0_index, tuple(sources), s, tuple(_warnings(unit, s)), units)

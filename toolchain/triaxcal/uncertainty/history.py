@@ -22,6 +22,8 @@ import numpy as np
 
 from triaxcal.errors import RefusedError
 from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.fit.family.cross_coupling import stated_pair
+from triaxcal.fit.family.result import PairTerms
 from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.records import MEASUREMENTS_FILE, MeasurementSet, read_measurements
@@ -117,17 +119,22 @@ def read_history(folder: Path, unit: UnitDescription) -> list[Calibrated]:
             expected=f"{HISTORY_FOLDER}/<day>.csv, as {HISTORY_FOLDER}/2025-03-30.csv",
             remedy=f"move {MEASUREMENTS_FILE} there before you put a new one in its place",
         )
-    found = [calibrated(path, unit, path.stem, _day(path.stem)) for path in older]
-    newest = calibrated(folder / MEASUREMENTS_FILE, unit, "now", unit.measured.date)
+    pair = stated_pair(unit, folder)
+    found = [calibrated(path, unit, path.stem, _day(path.stem), pair) for path in older]
+    newest = calibrated(folder / MEASUREMENTS_FILE, unit, "now", unit.measured.date, pair)
     return [*found, newest]
 
 
 def calibrated(
-    path: Path, unit: UnitDescription, name: str, day: datetime.date | None
+    path: Path,
+    unit: UnitDescription,
+    name: str,
+    day: datetime.date | None,
+    pair: PairTerms | None,
 ) -> Calibrated:
-    """One file, calibrated by the unit's description."""
+    """One file, calibrated by the unit's description, with the cross-coupling of its pair."""
     measurements = read_measurements(path, unit)
-    return Calibrated(name, day, measurements, calibrate(unit, measurements))
+    return Calibrated(name, day, measurements, calibrate(unit, measurements, pair))
 
 
 def _day(name: str) -> datetime.date | None:
@@ -150,7 +157,8 @@ def latest_change(folder: Path, unit: UnitDescription, newest: Calibrated) -> Ch
     older = older_files(folder)
     if not older or unit.recording is not None:
         return None
-    last = calibrated(older[-1], unit, older[-1].stem, _day(older[-1].stem))
+    name = older[-1].stem
+    last = calibrated(older[-1], unit, name, _day(name), newest.calibration.pair)
     return _change(unit, last, newest)
 
 

@@ -7,32 +7,40 @@ import itertools
 import numpy as np
 
 from triaxcal.model.positions import AXES
+from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray
 
 QUANTITIES = ("a_x", "a_y", "a_z", "|a|")
 _SPIRAL = 120
 
 
-def weights(directions: FloatArray) -> FloatArray:
-    """Rows w, shape (directions, 4, 12), whose products with D are `QUANTITIES`' errors at 1 g.
+def weights(directions: FloatArray, columns: int = 4) -> FloatArray:
+    """Rows w, shape (directions, 4, 3 columns), that give `QUANTITIES`' errors at 1 g from D.
 
-    Error of a component: D_i [n; 1]; of the length: its projection on n.
+    Error of a component: D_i [n; 1], with the products p(n) where D has ten `columns`; of the
+    length: its projection on n.
     """
     count = len(directions)
-    affine = np.column_stack([directions, np.ones(count)])
-    W = np.zeros((count, 4, 3, 4))
+    affine = np.column_stack([directions, np.ones(count), products(directions)])[:, :columns]
+    W = np.zeros((count, 4, 3, columns))
     for i in range(3):
         W[:, i, i] = affine
     W[:, 3] = directions[:, :, None] * affine[:, None, :]
-    return W.reshape(count, 4, 12)
+    return W.reshape(count, 4, 3 * columns)
 
 
 def force_variance(covariance: FloatArray, directions: FloatArray) -> FloatArray:
     """Variances of `QUANTITIES`, shape (..., directions, 4), of covariances of D (..., 12, 12).
 
+    Or (..., 30, 30), with quadratic terms.
+
     The quadratic forms of `weights` as products of matrices; those of a component use its own
     block alone.
     """
+    if covariance.shape[-1] != 12:
+        W = weights(directions, covariance.shape[-1] // 3)
+        variance: FloatArray = np.sum((W @ covariance[..., None, :, :]) * W, axis=-1)
+        return variance
     lead = covariance.shape[:-2]
     affine = np.column_stack([directions, np.ones(len(directions))])
     pairs = (affine[:, :, None] * affine[:, None, :]).reshape(-1, 16).T

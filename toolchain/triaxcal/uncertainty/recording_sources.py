@@ -10,12 +10,14 @@ from triaxcal.fit.family.result import RecordingFit
 from triaxcal.uncertainty.propagation import ROWS, Curves, mapped
 from triaxcal.uncertainty.rig_sources import gravity_by, thermometer, thermometer_drift
 from triaxcal.uncertainty.source import STUDENT, Source, direct
+from triaxcal.uncertainty.terms_sources import rate_source, with_quadratic
 
 
 def recording_sources(p: Curves, recording: RecordingFit) -> list[Source]:
     """All sources but the device's own."""
     return [
         _poses(p, recording),
+        *rate_source(p, recording),
         _gravity(p),
         thermometer(p),
         thermometer_drift(p),
@@ -46,7 +48,7 @@ def _poses(p: Curves, recording: RecordingFit) -> Source:
         origin="|a| - g at the poses, per degree of freedom",
         advice="record more poses, in orientations that are not alike",
         constants=constants,
-        force=mapped(-p.inverse, constants),
+        force=with_quadratic(p, recording, mapped(-p.inverse, constants)),
     )
 
 

@@ -35,7 +35,7 @@ class Source:
         What would make it smaller.
     constants, force : array, shape (n, 12, 12), or None
         Covariance of [K U0] and of D (`uncertainty.propagation`) at the temperatures; None where
-        the source does not act.
+        the source does not act. `force` is (n, 30, 30) where D goes on with Q (3 x 6).
     """
 
     key: str

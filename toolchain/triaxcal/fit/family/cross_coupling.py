@@ -22,6 +22,7 @@ import numpy as np
 
 from triaxcal.errors import RefusedError
 from triaxcal.fit.family.pair_checks import doubtful_position, refuse_other_readings
+from triaxcal.fit.family.result import PairTerms
 from triaxcal.model.terms import PRODUCT_NAMES, Terms
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.pair import read_pair
@@ -30,6 +31,7 @@ from triaxcal.unitfile import UnitDescription
 NAMES = ("K0B", "K0A", "K1A", "K1B", "KipA", "KipB", "b0")
 UNITS = ("g", "g", "", "", "g/g^2", "g/g^2", "rad")
 CONDITION_MAX = 100.0
+SIGNIFICANT_SD = 2.0
 
 
 @dataclass(frozen=True)
@@ -178,8 +180,8 @@ def terms_of_pair(kip_a: float, kip_b: float, axes: tuple[int, int]) -> Terms:
     return Terms(quadratic_per_g=Q)
 
 
-def stated_terms(unit: UnitDescription, folder: Path) -> tuple[FloatArray, tuple[str, ...]]:
-    """Q (3, 6) of the pair that unit.toml names, 0 without one, and what is told of it.
+def stated_pair(unit: UnitDescription, folder: Path) -> PairTerms | None:
+    """Cross-coupling of the pair that unit.toml names, if it names one.
 
     Raises
     ------
@@ -187,15 +189,34 @@ def stated_terms(unit: UnitDescription, folder: Path) -> tuple[FloatArray, tuple
         When the pair's file cannot be read, or leaves a coefficient open.
     """
     if unit.pair is None:
-        return np.zeros((3, 6)), ()
+        return None
     path = folder / unit.pair.file
     fit = fit_pair(str(path), *read_pair(path), unit.gravity_g)
+    return pair_terms(unit.pair.file, fit, unit.pair.axes)
+
+
+def pair_terms(file: str, fit: PairFit, axes: tuple[int, int]) -> PairTerms:
+    """The coefficients of a fit as quadratic terms, with what is told of them."""
     kip_a, kip_b = (float(v) for v in fit.values[4:6])
-    Q = terms_of_pair(kip_a, kip_b, unit.pair.axes).quadratic_per_g
+    Q = terms_of_pair(kip_a, kip_b, axes).quadratic_per_g
     assert Q is not None
-    first, second = ("xyz"[k] for k in unit.pair.axes)
+    # Q is linear in the two coefficients.
+    slopes = [terms_of_pair(*one, axes).quadratic_per_g for one in ((1, 0), (0, 1))]
+    J = np.stack([np.zeros(18) if s is None else s.ravel() for s in slopes], axis=1)
+    first, second = ("xyz"[k] for k in axes)
     told = (
-        f"cross-coupling of {unit.pair.file} is taken off: KipA {kip_a:.3g} (sd {fit.sd[4]:.1g}), "
+        f"cross-coupling of {file} is taken off: KipA {kip_a:.3g} (sd {fit.sd[4]:.1g}), "
         f"KipB {kip_b:.3g} (sd {fit.sd[5]:.1g}) g/g^2, A along {first} and B along {second}"
     )
-    return Q, (told,)
+    covariance = (J @ fit.covariance[4:6, 4:6] @ J.T).astype(np.float64)
+    findings = (told, *_insignificant(file, fit))
+    return PairTerms(Q, covariance, len(fit.residual_g2) - len(NAMES), findings)
+
+
+def _insignificant(file: str, fit: PairFit) -> list[str]:
+    """Tells coefficients that the pair does not tell from zero."""
+    found = [NAMES[k] for k in (4, 5) if abs(fit.values[k]) < SIGNIFICANT_SD * fit.sd[k]]
+    if len(found) == 2:
+        advice = "leave [quadratic] cross_coupling out, or measure the pair longer"
+        return [f"cross-coupling of {file} is not significant (both below 2 sd): {advice}"]
+    return [f"{name} of {file} is not significant (below 2 sd)" for name in found]

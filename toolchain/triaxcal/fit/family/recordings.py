@@ -20,7 +20,7 @@ from triaxcal.fit.family.checks import (
 from triaxcal.fit.family.frame import CASE, case_rotation, turned_constants, turned_quadratic
 from triaxcal.fit.family.outliers import worst_outlier
 from triaxcal.fit.family.rate import half_cycle_turns, pose_rates
-from triaxcal.fit.family.result import RecordingFit
+from triaxcal.fit.family.result import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
 from triaxcal.fit.family.scalar import MODELS, NINE, ScalarData, ScalarModel, scalar_data
 from triaxcal.fit.family.temperatures import (
     no_temperature,
@@ -243,7 +243,7 @@ class _Made:
         """The calibration, in the frame of the layout."""
         fit = self.best.fit
         constants, slopes = fit.constants(), fit.constants_jacobian()
-        quadratic = fit.quadratic
+        quadratic, patterns = fit.quadratic, fit.model.quadratic
         findings = list(self.findings)
         if self.layout.frame == CASE:
             force = force_from_voltage(fit.data.basis @ constants.T, self.poses.readings)
@@ -251,10 +251,18 @@ class _Made:
             findings.append(told)
             constants = turned_constants(constants, rotation)
             quadratic = turned_quadratic(quadratic, rotation)
+            patterns = np.array([turned_quadratic(pattern, rotation) for pattern in patterns])
             turned = [turned_constants(slopes[..., k], rotation) for k in range(slopes.shape[-1])]
             slopes = np.stack(turned, axis=-1)
         rate = self._rate_term(constants) if self.best.trial.rate else None
+        known = NO_TERMS_COVARIANCE
+        if len(patterns):
+            count, pattern = len(patterns), patterns.reshape(-1, 18)
+            mixed = fit.covariance[:, -count:] @ pattern
+            own = pattern.T @ fit.covariance[-count:, -count:] @ pattern
+            known = TermsCovariance(own, slopes @ mixed)
         if rate is not None:
+            known = TermsCovariance(rate_g2=self._rate_covariance(constants, slopes))
             findings.append(rate_in_words(rate))
             constants, slopes = constants[:, :-1], slopes[:, :-1]
         covariance = np.einsum("apk,kl,bql->apbq", slopes, fit.covariance, slopes)
@@ -262,7 +270,7 @@ class _Made:
             covariance = np.full_like(covariance, np.nan)
             findings.insert(0, _UNCHECKED.format(count=len(fit.theta)))
         terms = Terms(quadratic if quadratic.any() else None, rate)
-        return self._calibration(constants, terms, covariance, findings)
+        return self._calibration(constants, terms, covariance, known, findings)
 
     def _rate_term(self, constants: FloatArray) -> RateTerm:
         """The biases' last function, reading units at the largest rate, as an offset of a at T0."""
@@ -275,11 +283,19 @@ class _Made:
         low, high = 1.01 * min(float(rates.min()), 0.0), 1.01 * max(float(rates.max()), 0.0)
         return RateTerm(offset, (low, high))
 
+    def _rate_covariance(self, constants: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Covariance (3, 3) of the offset at the largest rate and T0, g^2."""
+        at_t0 = constants[:9, :-1] @ self.best.trial.shape.basis(self.unit.t0_degc)
+        offset = np.linalg.solve(at_t0.reshape(3, 3), slopes[9:, -1])
+        result: FloatArray = offset @ self.best.fit.covariance @ offset.T
+        return result
+
     def _calibration(
         self,
         constants: FloatArray,
         terms: Terms,
         covariance: FloatArray,
+        known: TermsCovariance,
         findings: list[str],
     ) -> Calibration:
         fit, t0, shape = self.best.fit, self.unit.t0_degc, self.best.trial.shape
@@ -299,6 +315,7 @@ class _Made:
             weakest=fit.unseen(),
             residual_g=fit.residual_g,
             findings=tuple(findings),
+            terms=known,
         )
         return Calibration(
             serial=self.unit.serial,

@@ -9,6 +9,50 @@ from triaxcal.recording.poses import PoseSet
 
 
 @dataclass(frozen=True)
+class PairTerms:
+    """Cross-coupling that a pair on a dividing head has shown, and how well.
+
+    Attributes
+    ----------
+    quadratic : array, shape (3, 6)
+        Q in g/g^2.
+    covariance : array, shape (18, 18)
+        Of Q row by row.
+    dof : int
+        Degrees of freedom of the pair's residuals.
+    findings : tuple of str
+        What the user should know of it.
+    """
+
+    quadratic: FloatArray
+    covariance: FloatArray
+    dof: int
+    findings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class TermsCovariance:
+    """How well the poses determine the terms beyond the twelve constants.
+
+    Attributes
+    ----------
+    quadratic : array, shape (18, 18), or None
+        Of Q row by row, g/g^2; None without quadratic terms.
+    cross : array, shape (12, P, 18), or None
+        Of the constants' parameters with Q.
+    rate_g2 : array, shape (3, 3), or None
+        Of the offset at the largest dT/dt; None without a term in it.
+    """
+
+    quadratic: FloatArray | None = None
+    cross: FloatArray | None = None
+    rate_g2: FloatArray | None = None
+
+
+NO_TERMS_COVARIANCE = TermsCovariance()
+
+
+@dataclass(frozen=True)
 class RecordingFit:
     """The poses behind a calibration, and how well they determine it.
 
@@ -37,6 +81,7 @@ class RecordingFit:
         |a| - g at each pose.
     findings : tuple of str
         What the user should know, the worst first.
+    terms : TermsCovariance
     """
 
     poses: PoseSet
@@ -51,6 +96,7 @@ class RecordingFit:
     weakest: str
     residual_g: FloatArray
     findings: tuple[str, ...]
+    terms: TermsCovariance = NO_TERMS_COVARIANCE
 
     @property
     def checked(self) -> bool:

@@ -10,12 +10,11 @@ import numpy as np
 from triaxcal.errors import RefusedError
 from triaxcal.fit.acceptance import refuse_unacceptable
 from triaxcal.fit.calibrate import Calibration, calibrate
-from triaxcal.fit.family.cross_coupling import stated_terms
+from triaxcal.fit.family.cross_coupling import stated_pair
 from triaxcal.fit.family.faces import face_measurements
 from triaxcal.fit.family.recordings import calibrate_poses
 from triaxcal.fit.family.tables import calibrate_table
 from triaxcal.fit.family.temperatures import no_temperature
-from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.recording.samples import Samples, read_samples
 from triaxcal.recordinglayout import RecordingLayout
 from triaxcal.records import MeasurementSet
@@ -35,19 +34,19 @@ def calibrate_recording(
     RefusedError
         When the recording cannot be read, or its poses do not carry a calibration.
     """
-    known, told = stated_terms(unit, folder)
+    pair = stated_pair(unit, folder)
+    known = np.zeros((3, 6)) if pair is None else pair.quadratic
     samples = read_samples(folder, layout, unit.temperature_sensor)
     unit = replace(unit, adc=_wide_enough(unit, layout, samples))
     if layout.faces:
         measurements = face_measurements(unit, layout, samples)
-        found = calibrate(unit, measurements)
+        found = calibrate(unit, measurements, pair)
         refuse_unacceptable(unit, found, measurements)
         unseen = [no_temperature(unit)] if samples.temp_degc is None else []
         calibration = replace(
             found,
             reading_unit=layout.acceleration_unit,
-            notes=(*samples.findings, *found.notes, *unseen, *told),
-            terms=Terms(known) if known.any() else NO_TERMS,
+            notes=(*samples.findings, *found.notes, *unseen),
         )
         return unit, measurements, calibration
     if layout.angles is not None:
@@ -57,8 +56,9 @@ def calibrate_recording(
     _refuse_beyond_limits(unit, calibration)
     recording = calibration.recording
     assert recording is not None
+    told = () if pair is None else pair.findings
     recording = replace(recording, findings=(*recording.findings, *told))
-    return unit, measurements, replace(calibration, recording=recording)
+    return unit, measurements, replace(calibration, recording=recording, pair=pair)
 
 
 def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Samples) -> Adc:

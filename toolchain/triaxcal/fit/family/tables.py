@@ -11,13 +11,13 @@ from triaxcal.errors import RefusedError
 from triaxcal.fit.calibrate import Calibration, CalibrationPoint
 from triaxcal.fit.family.checks import CONDITION_MAX, refuse_wrong_unit
 from triaxcal.fit.family.harmonics import table_findings
-from triaxcal.fit.family.oriented import table_error_g
+from triaxcal.fit.family.oriented import TRACELESS, table_error_g
 from triaxcal.fit.family.recordings import (
     BEYOND_1_G,
     covariance_blocks,
     pose_dwells,
 )
-from triaxcal.fit.family.result import RecordingFit
+from triaxcal.fit.family.result import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
 from triaxcal.fit.family.table_checks import (
     known_force,
     outlier_findings,
@@ -40,7 +40,7 @@ from triaxcal.fit.family.temperatures import no_temperature, recording_range, th
 from triaxcal.fit.family.trials import beats
 from triaxcal.fit.thermal import polynomial_shape
 from triaxcal.model.orientation import angle_slopes, angles_from_force, gravity_direction
-from triaxcal.model.terms import NO_TERMS, Terms
+from triaxcal.model.terms import NO_TERMS, Terms, products
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.poses import PoseSet, find_poses
 from triaxcal.recording.samples import Samples
@@ -188,7 +188,7 @@ def _calibration(
 ) -> Calibration:
     shape, temps = best.fit.shape, known.temps_degc
     thermal = shape.model(best.fit.constants)
-    covariance = _covariance(best, known)
+    covariance, terms = _covariance(best, known)
     errors = np.linalg.norm(best.own_g + known.force, axis=1) - unit.gravity_g
     dof = 3 * len(temps) - best.trial.parameters
     lengths = _left_out_lengths(best, known, unit.gravity_g)
@@ -205,6 +205,7 @@ def _calibration(
         weakest="",
         residual_g=errors,
         findings=tuple(findings),
+        terms=terms,
     )
     basis = shape.basis(unit.t0_degc)
     point = CalibrationPoint(
@@ -240,10 +241,17 @@ def _left_out_lengths(best: TableRow, known: TablePoses, gravity_g: float) -> fl
     return float(np.sqrt(np.mean((np.linalg.norm(force, axis=1) - gravity_g) ** 2)))
 
 
-def _covariance(best: TableRow, known: TablePoses) -> FloatArray:
-    """Covariance (12, P, 12, P) of the constants: least squares of (28), outputs independent."""
+def _covariance(best: TableRow, known: TablePoses) -> tuple[FloatArray, TermsCovariance]:
+    """Covariance (12, P, 12, P) of the constants, and that of Q where it is fitted.
+
+    Least squares of (28), with the products of (29) beside it; outputs independent.
+    """
     shape, gains = best.fit.shape, best.trial.gains
-    design = thermal_design(shape, gains, known)
+    linear = thermal_design(shape, gains, known)
+    fitted = best.trial.parameters > 3 * linear.shape[1]
+    design = linear
+    if fitted:
+        design = np.concatenate([linear, products(known.target) @ TRACELESS.T], axis=1)
     inverse = np.linalg.inv(design.T @ design)
     constants = shape.basis(known.temps_degc) @ best.fit.constants.T
     K = constants[:, :9].reshape(-1, 3, 3)
@@ -257,5 +265,18 @@ def _covariance(best: TableRow, known: TablePoses) -> FloatArray:
         index += [(9 + i, p) for p in range(count)]
         of_constant, of_function = (np.array(part) for part in zip(*index, strict=True))
         rows = of_constant[:, None], of_function[:, None]
-        full[*rows, of_constant[None], of_function[None]] = variance[i] * inverse
-    return full
+        own = inverse[: len(index), : len(index)]
+        full[*rows, of_constant[None], of_function[None]] = variance[i] * own
+    if not fitted:
+        return full, NO_TERMS_COVARIANCE
+    # (29) has its products in the outputs: Q = -K^-1 D2, at one temperature.
+    to_force = -np.linalg.inv(K[0])
+    at = linear.shape[1]
+    D2 = TRACELESS.T @ inverse[at:, at:] @ TRACELESS
+    own_q = np.einsum("io,jo,o,kl->ikjl", to_force, to_force, variance, D2).reshape(18, 18)
+    cross = np.zeros((12, count, 3, 6))
+    for o in range(3):
+        mixed = variance[o] * inverse[:at, at:] @ TRACELESS
+        rows_of_output = [3 * o, 3 * o + 1, 3 * o + 2, 9 + o]
+        cross[rows_of_output, 0] = mixed[:, None, :] * to_force[:, o][None, :, None]
+    return full, TermsCovariance(own_q, cross.reshape(12, count, 18))

@@ -1,0 +1,82 @@
+"""Sources of the terms beyond the twelve constants: quadratic terms and dT/dt.
+
+With them the error of the force is D [a; 1; p(a)], D = [-N dK, -N dU0, dQ] (3 x 10), row by row.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from triaxcal.fit.family.result import RecordingFit
+from triaxcal.model.types import FloatArray
+from triaxcal.uncertainty.propagation import ROWS, Curves
+from triaxcal.uncertainty.source import STUDENT, Source, direct
+
+_LINEAR = tuple(10 * i + k for i in range(3) for k in range(4))
+_QUADRATIC = tuple(10 * i + 4 + k for i in range(3) for k in range(6))
+
+
+def pair_source(p: Curves) -> list[Source]:
+    """Cross-coupling of a pair: the scatter of its readings on the dividing head."""
+    pair = p.calibration.pair
+    if pair is None:
+        return []
+    force = np.zeros((len(p.temps_degc), 30, 30))
+    force[:, np.array(_QUADRATIC)[:, None], _QUADRATIC] = pair.covariance
+    return [
+        Source(
+            key="quadratic_terms",
+            name="the pair's cross-coupling",
+            sd=math.sqrt(float(np.diag(pair.covariance).max())),
+            unit="g/g^2",
+            distribution=STUDENT,
+            dof=float(pair.dof),
+            origin="scatter of the pair's readings on the dividing head",
+            advice="measure the pair in more positions, or leave [quadratic] cross_coupling out",
+            constants=None,
+            force=force,
+        )
+    ]
+
+
+def rate_source(p: Curves, recording: RecordingFit) -> list[Source]:
+    """The term in dT/dt, at the largest dT/dt that it was fitted in."""
+    covariance = recording.terms.rate_g2
+    if covariance is None or not recording.checked:
+        return []
+    values, vectors = np.linalg.eigh(covariance)
+    factor = vectors * np.sqrt(np.maximum(values, 0.0))
+    return [
+        Source(
+            key="rate",
+            name="the term in dT/dt",
+            sd=math.sqrt(float(np.diag(covariance).max())),
+            unit="g",
+            distribution=STUDENT,
+            dof=float(recording.dof),
+            origin="scatter of the poses, at the largest dT/dt of the recording",
+            advice="record more poses while the temperature changes",
+            constants=None,
+            force=direct(p, np.broadcast_to(factor, (len(p.temps_degc), 3, 3))),
+        )
+    ]
+
+
+def with_quadratic(p: Curves, recording: RecordingFit, force: FloatArray) -> FloatArray:
+    """Covariance of D, (n, 12, 12), with Q of the same fit: (n, 30, 30) where there is one."""
+    own, cross = recording.terms.quadratic, recording.terms.cross
+    if own is None or cross is None:
+        return force
+    basis = p.calibration.shape.basis(p.temps_degc)
+    order = np.argsort(ROWS)
+    of_constants = np.einsum("apq,np->naq", cross, basis)[:, order]
+    linear, quadratic = np.array(_LINEAR), np.array(_QUADRATIC)
+    result = np.zeros((len(p.temps_degc), 30, 30))
+    mixed = p.force_factor(of_constants)
+    result[:, linear[:, None], linear] = force
+    result[:, linear[:, None], quadratic] = mixed
+    result[:, quadratic[:, None], linear] = np.swapaxes(mixed, 1, 2)
+    result[:, quadratic[:, None], quadratic] = own
+    return result
