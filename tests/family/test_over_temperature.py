@@ -11,6 +11,7 @@ from test_recordings import calibrated, symmetric_part
 
 from triaxcal.delivery import deliver
 from triaxcal.errors import RefusedError
+from triaxcal.fit.family.temperatures import temperature_groups
 from triaxcal.model.types import FloatArray
 
 WITH_T = COLUMNS + '\ntemperature = "T"'
@@ -88,3 +89,26 @@ def test_a_range_beyond_the_poses_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(RefusedError, match="record poses further out: nothing is extrapolated"):
         calibrated(folder)
+
+
+def test_a_steady_ramp_has_temperatures() -> None:
+    """Each pose is 1 degC from the next: a temperature is what lies within 2 degC of its lowest."""
+    ramp = np.arange(10.0)
+    assert temperature_groups(ramp) == [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9]]
+    assert temperature_groups(np.array([20.3, 40.0, 19.9, 20.0])) == [[2, 3, 0], [1]]
+
+
+def test_a_bias_on_a_slow_ramp_is_seen(tmp_path: Path) -> None:
+    """1 K a pose, up, down and up: 5 mg of bias are taken for temperature, not for noise."""
+    random = np.random.default_rng(3)
+    minutes = np.arange(72.0)
+    temps = 0.4 + np.minimum(minutes % 48.0, 48.0 - minutes % 48.0)
+    bias = U0 + 0.05 * temps[:, None] / 25.0 * [1.0, -1.0, 1.0]
+    readings = directions(72, seed=3) @ K.T + bias + 2e-3 * random.standard_normal((72, 3))
+    recording = COLUMNS.replace('time = "t"', 'rows = "poses"\ntemperature = "T"')
+    rows = np.column_stack([minutes, readings, temps])
+    calibration = calibrated(write_unit(tmp_path / "U", rows, recording, header="t,ax,ay,az,T"))
+    assert calibration.shape.order >= 1
+    assert calibration.recording is not None
+    # Readings of 0.2 mg; the bias alone is 3 mg rms.
+    assert (calibration.recording.left_out_length_g or 1.0) < 0.4e-3

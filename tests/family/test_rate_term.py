@@ -31,6 +31,31 @@ def cycle(per_rate: FloatArray) -> FloatArray:
     return np.column_stack([rows, temp])[:: round(RATE_HZ / 10)]
 
 
+def slow_ramp() -> FloatArray:
+    """Up and down by 10 degC twice, at 1 K/min with a pose a minute; the bias sees T and dT/dt."""
+    rows = log(directions(40, seed=4), 59.0, sd=0.01, seed=4)[:: round(RATE_HZ / 10)]
+    phase = rows[:, 0] / 60.0 % 20.0
+    temp = np.minimum(phase, 20.0 - phase)
+    rate = np.where(phase < 10.0, 1.0, -1.0) / 60.0
+    rows[:, 1:] += 5e-3 * temp[:, None] + rate[:, None] * (30.0 * PER_RATE)
+    return np.column_stack([rows, temp])
+
+
+def test_a_slow_ramp_is_fitted_over_temperature_with_its_rate(tmp_path: Path) -> None:
+    """Poses 1 degC apart are at many temperatures, not at one."""
+    more = '[thermal]\nmodel = "polynomial"\norder = 1\nt0_degc = 5\n'
+    folder = write_unit(tmp_path / "U", slow_ramp(), WITH_T, header="t,ax,ay,az,T", more=more)
+    calibration = calibrated(folder)
+    assert {c.order for c in calibration.candidates} == {1}
+    assert "4 half-cycles left out in turn" in calibration.selection_reason
+    rate = calibration.terms.rate
+    assert rate is not None
+    expected = -np.linalg.solve(symmetric_part(K), 30.0 * PER_RATE)
+    # Poses at the turns have half a rate in their window, two of forty; 590 samples of 0.01 m/s^2
+    # are 0.04 mg a pose: 0.04 / (1/60) / sqrt(40 / 3) g for 1 K/s, three times.
+    assert np.abs(rate.offset_g_s_per_k - expected).max() < 0.05 * np.abs(expected).max() + 2e-3
+
+
 def unit_with(folder: Path, per_rate: FloatArray) -> Path:
     return write_unit(folder, cycle(per_rate), WITH_T, header="t,ax,ay,az,T")
 

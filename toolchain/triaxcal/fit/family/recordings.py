@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -40,7 +39,6 @@ from triaxcal.fit.family.trials import (
     unscored,
     without_idle_rates,
 )
-from triaxcal.fit.grouping import GROUP_GAP_DEGC
 from triaxcal.fit.thermal import polynomial_shape
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import RateTerm, Terms
@@ -142,15 +140,11 @@ def _groups(data: ScalarData, temps: FloatArray) -> tuple[list[list[int]], list[
 
 def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
     """Poses alike in orientation and temperature: they say one thing, and count as one."""
-    cells = []
-    for group in orientations:
-        ordered = sorted(group, key=lambda k: temps[k])
-        cells.append([ordered[0]])
-        for before, k in pairwise(ordered):
-            if temps[k] - temps[before] > GROUP_GAP_DEGC:
-                cells.append([])
-            cells[-1].append(k)
-    return cells
+    return [
+        [group[k] for k in cell]
+        for group in orientations
+        for cell in temperature_groups(temps[group])
+    ]
 
 
 def _trials(
