@@ -111,3 +111,33 @@ def test_a_plain_cycle_is_no_worse(tmp_path: Path, count: int) -> None:
     found = calibrated(folder).thermal.constants_at(20.0)[9:]
     # Twenty poses of 0.12 mg over temperature: a few times that.
     assert np.abs(found - U0).max() < 1e-2
+
+
+@pytest.mark.parametrize("dither", [0.0, 0.1])
+def test_plateaus_have_no_rate(tmp_path: Path, dither: float) -> None:
+    """Constant, or between two codes: no slope that the thermometer could show."""
+    parts, start = [], 0.0
+    for n, temp in enumerate((0.0, 20.0, 40.0, 20.0, 0.0, 20.0, 40.0)):
+        rows = log(directions(10, seed=n), seed=n)
+        rows[:, 0] += start
+        start = rows[-1, 0] + 600.0
+        codes = dither * np.random.default_rng(n).integers(0, 2, len(rows))
+        parts.append(np.column_stack([rows, temp + codes]))
+    folder = write_unit(tmp_path / "U", np.concatenate(parts), WITH_T, header="t,ax,ay,az,T")
+    calibration = calibrated(folder)
+    assert "3 half-cycles left out in turn" in calibration.selection_reason
+    assert not any("dT/dt" in c.label for c in calibration.candidates)
+
+
+def test_nothing_judges_a_rate_where_no_orientation_can_be_spared(tmp_path: Path) -> None:
+    """Nine orientations for nine constants: single poses are left out, and no half-cycles."""
+    rows = log(np.tile(directions(9, seed=4), (5, 1)), HOLD_S, sd=0.01, seed=4)
+    half_s = rows[-1, 0] / HALVES
+    phase = np.pi * rows[:, 0] / half_s
+    rows[:, 1:] += 4.0 * np.pi / half_s * np.sin(phase)[:, None] * PER_RATE
+    rows = np.column_stack([rows, 20.0 - 4.0 * np.cos(phase)])[:: round(RATE_HZ / 10)]
+    calibration = calibrated(write_unit(tmp_path / "U", rows, WITH_T, header="t,ax,ay,az,T"))
+    assert "single poses, alike ones staying in" in calibration.selection_reason
+    assert "half-cycles" not in calibration.selection_reason
+    assert not any("dT/dt" in c.label for c in calibration.candidates)
+    assert calibration.terms.rate is None
