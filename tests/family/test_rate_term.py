@@ -134,8 +134,8 @@ def test_nothing_judges_a_rate_where_no_orientation_can_be_spared(tmp_path: Path
     rows = log(np.tile(directions(9, seed=4), (5, 1)), HOLD_S, sd=0.01, seed=4)
     half_s = rows[-1, 0] / HALVES
     phase = np.pi * rows[:, 0] / half_s
-    rows[:, 1:] += 4.0 * np.pi / half_s * np.sin(phase)[:, None] * PER_RATE
-    rows = np.column_stack([rows, 20.0 - 4.0 * np.cos(phase)])[:: round(RATE_HZ / 10)]
+    rows[:, 1:] += 5.0 * np.pi / half_s * np.sin(phase)[:, None] * PER_RATE
+    rows = np.column_stack([rows, 20.0 - 5.0 * np.cos(phase)])[:: round(RATE_HZ / 10)]
     calibration = calibrated(write_unit(tmp_path / "U", rows, WITH_T, header="t,ax,ay,az,T"))
     assert "single poses, alike ones staying in" in calibration.selection_reason
     assert "half-cycles" not in calibration.selection_reason
