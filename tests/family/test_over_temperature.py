@@ -164,3 +164,25 @@ def test_what_is_told_as_left_out_are_orientations_and_not_temperatures(tmp_path
     # Both solve to rounding; nine digits are written, 1e-8 m/s^2 of 8 mg.
     assert recording.left_out_length_g == pytest.approx(expected, rel=1e-6)
     assert recording.held_out_g != pytest.approx(expected, rel=1e-3)
+
+
+def test_the_order_of_averaged_rows_says_nothing(tmp_path: Path) -> None:
+    """Back to 20 degC at the end, as on every bench, or sorted: the same rows, the same model."""
+    random = np.random.default_rng(4)
+    temps = np.repeat([20.0, 60.0, -20.0, 20.0], 14)
+    d = temps[:, None] - 20.0
+    poses = np.concatenate([directions(14, seed=n) for n in range(4)])
+    readings = poses @ K.T + U0 + SLOPE * d + SQUARE * d**2
+    readings += 1e-3 * random.standard_normal(readings.shape)
+    recording = COLUMNS.replace('time = "t"', 'rows = "poses"\ntemperature = "T"')
+    rows = np.column_stack([np.zeros(len(temps)), readings, temps])
+    header = "t,ax,ay,az,T"
+    chosen = []
+    for name, ordered in (
+        ("AS-MEASURED", rows),
+        ("SORTED", rows[np.argsort(temps, kind="stable")]),
+    ):
+        made = calibrated(write_unit(tmp_path / name, ordered, recording, header=header))
+        chosen.append(next(c.label for c in made.candidates if c.chosen))
+    assert chosen[0] == chosen[1]
+    assert "order 2" in chosen[0]
