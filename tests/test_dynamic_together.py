@@ -7,14 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynamic_cases import aviation, changed, sheet
-from dynamic_judge import judge
+from dynamic_cases import aviation, changed, held, sheet
+from dynamic_judge import data_sheet, judge
 from test_dynamic_judge import ALL, CENTRES, motion
 from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.channels import steady
 from triaxcal.dynamic.missing import missing_effects
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuRecording
+from triaxcal.dynamic.registry import extensions
+from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import AVIATION, EFFECTS, draw_truth
 from triaxcal.simulation.imu_motion import three_axes
 
@@ -59,6 +61,23 @@ def test_a_table_that_creeps_does_not_rest() -> None:
     angle[3] = np.linspace(0.0, 2.4 * arcsec, 30)  # its halves differ by 1.24"
     assert steady(angle, arcsec).tolist() == [True, True, False, False, False, True]
     assert steady(angle * 0.8, arcsec).all()
+
+
+def test_an_angle_within_a_circle_is_as_good_as_one_that_counts_on() -> None:
+    """0 and 360 deg are one place; their mean is not. A table that rests at 0 reads both."""
+    truth = draw_truth(AVIATION, 6, ("mount-elasticity",))
+    recording = held(simulate_imu(truth, motion(MINUTES, "mount-elasticity"), 50.0, 6))
+    angle = recording.all().table_angle_rad
+    assert angle is not None
+    circle = angle % (2 * np.pi)
+    assert (np.abs(np.diff(circle)) > 6).sum() > 100
+    blocks = extensions()["table-angles"].blocks + extensions()["mount-elasticity"].blocks
+    counted, wrapped = (
+        calibrate_dynamic(changed(recording, table_angle_rad=a), data_sheet(truth.noise), blocks)
+        for a in (angle, circle)
+    )
+    # Rounding of angles of some hundred radians: 1e-13; a thousandth of a deviation is 1e-9.
+    assert np.abs((wrapped.p - counted.p) / counted.sd).max() < 1e-3
 
 
 def shown(recording: ImuRecording, noise: DataSheet) -> dict[str, str]:

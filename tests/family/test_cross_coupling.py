@@ -100,3 +100,48 @@ def test_too_few_positions_and_half_a_turn_are_refused() -> None:
     near = THETA[0] + np.radians(np.arange(28.0))
     with pytest.raises(RefusedError, match=r"the angles, 5 to 32 deg, leave coefficients open"):
         fit_pair("pair.csv", near, a, b, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (
+            lambda a, b: (9.80665 * a, b),
+            (
+                "p, column a_g: the readings swing by 9.807 g over a turn (m/s^2?); expected about "
+                "1 g; give them in g"
+            ),
+        ),
+        (
+            lambda a, b: (b, a),
+            (
+                "p, column a_g: the readings swing as -cos(theta) turned by +90 deg; expected "
+                "-cos(theta), within 15 deg; look at the order of the columns, at their signs, and "
+                "at the head's zero: at theta = 0 A reads -1 g, at 90 deg B reads +1 g"
+            ),
+        ),
+        (
+            lambda a, b: (a, -b),
+            "p, column b_g: the readings swing as sin(theta) turned by -180 deg; expected",
+        ),
+        (
+            lambda a, b: (-a, -b),
+            "p, column a_g: the readings swing as -cos(theta) turned by -180 deg; expected",
+        ),
+    ],
+    ids=["m/s^2", "exchanged", "sign", "head's zero"],
+)
+def test_other_readings_are_refused(change, text: str) -> None:
+    a, b = change(*readings(1, 1e-7, 10.0))
+    with pytest.raises(RefusedError) as refusal:
+        fit_pair("p", THETA, a, b, 1.0)
+    assert str(refusal.value).startswith(text)
+
+
+def test_a_wrong_cell_is_named() -> None:
+    a, b = readings(1, 1e-7, 10.0)
+    assert fit_pair("p", THETA, a, b, 1.0).doubtful == ""
+    b[6] += 1e-4
+    found = fit_pair("p", THETA, a, b, 1.0).doubtful
+    # Z changes by b times the error; b is 0.99 at 83 deg.
+    assert found.startswith("position 7 is 9.9e-05 g^2 in Z from what the others say")

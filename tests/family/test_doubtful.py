@@ -14,6 +14,7 @@ from test_tables import AIR, HEADER, rows_of, table
 
 from triaxcal.errors import RefusedError
 from triaxcal.fit.family.outliers import worst_outlier
+from triaxcal.model.types import FloatArray
 from triaxcal.report.temperatures import with_room
 
 
@@ -77,6 +78,34 @@ def test_a_pose_whose_length_is_wrong_is_told(tmp_path: Path) -> None:
     assert size is not None
     assert float(size[1]) == pytest.approx(4.0, abs=0.6)
     assert "stands out" not in findings(write_unit(tmp_path / "V", log(directions(20))))
+
+
+ROWS = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "m/s^2"'
+ROBUST = '[fit]\nterms = "linear"\nloss = "cauchy"\n'
+
+
+def told_by_cauchy(folder: Path, poses: FloatArray, seed: int) -> str:
+    noise = 0.01 * np.random.default_rng(seed).standard_normal(poses.shape)
+    return findings(write_unit(folder, poses @ K.T + U0 + noise, ROWS, header="a,b,c", more=ROBUST))
+
+
+def test_sound_poses_are_not_told_by_a_robust_fit(tmp_path: Path) -> None:
+    """A loss that gives up a pose makes the others fit by themselves: that proves nothing of it."""
+    for seed in (5, 9, 10, 13):
+        assert "stands out" not in told_by_cauchy(tmp_path / f"{seed}", directions(14, seed), seed)
+
+
+def test_a_robust_loss_is_not_advised_where_it_is_set(tmp_path: Path) -> None:
+    poses = directions(20)
+    poses[8] *= 1.02
+    told = told_by_cauchy(tmp_path / "U", poses, 1)
+    size = re.search(
+        r"pose 9 \(line 10\) stands out: \|a\| is \+([\d.]+) mg off .* look at it, or take", told
+    )
+    assert size is not None
+    # 20 mg, by a pose that the rest determine to 1 mg, each being good to 1 mg.
+    assert float(size[1]) == pytest.approx(20.0, abs=5.0)
+    assert "huber" not in told
 
 
 LABELS = ("top", "front", "bottom", "back", "left", "right")

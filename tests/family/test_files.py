@@ -30,18 +30,47 @@ def refusal(folder: Path) -> str:
 # ---- encodings and binary files ----
 
 
-@pytest.mark.parametrize("codec", ["utf-16", "utf-16-le", "utf-16-be"])
-def test_utf_16_is_read(tmp_path: Path, codec: str) -> None:
+@pytest.mark.parametrize("codec", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_wide_text_is_read(tmp_path: Path, codec: str) -> None:
     plain = calibrated(write_unit(tmp_path / "A", TEXT))
     folder = write_unit(tmp_path / "B", TEXT)
     (folder / "log.csv").write_bytes(TEXT.encode(codec))
     assert np.array_equal(found(plain)[0], found(calibrated(folder))[0])
 
 
-def test_utf_16_that_breaks_off_is_called_so(tmp_path: Path) -> None:
+@pytest.mark.parametrize("codec", ["utf-16", "utf-32"])
+def test_wide_text_that_breaks_off_is_called_so(tmp_path: Path, codec: str) -> None:
     folder = write_unit(tmp_path / "U", TEXT)
-    (folder / "log.csv").write_bytes(TEXT.encode("utf-16")[:-1])
-    assert "begins as UTF-16 text, but byte" in refusal(folder)
+    (folder / "log.csv").write_bytes(TEXT.encode(codec)[:-1])
+    assert f"begins as {codec.upper()} text, but byte" in refusal(folder)
+
+
+def test_utf_32_of_the_other_order_is_read(tmp_path: Path) -> None:
+    folder = write_unit(tmp_path / "U", TEXT)
+    (folder / "log.csv").write_bytes(b"\0\0\xfe\xff" + TEXT.encode("utf-32-be"))
+    assert calibrated(folder).recording is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (f'{TEXT}"{"x" * 140_000}"\n', len(TEXT.splitlines()) + 1),
+        ('{"rows": 3,"data": "' + "x" * 140_000 + '"}\n', 1),
+    ],
+    ids=["quoted", "json"],
+)
+def test_a_cell_without_end_is_refused_by_its_line(tmp_path: Path, text: str, line: int) -> None:
+    told = refusal(write_unit(tmp_path / "U", text))
+    assert f"log.csv, line {line}: a cell of more than 131072 characters, in a line of 1" in told
+    assert told.endswith(
+        "expected rows of numbers; export the recording as CSV, or remove the line"
+    )
+
+
+@pytest.mark.parametrize("columns", [COLUMNS, COLUMNS.replace('"ax", "ay", "az"', "2, 3, 4")])
+def test_a_header_alone_is_called_one(tmp_path: Path, columns: str) -> None:
+    told = refusal(write_unit(tmp_path / "U", "t,ax,ay,az\n", columns))
+    assert told.endswith("log.csv: a header but no rows; expected rows of numbers")
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from family_cases import COLUMNS, U0, K, directions, log, write_unit
+from scipy.optimize import least_squares
 from test_recordings import calibrated, symmetric_part
 
 from triaxcal.delivery import deliver
 from triaxcal.errors import RefusedError
+from triaxcal.fit.family.temperatures import temperature_groups
 from triaxcal.model.types import FloatArray
 
 WITH_T = COLUMNS + '\ntemperature = "T"'
@@ -88,3 +90,77 @@ def test_a_range_beyond_the_poses_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(RefusedError, match="record poses further out: nothing is extrapolated"):
         calibrated(folder)
+
+
+def test_a_steady_ramp_has_temperatures() -> None:
+    """Each pose is 1 degC from the next: a temperature is what lies within 2 degC of its lowest."""
+    ramp = np.arange(10.0)
+    assert temperature_groups(ramp) == [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9]]
+    assert temperature_groups(np.array([20.3, 40.0, 19.9, 20.0])) == [[2, 3, 0], [1]]
+
+
+def test_a_bias_on_a_slow_ramp_is_seen(tmp_path: Path) -> None:
+    """1 K a pose, up, down and up: 5 mg of bias are taken for temperature, not for noise."""
+    random = np.random.default_rng(3)
+    minutes = np.arange(72.0)
+    temps = 0.4 + np.minimum(minutes % 48.0, 48.0 - minutes % 48.0)
+    bias = U0 + 0.05 * temps[:, None] / 25.0 * [1.0, -1.0, 1.0]
+    readings = directions(72, seed=3) @ K.T + bias + 2e-3 * random.standard_normal((72, 3))
+    recording = COLUMNS.replace('time = "t"', 'rows = "poses"\ntemperature = "T"')
+    rows = np.column_stack([minutes, readings, temps])
+    calibration = calibrated(write_unit(tmp_path / "U", rows, recording, header="t,ax,ay,az,T"))
+    assert calibration.shape.order >= 1
+    assert calibration.recording is not None
+    # Readings of 0.2 mg; the bias alone is 3 mg rms.
+    assert (calibration.recording.left_out_length_g or 1.0) < 0.4e-3
+
+
+def slow_left_out(
+    readings: FloatArray, temps: FloatArray, groups: FloatArray, gains: int
+) -> FloatArray:
+    """|a| - g of each group left out in turn, by plain least squares; `gains` terms in K."""
+    d = (temps - 20.0) / 40.0
+
+    def residual(theta: FloatArray, rows: FloatArray) -> FloatArray:
+        powers = np.stack([np.ones(rows.sum()), d[rows]], axis=1)
+        six = powers[:, :gains] @ theta[: 6 * gains].reshape(gains, 6)
+        matrix = six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+        off = readings[rows] - powers @ theta[6 * gains :].reshape(2, 3)
+        force = np.linalg.solve(matrix, off[:, :, None])[:, :, 0]
+        result: FloatArray = np.linalg.norm(force, axis=1) - 1.0
+        return result
+
+    start = np.zeros(6 * gains + 6)
+    start[:3] = 9.8
+    errors = []
+    for group in np.unique(groups):
+        out = groups == group
+        fit = least_squares(residual, start, args=(~out,), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        errors.append(residual(fit.x, out))
+    return np.concatenate(errors)
+
+
+def test_what_is_told_as_left_out_are_orientations_and_not_temperatures(tmp_path: Path) -> None:
+    poses, temps = directions(12, seed=2), np.repeat(TEMPS, 12)
+    d = temps[:, None] - 20.0
+    noise = 5e-3 * np.random.default_rng(2).standard_normal((60, 3))
+    # A square that the order of 1 misses: at the temperatures left out by more.
+    readings = np.tile(poses, (5, 1)) @ K.T + U0 + 1e-4 * d**2 * [1.0, -1.0, 1.0] + noise
+    more = '[thermal]\nmodel = "polynomial"\norder = 1\n'
+    folder = write_unit(
+        tmp_path / "U",
+        np.column_stack([readings, temps]),
+        COLUMNS.replace('time = "t"', 'rows = "poses"\ntemperature = "T"'),
+        header="ax,ay,az,T",
+        more=more + "[limits]\nat_t0_g = 0.1\nover_range_g = 0.1\n",
+    )
+    calibration = calibrated(folder)
+    assert "12 orientations and 3 temperatures left out" in calibration.selection_reason
+    recording = calibration.recording
+    assert recording is not None
+    gains = (next(c.parameters for c in calibration.candidates if c.chosen) - 6) // 6
+    own = slow_left_out(readings, temps, np.tile(np.arange(12), 5), gains)
+    expected = float(np.sqrt(np.mean(own**2)))
+    # Both solve to rounding; nine digits are written, 1e-8 m/s^2 of 8 mg.
+    assert recording.left_out_length_g == pytest.approx(expected, rel=1e-6)
+    assert recording.held_out_g != pytest.approx(expected, rel=1e-3)

@@ -32,6 +32,31 @@ def cycle(per_rate: FloatArray) -> FloatArray:
     return np.column_stack([rows, temp])[:: round(RATE_HZ / 10)]
 
 
+def slow_ramp() -> FloatArray:
+    """Up and down by 10 degC twice, at 1 K/min with a pose a minute; the bias sees T and dT/dt."""
+    rows = log(directions(40, seed=4), 59.0, sd=0.01, seed=4)[:: round(RATE_HZ / 10)]
+    phase = rows[:, 0] / 60.0 % 20.0
+    temp = np.minimum(phase, 20.0 - phase)
+    rate = np.where(phase < 10.0, 1.0, -1.0) / 60.0
+    rows[:, 1:] += 5e-3 * temp[:, None] + rate[:, None] * (30.0 * PER_RATE)
+    return np.column_stack([rows, temp])
+
+
+def test_a_slow_ramp_is_fitted_over_temperature_with_its_rate(tmp_path: Path) -> None:
+    """Poses 1 degC apart are at many temperatures, not at one."""
+    more = '[thermal]\nmodel = "polynomial"\norder = 1\nt0_degc = 5\n'
+    folder = write_unit(tmp_path / "U", slow_ramp(), WITH_T, header="t,ax,ay,az,T", more=more)
+    calibration = calibrated(folder)
+    assert {c.order for c in calibration.candidates} == {1}
+    assert "4 half-cycles left out in turn" in calibration.selection_reason
+    rate = calibration.terms.rate
+    assert rate is not None
+    expected = -np.linalg.solve(symmetric_part(K), 30.0 * PER_RATE)
+    # Poses at the turns have half a rate in their window, two of forty; 590 samples of 0.01 m/s^2
+    # are 0.04 mg a pose: 0.04 / (1/60) / sqrt(40 / 3) g for 1 K/s, three times.
+    assert np.abs(rate.offset_g_s_per_k - expected).max() < 0.05 * np.abs(expected).max() + 2e-3
+
+
 def unit_with(folder: Path, per_rate: FloatArray) -> Path:
     return write_unit(folder, cycle(per_rate), WITH_T, header="t,ax,ay,az,T")
 
@@ -92,3 +117,33 @@ def test_a_plain_cycle_is_no_worse(tmp_path: Path, count: int) -> None:
     found = calibrated(folder).thermal.constants_at(20.0)[9:]
     # Twenty poses of 0.12 mg over temperature: a few times that.
     assert np.abs(found - U0).max() < 1e-2
+
+
+@pytest.mark.parametrize("dither", [0.0, 0.1])
+def test_plateaus_have_no_rate(tmp_path: Path, dither: float) -> None:
+    """Constant, or between two codes: no slope that the thermometer could show."""
+    parts, start = [], 0.0
+    for n, temp in enumerate((0.0, 20.0, 40.0, 20.0, 0.0, 20.0, 40.0)):
+        rows = log(directions(10, seed=n), seed=n)
+        rows[:, 0] += start
+        start = rows[-1, 0] + 600.0
+        codes = dither * np.random.default_rng(n).integers(0, 2, len(rows))
+        parts.append(np.column_stack([rows, temp + codes]))
+    folder = write_unit(tmp_path / "U", np.concatenate(parts), WITH_T, header="t,ax,ay,az,T")
+    calibration = calibrated(folder)
+    assert "3 half-cycles left out in turn" in calibration.selection_reason
+    assert not any("dT/dt" in c.label for c in calibration.candidates)
+
+
+def test_nothing_judges_a_rate_where_no_orientation_can_be_spared(tmp_path: Path) -> None:
+    """Nine orientations for nine constants: single poses are left out, and no half-cycles."""
+    rows = log(np.tile(directions(9, seed=4), (5, 1)), HOLD_S, sd=0.01, seed=4)
+    half_s = rows[-1, 0] / HALVES
+    phase = np.pi * rows[:, 0] / half_s
+    rows[:, 1:] += 5.0 * np.pi / half_s * np.sin(phase)[:, None] * PER_RATE
+    rows = np.column_stack([rows, 20.0 - 5.0 * np.cos(phase)])[:: round(RATE_HZ / 10)]
+    calibration = calibrated(write_unit(tmp_path / "U", rows, WITH_T, header="t,ax,ay,az,T"))
+    assert "single poses, alike ones staying in" in calibration.selection_reason
+    assert "half-cycles" not in calibration.selection_reason
+    assert not any("dT/dt" in c.label for c in calibration.candidates)
+    assert calibration.terms.rate is None

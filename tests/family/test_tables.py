@@ -12,10 +12,12 @@ from test_recordings import calibrated
 from triaxcal.delivery import deliver
 from triaxcal.errors import RefusedError
 from triaxcal.fit.family.route import calibrate_recording
+from triaxcal.fit.family.tables import _angle_residuals
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.orientation import AIRCRAFT, INCLINOMETER, gravity_direction
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray
+from triaxcal.recordinglayout import Angles
 from triaxcal.uncertainty.evaluate import uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance
 from triaxcal.unitfile import read_unit
@@ -326,3 +328,14 @@ def test_quadratic_terms_of_too_few_poses_are_refused_not_a_fault(tmp_path: Path
         RefusedError, match=r'leave constants open; .* leave out terms = "quadratic"'
     ):
         calibrated(folder)
+
+
+def test_the_roll_of_a_pose_on_its_nose_counts_for_nothing() -> None:
+    """At pitch 90 deg any roll is the same pose; at 60 deg an arcsecond of it turns half of one."""
+    table = np.radians([[90.0, 0.0], [-90.0, 120.0], [60.0, 10.0], [60.0, -20.0]])
+    force = gravity_direction(AIRCRAFT, table + np.radians([[0.0, 77.0], [0, 0], [0, 1], [0, -1]]))
+    angles = Angles(AIRCRAFT, ("pitch", "roll"), "deg")
+    told = _angle_residuals(angles, table, force)
+    # Two of four rows by 3600" cos(60 deg).
+    rms = 1800.0 / np.sqrt(2.0)
+    assert told.endswith(f"arcsec rms, roll {rms:.3g} arcsec rms")

@@ -200,7 +200,7 @@ class _Pass:
         angle = samples.table_angle_rad
         mean = None
         if angle is not None and self.noise.table_sd_arcsec is not None:
-            by_block = angle[lead + 1 :][: blocks * size].reshape(blocks, size)
+            by_block = np.unwrap(angle[lead + 1 :][: blocks * size].reshape(blocks, size))
             mean = by_block.mean(axis=1)
             resting &= steady(by_block, self.noise.table_sd_arcsec * ARCSEC)
         inner = made.C[:-1].swapaxes(1, 2) @ made.C[1:]

@@ -13,9 +13,15 @@ from triaxcal.model.types import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Layout:
-    """The constants p of the blocks that are switched on, one block after the other."""
+    """The constants p of the blocks that are switched on, one block after the other.
+
+    A block that two extensions bring is there once.
+    """
 
     blocks: tuple[StateBlock, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "blocks", tuple(dict.fromkeys(self.blocks)))
 
     @property
     def states(self) -> tuple[State, ...]:

@@ -82,7 +82,8 @@ def missing_effects(
     covariance = done.root @ done.root.T
     found = []
     for extension in candidates:
-        places = [layout.place(block.name) for block in extension.blocks]
+        new = [block for block in extension.blocks if block.name not in result.layout]
+        places = [layout.place(block.name) for block in new]
         index = np.concatenate([np.arange(len(layout))[place] for place in places])
         value = float(
             done.p[index] @ np.linalg.solve(covariance[np.ix_(index, index)], done.p[index])
@@ -124,6 +125,6 @@ def _possible(extension: Extension, recording: ImuRecording, result: DynamicResu
     first = next(iter(recording.pieces()))
     needed = {block.needs for block in extension.blocks} - {""}
     ready = all(getattr(first, name, None) is not None for name in needed)
-    on = any(block.name in result.layout for block in extension.blocks)
+    on = all(block.name in result.layout for block in extension.blocks)
     # A second triad or a table that is recorded is no effect: its states are its own.
     return ready and not on and not needed & {"force2", "table_angle_rad", "table"}

@@ -164,8 +164,13 @@ def _section(
 
 
 def _turns_evenly(rate: FloatArray, force: FloatArray) -> bool:
-    """Whether a section starts in an even turn, which to the gyros alone looks like a bias."""
-    direction = force / np.linalg.norm(force, axis=1)[:, None]
+    """Whether a section starts in an even turn, which to the gyros alone looks like a bias.
+
+    Medians of seconds: one spoiled sample is no turn.
+    """
+    second = round(1.0 / WINDOW_S)
+    seconds = [np.median(force[k : k + second], axis=0) for k in range(0, len(force), second)]
+    direction = np.array([f / np.linalg.norm(f) for f in seconds])
     leans = bool((direction @ direction[0]).min() < REST_FORCE_COSINE)
     return leans or float(np.linalg.norm(rate)) > REST_MAX_RAD_PER_S
 

@@ -51,6 +51,8 @@ def find_table(lines: Sequence[Line], layout: RecordingLayout) -> FoundTable:
     above = [line for line in lines if line.number < plain[first].number]
     if layout.header is None:
         header = _header(above, _wanted(layout), delimiter, width)
+        if len(plain) == 1 and not any(map(_numeric, _split(plain[0].text, delimiter))):
+            header = plain[0]
     else:
         header = plain[0] if layout.header else None
     names: tuple[str, ...] = ()

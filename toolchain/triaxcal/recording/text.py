@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -142,12 +143,27 @@ def read_text(path: Path, layout: RecordingLayout) -> TextTable:
     """
     source = str(path)
     lines = _lines(source, _decoded(path), layout)
-    found = find_table(lines, layout)
+    try:
+        found = find_table(lines, layout)
+    except csv.Error as error:
+        raise _no_cells(source, lines) from error
     if not found.rows:
         raise RefusedError(source, "a header but no rows", expected="rows of numbers")
     _refuse_ragged(source, found.names, found.lines, found.rows)
     return TextTable(
         source, found.names, found.lines, found.rows, layout.decimal, findings=found.findings
+    )
+
+
+def _no_cells(source: str, lines: list[Line]) -> RefusedError:
+    """What is no row of cells: a quotation mark that is not closed, a document on one line."""
+    limit = csv.field_size_limit()
+    line = next((line for line in lines if len(line.text) > limit), lines[0])
+    return RefusedError(
+        f"{source}, line {line.number}",
+        f"a cell of more than {limit} characters, in a line of {len(line.text)}",
+        expected="rows of numbers",
+        remedy="export the recording as CSV, or remove the line",
     )
 
 
@@ -160,14 +176,14 @@ def _decoded(path: Path) -> str:
             f"cannot be read: {(error.strerror or str(error)).lower()}",
             remedy="put the recording there, or correct [recording] file",
         ) from error
-    wide = _utf_16(data)
+    wide = _wide(data)
     if wide:
         try:
             return data.decode(wide).removeprefix("\ufeff")
         except UnicodeDecodeError as error:
             raise RefusedError(
                 str(path),
-                f"begins as UTF-16 text, but byte {error.start} is none",
+                f"begins as {wide[:6].upper()} text, but byte {error.start} is none",
                 expected="text in one encoding",
                 remedy="save the file as UTF-8",
             ) from error
@@ -185,8 +201,10 @@ def _decoded(path: Path) -> str:
         return data.decode("latin-1")
 
 
-def _utf_16(data: bytes) -> str:
-    """Codec of UTF-16 text, by its mark or by the zeros of every other byte; "" of all else."""
+def _wide(data: bytes) -> str:
+    """Codec of UTF-32 by its mark, of UTF-16 by it or every other byte being 0; "" of all else."""
+    if data[:4] in {b"\xff\xfe\0\0", b"\0\0\xfe\xff"}:  # begins with UTF-16's mark: asked first
+        return "utf-32"
     if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         return "utf-16"
     start = data[:4096]

@@ -189,6 +189,8 @@ def pair_text(fit: PairFit, recursion: Recursion) -> str:
         f"{count} positions, condition number {fit.condition:.2f}, residual of Z {rms:.2g} g^2 rms",
         f"from position {settled} on the sd of both Kip stays within twice its last value",
     ]
+    if fit.doubtful:
+        lines += ["", fit.doubtful]
     return "\n".join(lines)
 
 

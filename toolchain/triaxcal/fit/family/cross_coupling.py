@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.errors import RefusedError
+from triaxcal.fit.family.pair_checks import doubtful_position, refuse_other_readings
 from triaxcal.fit.family.result import PairTerms
 from triaxcal.model.terms import PRODUCT_NAMES, Terms
 from triaxcal.model.types import FloatArray
@@ -45,6 +46,8 @@ class PairFit:
         Of Z.
     condition : float
         Of H, its columns scaled to length 1.
+    doubtful : str
+        The position that the others contradict, "" where there is none.
     """
 
     values: FloatArray
@@ -52,6 +55,7 @@ class PairFit:
     covariance: FloatArray
     residual_g2: FloatArray
     condition: float
+    doubtful: str
 
 
 def design(theta_rad: FloatArray, gravity_g: float) -> FloatArray:
@@ -75,16 +79,19 @@ def fit_pair(
     Raises
     ------
     RefusedError
-        When there are fewer than nine positions, or they leave a coefficient open.
+        When there are fewer than nine positions, or they leave a coefficient open; as
+        `refuse_other_readings`.
     """
     refuse_positions(source, theta_rad, gravity_g)
+    refuse_other_readings(source, theta_rad, a_g, b_g, gravity_g)
     H, z = design(theta_rad, gravity_g), half_square(a_g, b_g, gravity_g)
     values = np.linalg.lstsq(H, z, rcond=None)[0].astype(np.float64)
     residual = z - H @ values
     variance = float(residual @ residual) / (len(z) - len(NAMES))
     covariance = (variance * np.linalg.inv(H.T @ H)).astype(np.float64)
     sd: FloatArray = np.sqrt(np.diag(covariance))
-    return PairFit(values, sd, covariance, residual, condition_number(H))
+    doubtful = doubtful_position(residual, H)
+    return PairFit(values, sd, covariance, residual, condition_number(H), doubtful)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -21,7 +20,14 @@ from triaxcal.fit.family.frame import CASE, case_rotation, turned_constants, tur
 from triaxcal.fit.family.outliers import worst_outlier
 from triaxcal.fit.family.rate import half_cycle_turns, pose_rates
 from triaxcal.fit.family.result import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
-from triaxcal.fit.family.scalar import MODELS, NINE, ScalarData, ScalarModel, scalar_data
+from triaxcal.fit.family.scalar import (
+    MODELS,
+    NINE,
+    ScalarData,
+    ScalarModel,
+    fit_scalar,
+    scalar_data,
+)
 from triaxcal.fit.family.temperatures import (
     no_temperature,
     recording_range,
@@ -40,7 +46,6 @@ from triaxcal.fit.family.trials import (
     unscored,
     without_idle_rates,
 )
-from triaxcal.fit.grouping import GROUP_GAP_DEGC
 from triaxcal.fit.thermal import polynomial_shape
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import RateTerm, Terms
@@ -75,7 +80,10 @@ def calibrate_poses(
     data, temps, findings = _prepared(unit, layout, samples, poses)
     orientations, temperatures = _groups(data, temps)
     halves = half_cycle_turns(temps)
-    climate = PoseClimate(temps, pose_rates(samples, poses, layout) if halves else None, unit.loss)
+    rates = pose_rates(samples, poses, layout) if halves else None
+    if rates is None:
+        halves = []  # they judge a term in dT/dt; without a clock the rows' order says nothing
+    climate = PoseClimate(temps, rates, unit.loss)
     left_out = folds(orientations, temperatures, len(temps)) + halves
     trials = [
         replace(trial, model=replace(trial.model, known=known))
@@ -84,6 +92,8 @@ def calibrate_poses(
     rows = [judge(trial, data, climate, left_out) for trial in trials]
     turns = _turns(orientations, temperatures, len(halves))
     if unscored(rows):
+        # Single poses, not half-cycles, are spared here: nothing could judge a term in dT/dt.
+        halves, trials = [], [trial for trial in trials if not trial.rate]
         left_out = folds([[k] for k in range(len(temps))], temperatures, len(temps))
         rows = [judge(trial, data, climate, left_out) for trial in trials]
         turns = f"{len(temps)} single poses, alike ones staying in,"
@@ -95,9 +105,11 @@ def calibrate_poses(
     able = without_idle_rates(rows, sum(int(judged.sum()) for _, judged in halves))
     best = choose(able)
     why = reason(able, best, turns, values)
-    findings += _outlier(best, poses) + ([BEYOND_1_G] if len(best.fit.model.quadratic) else [])
-    rates = climate.rates if best.trial.rate else None
-    measurements = MeasurementSet(poses.source, pose_dwells(poses, temps, rates))
+    findings += _outlier(best, poses, unit.loss) + (
+        [BEYOND_1_G] if len(best.fit.model.quadratic) else []
+    )
+    shown = climate.rates if best.trial.rate else None
+    measurements = MeasurementSet(poses.source, pose_dwells(poses, temps, shown))
     made = _Made(unit, layout, poses, climate, rows, best, why, findings)
     return measurements, made.calibration()
 
@@ -142,15 +154,11 @@ def _groups(data: ScalarData, temps: FloatArray) -> tuple[list[list[int]], list[
 
 def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
     """Poses alike in orientation and temperature: they say one thing, and count as one."""
-    cells = []
-    for group in orientations:
-        ordered = sorted(group, key=lambda k: temps[k])
-        cells.append([ordered[0]])
-        for before, k in pairwise(ordered):
-            if temps[k] - temps[before] > GROUP_GAP_DEGC:
-                cells.append([])
-            cells[-1].append(k)
-    return cells
+    return [
+        [group[k] for k in cell]
+        for group in orientations
+        for cell in temperature_groups(temps[group])
+    ]
 
 
 def _trials(
@@ -187,9 +195,11 @@ def _turns(orientations: list[list[int]], temperatures: list[list[int]], halves:
     return words + (f" and {halves} half-cycles" if halves else "")
 
 
-def _outlier(best: Judged, poses: PoseSet) -> list[str]:
-    """Names a pose that the others contradict, by its leverage in the fit."""
+def _outlier(best: Judged, poses: PoseSet, loss: str) -> list[str]:
+    """Names a pose that the others contradict, by its leverage in a least-squares fit."""
     fit = best.fit
+    if loss != "linear":  # leverage and F are those of least squares
+        fit = fit_scalar(fit.model, fit.data, fit.gain_functions, start=fit.theta)
     weighted = fit.residual_g * fit.data.weight
     lever = (np.linalg.qr(fit.jacobian)[0] ** 2).sum(axis=1)
     left_out = weighted / np.maximum(1.0 - lever, 1e-9)
@@ -199,10 +209,10 @@ def _outlier(best: Judged, poses: PoseSet) -> list[str]:
     worst = found.indices[0]
     numbers = " or ".join(f"pose {poses.poses[k].number}" for k in found.indices[:4])
     error = left_out[worst] / fit.data.weight[worst] * 1e3
+    remedy = 'take it out, or set [fit] loss = "huber"' if loss == "linear" else "or take it out"
     told = (
         f"{numbers} (line {poses.poses[worst].line}) stands out: |a| is {error:+.3g} mg off by the "
-        f"other poses, which are within {found.others * 1e3:.2g} mg rms; look at it, take it out, "
-        'or set [fit] loss = "huber"'
+        f"other poses, which are within {found.others * 1e3:.2g} mg rms; look at it, {remedy}"
     )
     return [told]
 
@@ -310,7 +320,7 @@ class _Made:
             rms_g=fit.rms_g,
             rms_free_g=math.sqrt(float((fit.residual_g**2).sum()) / dof) if dof else math.nan,
             held_out_g=self.best.held_out_g,
-            left_out_length_g=self.best.held_out_g,
+            left_out_length_g=self.best.length_g(len(self.poses.poses)),
             condition=fit.condition,
             weakest=fit.unseen(),
             residual_g=fit.residual_g,

@@ -72,7 +72,8 @@ class RecordingFit:
     held_out_g : float or None
         The same at what was left out in turn: the score of the candidates.
     left_out_length_g : float or None
-        Rms of |a| - g at poses left out in turn.
+        Rms of |a| - g over the poses, each left out with its orientation (of more than 60
+        orientations in 60 bundles); temperatures and half-cycles left out are not in it.
     condition : float
         Condition number of the scaled Jacobian.
     weakest : str

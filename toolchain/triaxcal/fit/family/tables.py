@@ -39,7 +39,7 @@ from triaxcal.fit.family.table_rows import (
 from triaxcal.fit.family.temperatures import no_temperature, recording_range, thermal_orders
 from triaxcal.fit.family.trials import beats
 from triaxcal.fit.thermal import polynomial_shape
-from triaxcal.model.orientation import angles_from_force, gravity_direction
+from triaxcal.model.orientation import angle_slopes, angles_from_force, gravity_direction
 from triaxcal.model.terms import NO_TERMS, Terms, products
 from triaxcal.model.types import FloatArray
 from triaxcal.recording.poses import PoseSet, find_poses
@@ -142,9 +142,14 @@ def _choose(rows: Sequence[TableRow], temperatures: list[list[int]]) -> tuple[Ta
 
 
 def _angle_residuals(angles: Angles, table: FloatArray, force: FloatArray) -> str:
-    """P0 (8): the angles back from the compensated readings against those that were set."""
+    """P0 (8): the angles back from the compensated readings against those that were set.
+
+    The second turns the force by less where the first is steep, by nothing at pitch 90 deg, where
+    it cannot be seen: it is weighted with what it turns.
+    """
     difference = angles_from_force(angles.kind, force) - table[:, :2]
     wrapped = np.degrees((difference + np.pi) % (2.0 * np.pi) - np.pi) * 3600.0
+    wrapped[:, 1] *= np.linalg.norm(angle_slopes(angles.kind, table[:, :2])[..., 1], axis=-1)
     rms = np.sqrt(np.mean(wrapped**2, axis=0))
     names = ("pitch", "roll") if angles.kind == "aircraft" else ("zenith", "tool face")
     return "angles back from the readings (8): " + ", ".join(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
@@ -28,11 +27,14 @@ def no_temperature(unit: UnitDescription) -> str:
 
 
 def temperature_groups(temps_degc: FloatArray) -> list[list[int]]:
-    """Indices of the poses at each temperature, rising."""
+    """Indices of the poses at each temperature, rising: those within 2 degC of the lowest.
+
+    Not chained: a slow ramp must not become one temperature.
+    """
     order = [int(k) for k in np.argsort(temps_degc, kind="stable")]
     groups = [[order[0]]]
-    for before, k in pairwise(order):
-        if temps_degc[k] - temps_degc[before] > GROUP_GAP_DEGC:
+    for k in order[1:]:
+        if temps_degc[k] - temps_degc[groups[-1][0]] > GROUP_GAP_DEGC:
             groups.append([])
         groups[-1].append(k)
     return groups

@@ -104,6 +104,12 @@ class Judged:
     able: bool
     errors_g: FloatArray | None = None
 
+    def length_g(self, poses: int) -> float | None:
+        """Rms |a| - g of the `poses` poses, each left out with its orientation: the first turns."""
+        if self.errors_g is None:
+            return None
+        return float(np.sqrt(np.mean(self.errors_g[:poses] ** 2)))
+
     def candidate(self, estimator: str, *, chosen: bool) -> Candidate:
         """Row of the table."""
         shape = self.trial.shape
