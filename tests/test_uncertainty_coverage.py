@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -84,14 +85,25 @@ def coverage(
     )
 
 
-PERFECT_MOST = 0.98
-"""A variance that is zero comes out above zero in half of the units and never below: on the safe
-side, for noise, repeatability, squareness and thermal model together."""
+PERFECT = Coverage(constants=0.968, components=0.972, length=0.971)
+"""Found for a perfect tilter left to the residuals. A variance that is zero comes out above zero in
+half of the units and never below: on the safe side, for noise, repeatability, squareness and
+thermal model together."""
 
 
-def within(found: Coverage, most: float = 0.97) -> bool:
+def within(found: Coverage, most: Coverage | None = None) -> bool:
     """93 to 97 %, each. Values of one unit hang together, so it is like 500 to 1000 draws: 1 %."""
-    return all(0.93 <= share <= most for share in (found.constants, found.components, found.length))
+    limits = (0.97, 0.97, 0.97) if most is None else astuple(most)
+    return all(0.93 <= s <= limit for s, limit in zip(astuple(found), limits, strict=True))
+
+
+def one_standard_error_above(figure: Coverage, units: int) -> Coverage:
+    """Of a share that so many units, one draw each, show; the seeds are fixed, so one is enough.
+
+    Squareness counted as what noise could have hidden gave 97.5, 98.0 and 97.6 %: it fails in the
+    constants (97.4 %) and in the components (97.7 %).
+    """
+    return Coverage(*(p + math.sqrt(p * (1.0 - p) / units) for p in astuple(figure)))
 
 
 def test_intervals_of_500_units_hold_the_truth() -> None:
@@ -126,8 +138,16 @@ def test_intervals_of_1000_units_hold_the_truth(
     stated: StatedUncertainty, imperfections: Imperfections, auto: bool
 ) -> None:
     found = coverage(1000, stated, imperfections, auto=auto)
-    perfect = imperfections == Imperfections()
-    assert within(found, PERFECT_MOST if perfect else 0.97), found
+    perfect = imperfections == Imperfections() and stated.squareness_arcsec is None
+    assert within(found, one_standard_error_above(PERFECT, 1000) if perfect else None), found
+
+
+def test_the_limit_of_a_perfect_tilter_can_fail() -> None:
+    """What was found while an unseen squareness was counted in does not pass; what is now does."""
+    limit = one_standard_error_above(PERFECT, 1000)
+    assert within(PERFECT, limit)
+    assert not within(Coverage(0.975, 0.972, 0.971), limit)
+    assert not within(Coverage(0.968, 0.980, 0.971), limit)
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from test_recordings import calibrated, symmetric_part
 from triaxcal.delivery import deliver
 from triaxcal.model.types import FloatArray
 from triaxcal.report.results import calibration_json
+from triaxcal.uncertainty.evaluate import uncertainty
 
 WITH_T = COLUMNS + '\ntemperature = "T"'
 HALVES, POSES, HOLD_S = 4, 22, 7.0
@@ -83,6 +84,11 @@ def test_a_term_that_wins_on_half_cycles_left_out_reaches_the_compiled_c(tmp_pat
         # r is that of T0: K changes by nothing here; rounding, and the method's error in two axes.
         limit = 2.0 * delivery.model_error_g + 2e-6
         assert np.abs(errors - calibration.recording.residual_g).max() < limit
+    u = uncertainty(delivery.unit, delivery.measurements, calibration, None)
+    stated = next(s for s in u.sources if s.key == "rate").sd
+    assert stated is not None
+    # A third of the 0.22 above, at the largest rate; how unevenly the poses lie is within a half.
+    assert 0.5 < stated / (0.22e-3 / 3.0 * max(np.abs(rate.range_k_per_s))) < 2.0
     still = np.abs(calibration.recording.residual_g).max()
     assert still < 1e-3  # without the term 0.45 K/s leave 5 mg
 

@@ -10,7 +10,13 @@ _NOTHING_G = 1e-12
 _NOTHING = 0.001
 """Contributions below this, in the unit shown, are not worth digits."""
 MINUS = "\u2212"
-_HANDY = {"g": ("µg", 1e6), "V": ("µV", 1e6), "V/g": ("µV/g", 1e6), "m/s²": ("mm/s²", 1e3)}
+_HANDY = {
+    "g": ("µg", 1e6),
+    "V": ("µV", 1e6),
+    "V/g": ("µV/g", 1e6),
+    "m/s²": ("mm/s²", 1e3),
+    "g/g^2": ("µg/g²", 1e6),
+}
 
 
 def with_uncertainty(value: float, expanded: float, scale: float = 1.0) -> tuple[str, str]:
