@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from family_cases import COLUMNS, directions, log, write_unit
+from test_doubtful import FACES, LABELS, labelled
 
 from triaxcal.cli.main import main
 from triaxcal.errors import RefusedError
@@ -28,6 +29,21 @@ def test_poses_are_listed_with_the_reasons_of_refusals(tmp_path: Path) -> None:
     assert "s still, needs 2.0" in output
     assert output.rstrip().endswith("11 poses; 1 still stretches refused")
     assert (tmp_path / "p.svg").read_text().startswith("<svg")
+
+
+def test_labelled_faces_are_listed_without_a_clock(tmp_path: Path) -> None:
+    """As the calibration takes them: five rows a face, and no still stretch is searched."""
+    columns = COLUMNS.replace('\ntime = "t"', "")
+    folder = write_unit(tmp_path / "U", labelled(), f"{columns}\n{FACES}")
+    output = run("poses", str(folder), "--picture", str(tmp_path / "p.svg"))
+    assert [line.split()[0::8] for line in output.splitlines()[1:7]] == [
+        [str(k + 1), label] for k, label in enumerate(LABELS)
+    ]
+    assert output.rstrip().endswith("6 poses; 0 still stretches refused")
+    assert (tmp_path / "p.svg").read_text().startswith("<svg")
+    folder = write_unit(tmp_path / "V", labelled(labels=tuple("abcdef")), f"{columns}\n{FACES}")
+    with pytest.raises(RefusedError, match="no section is a pose; sections found: a, b, c, d"):
+        run("poses", str(folder))
 
 
 def test_drift_names_the_hysteresis_and_a_term_that_wins(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -339,3 +340,18 @@ def test_the_roll_of_a_pose_on_its_nose_counts_for_nothing() -> None:
     # Two of four rows by 3600" cos(60 deg).
     rms = 1800.0 / np.sqrt(2.0)
     assert told.endswith(f"arcsec rms, roll {rms:.3g} arcsec rms")
+
+
+def test_one_pose_that_all_hangs_on_is_told_by_what_is_left_without_it(tmp_path: Path) -> None:
+    """Five poses about x and one that tips it: together well seen, without it x is open."""
+    angles = np.radians([[0, 0], [0, 90], [0, 180], [0, 270], [0, 45], [60, 0]])
+    folder = write_unit(tmp_path / "U", rows_of(angles), AIR, header=HEADER)
+    with pytest.raises(RefusedError) as refusal:
+        calibrated(folder)
+    told = re.search(
+        r"the 6 poses leave constants open when some are left out \(condition number (\S+)\); "
+        "expected 1000 at most, with each pose left out in turn; add poses over both angles",
+        str(refusal.value),
+    )
+    assert told is not None
+    assert float(told[1]) > 1000.0

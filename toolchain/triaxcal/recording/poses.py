@@ -124,7 +124,7 @@ class _Scale:
 
 
 def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
-    """Poses of samples: one a row, one a labelled section, or found by stillness.
+    """Poses of samples: one a row, one a section or labelled face, or found by stillness.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     """
     if layout.rows == POSES:
         return PoseSet(samples.source, _row_poses(samples), (), None, samples.findings)
-    if layout.rows == SECTIONS:
+    if layout.rows == SECTIONS or layout.faces:
         return _section_poses(samples, layout)
     stillness = find_stillness(samples, layout.still_s)
     scale = _Scale.of(samples, layout)
@@ -149,7 +149,7 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
         reason = _reason(samples, run, pose, layout, scale)
         if reason:
             refused.append(RefusedPose(number, pose.line, pose.start_s, length, reason))
-        elif not layout.faces or pose.label in layout.faces:
+        else:
             poses.append(pose)
     if not poses:
         raise _no_poses(samples, layout, refused)
@@ -175,7 +175,10 @@ def _row_poses(samples: Samples) -> tuple[Pose, ...]:
 
 
 def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
-    """Each stretch of rows with one label is a pose; without a label it is what lies between."""
+    """Each stretch of rows with one label is a pose; without a label it is what lies between.
+
+    With `faces` only their labels count.
+    """
     assert samples.label is not None
     scale = _Scale.of(samples, layout)
     poses: list[Pose] = []
@@ -184,7 +187,7 @@ def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     for label, rows in groupby(samples.label):
         run = start, start + len(list(rows))
         start = run[1]
-        if not label.strip():
+        if not label.strip() or (layout.faces and label not in layout.faces):
             continue
         pose = _pose(samples, run, len(poses) + len(refused) + 1)
         reason = _moves(samples.reading[run[0] : run[1]].std(axis=0), layout, scale)
@@ -200,8 +203,13 @@ def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
             poses.append(pose)
     if not poses:
         first = f": pose {refused[0].number}: {refused[0].reason}" if refused else ""
+        labels = ""
+        if layout.faces and not refused:
+            labels = f"; sections found: {', '.join(sorted(set(samples.label))[:10])}"
         raise RefusedError(
-            samples.source, f"no section is a pose{first}", expected="sections held still"
+            samples.source,
+            f"no section is a pose{first}{labels}",
+            expected="sections held still" + ", labelled as in [recording] faces" * bool(labels),
         )
     return PoseSet(samples.source, tuple(poses), tuple(refused), None, samples.findings)
 
@@ -279,14 +287,9 @@ def _no_poses(
 ) -> RefusedError:
     longest = max((r.duration_s for r in refused), default=0.0)
     first = f"; pose {refused[0].number}: {refused[0].reason}" if refused else ""
-    labels = ""
-    if layout.faces and samples.label is not None:
-        found = sorted(set(samples.label))
-        if not set(found) & set(layout.faces):
-            labels = f"; sections found: {', '.join(found[:10])}"
     return RefusedError(
         samples.source,
-        f"no pose found: the longest still stretch has {longest:.3g} s{first}{labels}",
+        f"no pose found: the longest still stretch has {longest:.3g} s{first}",
         expected=f"poses of {layout.still_s:g} s at least",
         remedy=_wrong_clock(samples, layout)
         or "hold each pose longer, or lower [recording] still_s; "

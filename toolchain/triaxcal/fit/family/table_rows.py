@@ -28,6 +28,9 @@ from triaxcal.model.metrological import force_from_voltage, pack_constants
 from triaxcal.model.terms import products
 from triaxcal.model.types import BoolArray, FloatArray
 
+LEFT_OUT_MAX = 10.0 * CONDITION_MAX
+"""Of what a turn leaves: it is only to judge, not to ship."""
+
 
 @dataclass(frozen=True)
 class TablePoses:
@@ -127,6 +130,8 @@ class TableRow:
         Rms of `errors_g`, a component; None when not scored.
     errors_g : array, shape (m, 3), or None
         Errors of what was left out: each pose in turn, then the inner temperatures.
+    open_at : float or None
+        The condition number for which it is not scored: of all poses, or of what a turn leaves.
     """
 
     trial: TableTrial
@@ -134,6 +139,7 @@ class TableRow:
     own_g: FloatArray
     held_out_g: float | None
     errors_g: FloatArray | None = None
+    open_at: float | None = None
 
     @property
     def fitted_g(self) -> float:
@@ -198,8 +204,11 @@ def judge_table(trial: TableTrial, poses: TablePoses, left_out: Sequence[BoolArr
         return TableRow(trial, fit, own, None)
     errors = []
     for mask in left_out:
-        part = trial.fit(poses.select(~mask))
-        if part.condition > 10.0 * CONDITION_MAX:
+        try:
+            part = trial.fit(poses.select(~mask))
+        except np.linalg.LinAlgError:  # singular to the last digit
+            return TableRow(trial, fit, own, None, open_at=np.inf)
+        if part.condition > LEFT_OUT_MAX:
             return TableRow(trial, fit, own, None)
         out = poses.select(mask)
         errors.append(part.force_g(out) - out.force)

@@ -27,6 +27,7 @@ from triaxcal.fit.family.table_checks import (
     refuse_open,
 )
 from triaxcal.fit.family.table_rows import (
+    LEFT_OUT_MAX,
     TablePoses,
     TableRow,
     TableTrial,
@@ -81,15 +82,7 @@ def calibrate_table(
     rows = [judge_table(trial, known, left_out) for trial in trials]
     able = [r for r in rows if r.held_out_g is not None]
     if not able:
-        raise RefusedError(
-            poses.source,
-            f"the {len(poses.poses)} poses leave constants open"
-            + (f" (condition number {min(r.fit.condition for r in rows):.3g})" if rows else ""),
-            expected=f"{CONDITION_MAX:g} at most, with each pose left out in turn",
-            remedy='add poses over both angles, or leave out terms = "quadratic"'
-            if unit.terms == "quadratic"
-            else "add poses over both angles",
-        )
+        raise _open(unit, poses, rows)
     best, why = _choose(able, temperatures)
     found = sign * (best.own_g + force)
     near = min(temperatures, key=lambda group: abs(temps[group].mean() - unit.t0_degc))
@@ -127,6 +120,27 @@ def _trials(
         for trial in one_temperature_trials(shapes[0])
         if unit.terms == "auto" or (unit.terms == "quadratic") == trial.label.startswith("quadr")
     ]
+
+
+def _open(unit: UnitDescription, poses: PoseSet, rows: Sequence[TableRow]) -> RefusedError:
+    """Why no candidate is scored: the condition number of all poses, or of the turn that fails."""
+    told, expected = "", "more values than constants, with each pose left out in turn"
+    numbers = [(row.open_at, row.fit.condition) for row in rows if row.open_at is not None]
+    if numbers:
+        found, of_all = min(numbers)
+        in_turn = of_all <= CONDITION_MAX
+        told = f"{' when some are left out' * in_turn} (condition number {found:.3g})"
+        expected = f"{CONDITION_MAX:g} at most"
+        if in_turn:
+            expected = f"{LEFT_OUT_MAX:g} at most, with each pose left out in turn"
+    return RefusedError(
+        poses.source,
+        f"the {len(poses.poses)} poses leave constants open{told}",
+        expected=expected,
+        remedy='add poses over both angles, or leave out terms = "quadratic"'
+        if unit.terms == "quadratic"
+        else "add poses over both angles",
+    )
 
 
 def _choose(rows: Sequence[TableRow], temperatures: list[list[int]]) -> tuple[TableRow, str]:
