@@ -186,3 +186,24 @@ def test_the_order_of_averaged_rows_says_nothing(tmp_path: Path) -> None:
         chosen.append(next(c.label for c in made.candidates if c.chosen))
     assert chosen[0] == chosen[1]
     assert "order 2" in chosen[0]
+
+
+def test_t0_outside_of_the_poses_is_told(tmp_path: Path) -> None:
+    made = calibrated(unit_with(tmp_path / "U", cycle((30.0, 40.0, 60.0))))
+    assert made.recording is not None
+    assert (
+        "T0 = 20 degC lies outside of the poses' 30 to 60 degC: the constants there are "
+        "extrapolated; state [thermal] t0_degc"
+    ) in made.recording.findings
+
+
+def test_kelvin_taken_for_degc_is_refused(tmp_path: Path) -> None:
+    rows = cycle((0.0, 20.0, 40.0))
+    rows[:, -1] += 273.15
+    with pytest.raises(RefusedError) as refusal:
+        calibrated(unit_with(tmp_path / "U", rows))
+    assert str(refusal.value) == (
+        "U/unit.toml, [recording] temperature_unit: poses at 273.2 to 313.2 degC, and T0 at 20 "
+        'degC; expected T0 among the poses\' temperatures; temperature_unit = "K" if they are '
+        "kelvin, else state [thermal] t0_degc"
+    )

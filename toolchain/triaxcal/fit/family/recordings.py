@@ -29,8 +29,8 @@ from triaxcal.fit.family.scalar import (
     scalar_data,
 )
 from triaxcal.fit.family.temperatures import (
-    no_temperature,
     recording_range,
+    temperature_findings,
     temperature_groups,
     thermal_orders,
 )
@@ -132,8 +132,7 @@ def _prepared(
     crowd = crowd_finding(orientations, poses)
     if crowd:
         findings.append(crowd)
-    if recorded is None:
-        findings.append(no_temperature(unit))
+    findings += temperature_findings(unit, recorded)
     findings.append(axes)
     weight = np.ones(len(temps))
     for group in _cells(orientations, temps):

@@ -14,7 +14,7 @@ from triaxcal.fit.family.cross_coupling import stated_pair
 from triaxcal.fit.family.faces import face_measurements
 from triaxcal.fit.family.recordings import calibrate_poses
 from triaxcal.fit.family.tables import calibrate_table
-from triaxcal.fit.family.temperatures import no_temperature
+from triaxcal.fit.family.temperatures import temperature_findings
 from triaxcal.recording.samples import Samples, read_samples
 from triaxcal.recordinglayout import RecordingLayout
 from triaxcal.records import MeasurementSet
@@ -42,7 +42,7 @@ def calibrate_recording(
         measurements = face_measurements(unit, layout, samples)
         found = calibrate(unit, measurements, pair)
         refuse_unacceptable(unit, found, measurements)
-        unseen = [no_temperature(unit)] if samples.temp_degc is None else []
+        unseen = temperature_findings(unit, samples.temp_degc)
         calibration = replace(
             found,
             reading_unit=layout.acceleration_unit,

@@ -37,7 +37,11 @@ from triaxcal.fit.family.table_rows import (
     thermal_trials,
     turns,
 )
-from triaxcal.fit.family.temperatures import no_temperature, recording_range, thermal_orders
+from triaxcal.fit.family.temperatures import (
+    recording_range,
+    temperature_findings,
+    thermal_orders,
+)
 from triaxcal.fit.family.trials import beats
 from triaxcal.fit.thermal import polynomial_shape
 from triaxcal.model.orientation import angle_slopes, angles_from_force, gravity_direction
@@ -90,7 +94,7 @@ def calibrate_table(
         *poses.findings,
         *outlier_findings(unit, angles, poses, table=table, sign=sign, best=best),
         *([BEYOND_1_G] if best.trial.parameters > 12 and best.fit.quadratic is not None else []),
-        *([] if poses.temps_degc is not None else [no_temperature(unit)]),
+        *temperature_findings(unit, poses.temps_degc),
         *table_findings(angles, table[near], readings[near], found[near], unit.gravity_g),
         _angle_residuals(angles, table, found),
         *_budget(unit, angles, table, best),

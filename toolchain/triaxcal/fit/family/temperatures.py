@@ -16,14 +16,42 @@ from triaxcal.unitfile import UnitDescription
 THERMAL_SPREAD_DEGC = 5.0
 """Poses over less than this are at one temperature: an order is not asked of them."""
 ORDER_MAX = 3
+_KELVIN_MIN = 200.0
+"""No chamber with an accelerometer in it is as hot in degC, and hardly one as cold in kelvin."""
 
 
-def no_temperature(unit: UnitDescription) -> str:
-    """What a recording without a temperature cannot say."""
-    return (
-        f"no temperature in the recording: the constants are taken as those of T0 = "
-        f"{unit.t0_degc:g} degC, and nothing shows how they change"
-    )
+def temperature_findings(unit: UnitDescription, temps_degc: FloatArray | None) -> list[str]:
+    """What a recording's temperatures cannot say of the constants at T0.
+
+    Raises
+    ------
+    RefusedError
+        When the temperatures can only be kelvin.
+    """
+    t0 = unit.t0_degc
+    if temps_degc is None:
+        return [
+            (
+                f"no temperature in the recording: the constants are taken as those of T0 = "
+                f"{t0:g} degC, and nothing shows how they change"
+            )
+        ]
+    low, high = float(temps_degc.min()), float(temps_degc.max())
+    if low - EDGE_DEGC <= t0 <= high + EDGE_DEGC:
+        return []
+    if low > _KELVIN_MIN:
+        raise RefusedError(
+            f"{unit.name}/unit.toml, [recording] temperature_unit",
+            f"poses at {low:.4g} to {high:.4g} degC, and T0 at {t0:g} degC",
+            expected="T0 among the poses' temperatures",
+            remedy='temperature_unit = "K" if they are kelvin, else state [thermal] t0_degc',
+        )
+    return [
+        (
+            f"T0 = {t0:g} degC lies outside of the poses' {low:.4g} to {high:.4g} degC: the constants "
+            "there are extrapolated; state [thermal] t0_degc"
+        )
+    ]
 
 
 def temperature_groups(temps_degc: FloatArray) -> list[list[int]]:
