@@ -48,8 +48,8 @@ def temperature_findings(unit: UnitDescription, temps_degc: FloatArray | None) -
         )
     return [
         (
-            f"T0 = {t0:g} degC lies outside of the poses' {low:.4g} to {high:.4g} degC: the constants "
-            "there are extrapolated; state [thermal] t0_degc"
+            f"T0 = {t0:g} degC lies outside of the poses' {low:.4g} to {high:.4g} degC: the "
+            "constants there are extrapolated; state [thermal] t0_degc"
         )
     ]
 
