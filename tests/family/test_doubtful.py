@@ -80,6 +80,16 @@ def test_a_pose_whose_length_is_wrong_is_told(tmp_path: Path) -> None:
     assert "stands out" not in findings(write_unit(tmp_path / "V", log(directions(20))))
 
 
+def test_a_wrong_pose_that_makes_a_small_model_win_is_told(tmp_path: Path) -> None:
+    """14 poses, one 1 % too long: six constants are chosen, in which it does not stand out."""
+    poses = directions(14)
+    poses[9] *= 1.01
+    told = findings(write_unit(tmp_path / "U", log(poses)))
+    size = re.search(r"pose 10 \(line \d+\) stands out: \|a\| is \+([\d.]+) mg off by", told)
+    assert size is not None
+    assert float(size[1]) == pytest.approx(10.0, abs=1.5)
+
+
 ROWS = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "m/s^2"'
 ROBUST = '[fit]\nterms = "linear"\nloss = "cauchy"\n'
 

@@ -105,7 +105,7 @@ def calibrate_poses(
     able = without_idle_rates(rows, sum(int(judged.sum()) for _, judged in halves))
     best = choose(able)
     why = reason(able, best, turns, values)
-    findings += _outlier(best, poses, unit.loss) + (
+    findings += _outlier(_widest_linear(rows, best), poses, unit.loss) + (
         [BEYOND_1_G] if len(best.fit.model.quadratic) else []
     )
     shown = climate.rates if best.trial.rate else None
@@ -194,9 +194,26 @@ def _turns(orientations: list[list[int]], temperatures: list[list[int]], halves:
     return words + (f" and {halves} half-cycles" if halves else "")
 
 
-def _outlier(best: Judged, poses: PoseSet, loss: str) -> list[str]:
+def _widest_linear(rows: list[Judged], best: Judged) -> Judged:
+    """The chosen row or the one with most constants that is linear and follows temperature alike.
+
+    One wrong pose can make a small model win, in which all residuals are as large as its own.
+    """
+    alike = [
+        row
+        for row in rows
+        if row.able
+        and not len(row.trial.model.quadratic)
+        and row.trial.shape.parameters == best.trial.shape.parameters
+        and row.trial.gain_functions == best.trial.gain_functions
+        and row.trial.rate == best.trial.rate
+    ]
+    return max([best, *alike], key=lambda row: row.trial.parameters)
+
+
+def _outlier(judge: Judged, poses: PoseSet, loss: str) -> list[str]:
     """Names a pose that the others contradict, by its leverage in a least-squares fit."""
-    fit = best.fit
+    fit = judge.fit
     if loss != "linear":  # leverage and F are those of least squares
         fit = fit_scalar(fit.model, fit.data, fit.gain_functions, start=fit.theta)
     weighted = fit.residual_g * fit.data.weight
