@@ -45,6 +45,13 @@ class Outlier:
     others: float
 
 
+def left_out_residuals(own: FloatArray, jacobian: FloatArray) -> FloatArray:
+    """Residuals (n,) of least squares with each row of the Jacobian (n, p) left out in turn."""
+    leverage = (np.linalg.qr(jacobian)[0] ** 2).sum(axis=1)
+    result: FloatArray = own / np.maximum(1.0 - leverage, 1e-9)
+    return result
+
+
 def worst_outlier(own: FloatArray, left_out: FloatArray, parameters: int) -> Outlier | None:
     """The pose that fits worst, when that is no chance.
 

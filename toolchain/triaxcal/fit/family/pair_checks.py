@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.errors import RefusedError
-from triaxcal.fit.family.outliers import worst_outlier
+from triaxcal.fit.family.outliers import left_out_residuals, worst_outlier
 from triaxcal.model.types import FloatArray
 
 SIZE_MAX = 1.5
@@ -56,8 +56,7 @@ def refuse_other_readings(
 
 def doubtful_position(residual_g2: FloatArray, H: FloatArray) -> str:
     """The position that the others contradict, in words; "" where there is none."""
-    leverage = np.einsum("ij,ji->i", H, np.linalg.pinv(H))
-    left_out = residual_g2 / np.maximum(1.0 - leverage, 1e-12)
+    left_out = left_out_residuals(residual_g2, H)
     found = worst_outlier(residual_g2[:, None], left_out[:, None], H.shape[1])
     if found is None:
         return ""

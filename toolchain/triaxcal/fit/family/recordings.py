@@ -17,7 +17,7 @@ from triaxcal.fit.family.checks import (
     refuse_wrong_unit,
 )
 from triaxcal.fit.family.frame import CASE, case_rotation, turned_constants, turned_quadratic
-from triaxcal.fit.family.outliers import worst_outlier
+from triaxcal.fit.family.outliers import left_out_residuals, worst_outlier
 from triaxcal.fit.family.rate import half_cycle_turns, pose_rates
 from triaxcal.fit.family.result import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
 from triaxcal.fit.family.scalar import (
@@ -217,8 +217,7 @@ def _outlier(judge: Judged, poses: PoseSet, loss: str) -> list[str]:
     if loss != "linear":  # leverage and F are those of least squares
         fit = fit_scalar(fit.model, fit.data, fit.gain_functions, start=fit.theta)
     weighted = fit.residual_g * fit.data.weight
-    lever = (np.linalg.qr(fit.jacobian)[0] ** 2).sum(axis=1)
-    left_out = weighted / np.maximum(1.0 - lever, 1e-9)
+    left_out = left_out_residuals(weighted, fit.jacobian)
     found = worst_outlier(weighted[:, None], left_out[:, None], len(fit.theta))
     if found is None:
         return []
