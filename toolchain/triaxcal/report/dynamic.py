@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import textwrap
 from collections.abc import Iterable
@@ -15,6 +14,7 @@ from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Observability
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.imudelivery import ImuDelivery
+from triaxcal.jsontext import json_bytes
 from triaxcal.report.dynamicpage import digits, dynamic_page, verdict, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
 
@@ -89,7 +89,7 @@ def _calibration_json(done: DynamicUnit, inputs_sha256: str) -> bytes:
         ],
         "known_only_together": [list(pair) for pair in seen.together],
     }
-    return (json.dumps(document, indent=1) + "\n").encode()
+    return json_bytes(document)
 
 
 def axis_up(result: DynamicResult) -> str:
