@@ -7,7 +7,7 @@ from pathlib import Path
 from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.plan import read_plan
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.description import read_unit
 
 REPO = Path(__file__).resolve().parents[1]
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import atheris
 
 with atheris.instrument_imports(include=["triaxcal"]):
-    from triaxcal.errors import RefusedError
-    from triaxcal.records import read_measurements
-    from triaxcal.unitfile import read_unit
+    from triaxcal.base.errors import RefusedError
+    from triaxcal.readings.measurements import read_measurements
+    from triaxcal.unit.description import read_unit
 
 UNIT = b"""format = 1
 serial = "FUZZ-1"

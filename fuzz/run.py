@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.resources import shipped
+from triaxcal.base.shipped import shipped
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 from triaxcal.verify.shapes import SHAPES, subject
 from triaxcal.verify.table import table

@@ -12,7 +12,7 @@ from builds import UNITS, Built, write_generated
 from plans import COVERING, GOLDEN, random_plan
 from recordings import ABSENT, FOLDER
 from triaxcal.codegen.routines import Generated, Reference, start_generated, start_reference
-from triaxcal.delivery import Delivery, deliver
+from triaxcal.deliver.unit import Delivery, deliver
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 from triaxcal.model.metrological import pack_constants, voltage_from_force
 from triaxcal.model.positions import TEST_POSITIONS, specific_force_g
 from triaxcal.model.types import FloatArray
-from triaxcal.records import Dwell, MeasurementSet
-from triaxcal.unitfile import Adc, Limits, TemperatureSensor, ThermalChoice, UnitDescription
+from triaxcal.readings.measurements import Dwell, MeasurementSet
+from triaxcal.unit.description import Adc, Limits, TemperatureSensor, ThermalChoice, UnitDescription
 
 AUTO = ThermalChoice("auto", None, None)
 

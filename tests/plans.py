@@ -18,7 +18,7 @@ from triaxcal.fixedpoint.inversion import InverseShifts
 from triaxcal.fixedpoint.plan import Plan, Shape
 from triaxcal.model.compensation import DIRECT, INVERSE
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
-from triaxcal.unitfile import Adc, Limits, TemperatureSensor, ThermalChoice, UnitDescription
+from triaxcal.unit.description import Adc, Limits, TemperatureSensor, ThermalChoice, UnitDescription
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 ROW_LIMIT, ROW_LIMIT_QUADRATIC = 2**32 - 8, 3 * 2**30

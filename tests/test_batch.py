@@ -19,6 +19,7 @@ import pytest
 from click.testing import CliRunner
 
 import batch_workers
+from triaxcal.base.errors import RefusedError
 from triaxcal.batch import journal
 from triaxcal.batch.cluster import connect
 from triaxcal.batch.local import run_local
@@ -26,7 +27,6 @@ from triaxcal.batch.order import Make, Order, Outcome, filled
 from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import Series, run_series
 from triaxcal.cli.batch import batch
-from triaxcal.errors import RefusedError
 from triaxcal.report.series.unit import make_unit
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -12,15 +12,15 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from triaxcal.certificate import CertificateDetails
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.render import function_format
-from triaxcal.delivery import Delivery
-from triaxcal.errors import RefusedError
+from triaxcal.deliver.unit import Delivery
 from triaxcal.report.a2l import calib_a2l, calib_words
 from triaxcal.report.dcc import DCC, SI, certificate_xml
 from triaxcal.report.files import CERTIFICATE, all_files
 from triaxcal.report.passport.content import passport
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.certificate import CertificateDetails
+from triaxcal.unit.description import read_unit
 
 UNITS = Path(__file__).parent.parent / "units"
 DETAILS = CertificateDetails(

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from plans import TABLE_T0
 from strategies import constants, forces_g
+from triaxcal.base.tomltable import read_toml
 from triaxcal.model.compensation import (
     DIRECT,
     INVERSE,
@@ -30,7 +31,6 @@ from triaxcal.model.metrological import (
 )
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
-from triaxcal.tomltable import read_toml
 
 TABLES = read_toml(Path(__file__).parent.parent / "units" / "AT-CHERNIAK" / "tables.toml")[
     "constants"

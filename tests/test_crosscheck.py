@@ -12,6 +12,7 @@ import pytest
 import oracle
 from builds import Built, write_generated
 from plans import COVERING, GOLDEN, INT32_MAX, INT32_MIN
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.crosscheck import (
     RANDOM_VECTORS,
     VectorSet,
@@ -21,7 +22,6 @@ from triaxcal.codegen.crosscheck import (
 )
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.routines import Answers, Generated, Reference, start_generated
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import prove
 

@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from triaxcal import delivery as delivery_module
+from triaxcal.base.tomltable import read_toml
 from triaxcal.codegen.crosscheck import vector_sets
 from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
 from triaxcal.codegen.routines import Generated, start_generated
 from triaxcal.codegen.tryout import BEFORE
-from triaxcal.delivery import Delivery, compensation_of, deliver
-from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.deliver import unit as delivery_module
+from triaxcal.deliver.unit import Delivery, compensation_of, deliver
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g
@@ -32,8 +34,7 @@ from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.tilts import truth_force_g
 from triaxcal.simulation.truth import Plan, Truth, read_truth
-from triaxcal.tomltable import read_toml
-from triaxcal.unitfile import METHODS, ThermalChoice, UnitDescription
+from triaxcal.unit.description import METHODS, ThermalChoice, UnitDescription
 
 UNITS = Path(__file__).parent.parent / "units"
 TABLES = read_toml(UNITS / "AT-CHERNIAK" / "tables.toml")["constants"]

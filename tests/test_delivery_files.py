@@ -17,7 +17,7 @@ import pytest
 
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.tryout import model_error_g
-from triaxcal.delivery import IMAGE_FILE, Delivery
+from triaxcal.deliver.unit import IMAGE_FILE, Delivery
 from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g
 from triaxcal.report.files import all_files
 

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from builds import UNITS
-from triaxcal import delivery
-from triaxcal.delivery import Delivery, deliver
-from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.deliver import unit as delivery
+from triaxcal.deliver.unit import Delivery, deliver
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, Terms
-from triaxcal.records import MeasurementSet
+from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.report.a2l import calib_words
-from triaxcal.unitfile import UnitDescription
+from triaxcal.unit.description import UnitDescription
 
 assert EXAMPLE_TERMS.quadratic_per_g is not None
 SMALL = Terms(EXAMPLE_TERMS.quadratic_per_g / 100, EXAMPLE_RATE)

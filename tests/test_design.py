@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.design import design as command
 from triaxcal.design.problem import Problem, read_problem, unobservable
 from triaxcal.design.search import (
@@ -25,15 +26,14 @@ from triaxcal.design.search import (
     usual,
 )
 from triaxcal.design.words import comparison, rig_plan
-from triaxcal.errors import RefusedError
-from triaxcal.fit.calibrate import calibrate
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.rig.plan import read_plan
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.truth import Imperfections, Plan, read_truth
 from triaxcal.uncertainty.orientation import DIRECTIONS
-from triaxcal.unitfile import ThermalChoice, read_unit
+from triaxcal.unit.description import ThermalChoice, read_unit
 
 ROOT = Path(__file__).resolve().parents[1]
 QUESTION = ROOT / "rig" / "design.toml"

@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from dynamic_judge import Verdict, judge
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.recording import INCREMENT, INSTANT
-from triaxcal.errors import RefusedError
 from triaxcal.simulation.imu_grades import AVIATION, EFFECTS, GRADES, MEMS, draw_truth
 from triaxcal.simulation.imu_motion import (
     PRECISE_TABLE,

@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 from dynamic_cases import UNIT_TOML
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
+from triaxcal.design.imu import plan_unit
 from triaxcal.dynamic.unit import calibrate_unit
-from triaxcal.errors import RefusedError
-from triaxcal.imuplan import plan_unit
 from triaxcal.simulation.imu_unit import planned_motion, write_simulated_recording
 
 TRUTH = """\

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from dynamic_cases import changed, held, mems_short, part, short_motion
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.recording import ImuRecording, ImuSamples
 from triaxcal.dynamic.survey import survey
-from triaxcal.errors import RefusedError
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_motion import three_axes
 

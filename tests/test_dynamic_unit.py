@@ -10,10 +10,10 @@ import pytest
 from click.testing import CliRunner
 
 from dynamic_cases import COLUMNS, UNIT_TOML, mems_short, table_of, write_unit
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.reading import read_recording
-from triaxcal.errors import RefusedError
 
 
 def table() -> np.ndarray:

@@ -22,11 +22,12 @@ from fit_cases import (
     unit,
     with_checks,
 )
-from triaxcal.errors import RefusedError
-from triaxcal.fit.calibrate import Calibration, calibrate
-from triaxcal.fit.thermal import relative_coefficients
-from triaxcal.records import MeasurementSet
-from triaxcal.unitfile import ThermalChoice
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.core.thermal import relative_coefficients
+from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.unit.description import ThermalChoice
 
 EPS = np.finfo(float).eps
 CUBIC = ThermalChoice("polynomial", 3, None)
@@ -277,6 +278,8 @@ def test_exchanged_positions_are_told_before_the_condition_number():
 
 
 def test_scipy_is_not_loaded():
-    code = "import sys, triaxcal.fit.calibrate; print([m for m in sys.modules if 'scipy' in m])"
+    code = (
+        "import sys, triaxcal.fit.tilter.calibrate; print([m for m in sys.modules if 'scipy' in m])"
+    )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"

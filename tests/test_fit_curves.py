@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from fit_cases import SEVEN, TABLE_TEMPS, TABLES, cubic_truth, readings, tables_truth
-from triaxcal.fit.curves import (
+from triaxcal.fit.core.calibration import curve_covariance
+from triaxcal.fit.core.grouping import GroupedReadings, group_dwells, grouped_readings
+from triaxcal.fit.core.thermal import piecewise_linear_shape, polynomial_shape
+from triaxcal.fit.tilter.curves import (
     TilterData,
-    curve_covariance,
     fit_curves,
     parameter_covariance,
     shifted_voltage,
 )
-from triaxcal.fit.grouping import GroupedReadings, group_dwells, grouped_readings
-from triaxcal.fit.thermal import piecewise_linear_shape, polynomial_shape
-from triaxcal.fit.tilter import constants_of, estimator_operators
-from triaxcal.unitfile import ESTIMATORS
+from triaxcal.fit.tilter.estimators import constants_of, estimator_operators
+from triaxcal.unit.description import ESTIMATORS
 
 EPS = np.finfo(float).eps
 

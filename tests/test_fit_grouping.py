@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from fit_cases import SEVEN, TABLE_TEMPS, cubic_truth, readings, with_checks
-from triaxcal.errors import RefusedError
-from triaxcal.fit.grouping import (
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.grouping import (
     GROUP_GAP_DEGC,
     check_position_dwells,
     group_dwells,
     grouped_readings,
 )
-from triaxcal.records import MeasurementSet
+from triaxcal.readings.measurements import MeasurementSet
 
 
 def measured(temps=TABLE_TEMPS, **options) -> MeasurementSet:

@@ -21,10 +21,10 @@ from fit_cases import (
     tables_truth,
     with_checks,
 )
-from triaxcal.errors import RefusedError
-from triaxcal.fit.grouping import group_dwells
-from triaxcal.fit.plausibility import refuse_exchanged_positions, refuse_mistaken_units
-from triaxcal.records import MeasurementSet
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.grouping import group_dwells
+from triaxcal.fit.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
+from triaxcal.readings.measurements import MeasurementSet
 
 POSITIONS = ("TP1", "TP2", "TP3", "TP4", "TP5", "TP6")
 TRANSPOSITIONS = list(combinations(POSITIONS, 2))

@@ -18,12 +18,13 @@ from fit_cases import (
     unit,
     with_checks,
 )
-from triaxcal.fit.calibrate import Calibration, calibrate
-from triaxcal.fit.selection import PREFERENCE, candidate_shapes
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.fit.tilter.selection import PREFERENCE, candidate_shapes
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import TEST_POSITIONS
-from triaxcal.records import MeasurementSet
-from triaxcal.unitfile import ESTIMATORS, ThermalChoice
+from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.unit.description import ESTIMATORS, ThermalChoice
 
 BETWEEN = (-30.0, -10.0, 10.0, 30.0, 62.0)
 

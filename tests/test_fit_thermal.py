@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fit_cases import SEVEN, TABLE_TEMPS, TABLES, TABLES_PRINTED, cubic_truth
-from triaxcal.errors import RefusedError
-from triaxcal.fit.thermal import (
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.thermal import (
     ThermalShape,
     dense_knots,
     piecewise_linear_shape,

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fit_cases import TABLES, random_constants
-from triaxcal.errors import RefusedError
-from triaxcal.fit.tilter import (
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.tilter.estimators import (
     constants_covariance,
     constants_of,
     design_matrix,
@@ -19,7 +19,7 @@ from triaxcal.fit.tilter import (
 )
 from triaxcal.model.metrological import CONSTANT_NAMES, unpack_constants, voltage_from_force
 from triaxcal.model.positions import TEST_POSITIONS
-from triaxcal.unitfile import ESTIMATORS
+from triaxcal.unit.description import ESTIMATORS
 
 EPS = np.finfo(float).eps
 FORCES = np.array(list(TEST_POSITIONS.values()), dtype=float)

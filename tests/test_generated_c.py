@@ -24,13 +24,13 @@ from plans import (
     random_plan,
     vectors,
 )
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import limb_split
 from triaxcal.codegen.routines import Answers, Generated, Reference
 from triaxcal.fixedpoint.plan import Plan
-from triaxcal.resources import shipped
 
 MAIN = Path(__file__).parent / "run_vectors.c"
 STRICT = [flag for flag in FLAGS if flag != "-O2"]

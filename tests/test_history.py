@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.history import history as command
 from triaxcal.cli.main import main
-from triaxcal.errors import RefusedError
-from triaxcal.fit.calibrate import calibrate
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.truth import Imperfections, Truth, read_truth
 from triaxcal.simulation.unit import write_simulated_unit
@@ -27,7 +27,7 @@ from triaxcal.uncertainty.history import (
     read_history,
     repeatability,
 )
-from triaxcal.unitfile import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
+from triaxcal.unit.description import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
 
 WARNING = re.compile(
     r"warning: calibration (?P<name>\S+) contradicts (?P<before>\S+): (?P<constant>\w+) at "

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 import oracle
 from builds import Built
 from plans import COVERING, GOLDEN, INT32_MAX, INT32_MIN, disturbed, random_plan
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.routines import Reference
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.plan import Plan
 
 NOTHING = np.zeros(0, np.int32), np.zeros((0, 3), np.int32)
@@ -295,7 +295,7 @@ def test_words_are_assembled_from_bytes(built: dict[str, Built], source: str) ->
     """No host word is read from the image, so the host's byte order cannot matter."""
     folder = built["direct-checked"].folder
     if source == "triax_ref_image.c":
-        from triaxcal.resources import shipped
+        from triaxcal.base.shipped import shipped
 
         folder = shipped("firmware_ref")
     code = re.sub(r"/\*.*?\*/", "", (folder / source).read_text(encoding="utf-8"), flags=re.DOTALL)

@@ -13,10 +13,10 @@ import pytest
 import oracle
 from builds import PROVENANCE
 from plans import SENSOR
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.forces import forces_of
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.imu import ImuBuild, build_imu, rate_bound
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.gyro import TriadDescription, make_gyro_plan
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import make_plan
@@ -30,7 +30,7 @@ from triaxcal.model.imu import (
 )
 from triaxcal.model.terms import EXAMPLE_TERMS, NO_TERMS, Terms
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
-from triaxcal.unitfile import Adc, TemperatureSensor
+from triaxcal.unit.description import Adc, TemperatureSensor
 
 RANGE = (-40.0, 85.0)
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)

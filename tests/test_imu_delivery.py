@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from triaxcal import imudelivery
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
 from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
+from triaxcal.deliver import imu as imudelivery
+from triaxcal.deliver.imu import ImuC, ImuDelivery, deliver_imu
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.imumodel import imu_model
-from triaxcal.errors import RefusedError
-from triaxcal.imudelivery import ImuC, ImuDelivery, deliver_imu
 from triaxcal.model.imu import ImuModel, compensate_imu
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary

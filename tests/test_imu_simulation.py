@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuSamples
-from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation import imu, imu_noise
 from triaxcal.simulation.imu import simulate_imu

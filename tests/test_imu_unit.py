@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.description import _LAYOUT, read_dynamic
 from triaxcal.dynamic.reading import read_recording
 from triaxcal.dynamic.registry import extensions
-from triaxcal.errors import RefusedError
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
 from triaxcal.simulation.imu_motion import three_axes

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from triaxcal.jsontext import json_bytes
+from triaxcal.base.jsontext import json_bytes
 
 
 def test_what_is_written_is_read_back() -> None:

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from triaxcal.delivery import Delivery, deliver
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
+from triaxcal.deliver.unit import Delivery, deliver
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.files import all_files
 from triaxcal.report.passport.content import Passport, passport

@@ -26,7 +26,7 @@ from triaxcal.fixedpoint.plan import MAX_TEMPERATURE_CODES, Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.compensation import DIRECT, INVERSE, Compensation, compensate
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
-from triaxcal.unitfile import METHODS, TemperatureSensor, UnitDescription
+from triaxcal.unit.description import METHODS, TemperatureSensor, UnitDescription
 
 SQUARES = [1e-2 * slope for slope in TABLE_SLOPES]
 EPS = np.finfo(np.float64).eps

@@ -15,7 +15,7 @@ from plans import (
     polynomial_model,
     unit_of,
 )
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.compensation import (
@@ -25,7 +25,7 @@ from triaxcal.model.compensation import (
 )
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
-from triaxcal.unitfile import METHODS, TemperatureSensor, UnitDescription
+from triaxcal.unit.description import METHODS, TemperatureSensor, UnitDescription
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 """45 codes from -40 to 70 degC: few enough for fractions."""

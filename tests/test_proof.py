@@ -28,8 +28,8 @@ from plans import (
     unit_of,
     with_quadratic,
 )
-from triaxcal.delivery import Delivery
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
+from triaxcal.deliver.unit import Delivery
 from triaxcal.fixedpoint import integer_model
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import check_ranges, prove
@@ -41,7 +41,7 @@ from triaxcal.model.compensation import (
 )
 from triaxcal.model.metrological import pack_constants
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
-from triaxcal.unitfile import METHODS, TemperatureSensor, UnitDescription
+from triaxcal.unit.description import METHODS, TemperatureSensor, UnitDescription
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 """45 codes from -40 to 70 degC: few enough for fractions."""

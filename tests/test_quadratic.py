@@ -23,17 +23,17 @@ from plans import (
     unit_of,
     with_quadratic,
 )
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.crosscheck import cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images
 from triaxcal.codegen.routines import Generated, Reference, start_generated
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.terms import EXAMPLE_TERMS, Terms
-from triaxcal.unitfile import TemperatureSensor, UnitDescription
+from triaxcal.unit.description import TemperatureSensor, UnitDescription
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 """45 codes from -40 to 70 degC: few enough for fractions."""

@@ -12,19 +12,19 @@ import pytest
 import oracle
 from builds import PROVENANCE, write_generated
 from plans import SENSOR, TABLE_SLOPES, TABLE_T0, polynomial_model, unit_of
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.crosscheck import cross_check, vector_sets
 from triaxcal.codegen.forces import rates_of
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images
 from triaxcal.codegen.render import render_constants
 from triaxcal.codegen.routines import Reference, routines_of, start_generated
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, RateTerm, Terms
-from triaxcal.unitfile import TemperatureSensor, UnitDescription
+from triaxcal.unit.description import TemperatureSensor, UnitDescription
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 TERM = EXAMPLE_RATE

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from triaxcal.errors import RefusedError
-from triaxcal.records import Dwell, read_measurements, volts, write_measurements
-from triaxcal.records_csv import DEVIATIONS, READINGS
-from triaxcal.unitfile import (
+from triaxcal.base.errors import RefusedError
+from triaxcal.readings.measurements import Dwell, read_measurements, volts, write_measurements
+from triaxcal.readings.measurements_csv import DEVIATIONS, READINGS
+from triaxcal.unit.description import (
     Adc,
     Limits,
     TemperatureSensor,

@@ -13,18 +13,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strategies import constants, forces_g, temperatures_degc
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import read_toml
 from triaxcal.model.metrological import CONSTANT_NAMES, force_from_voltage, unpack_constants
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
-from triaxcal.records import Dwell, read_measurements
+from triaxcal.readings.measurements import Dwell, read_measurements
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.tilts import TILT_DEG, truth_force_g
 from triaxcal.simulation.truth import Plan, Truth, read_truth
 from triaxcal.simulation.unit import write_simulated_unit
-from triaxcal.tomltable import read_toml
-from triaxcal.unitfile import UnitDescription, read_unit
+from triaxcal.unit.description import UnitDescription, read_unit
 
 UNITS = Path(__file__).parent.parent / "units"
 SIM = UNITS / "AT-SIM"

@@ -12,9 +12,10 @@ import pytest
 from scipy import stats
 
 import fit_cases
-from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.model.positions import TEST_POSITIONS
-from triaxcal.records import Dwell, MeasurementSet, read_measurements
+from triaxcal.readings.measurements import Dwell, MeasurementSet, read_measurements
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.rig import Rig, rotation
 from triaxcal.simulation.truth import Imperfections, Truth, read_truth
@@ -26,7 +27,7 @@ from triaxcal.uncertainty.heldout import held_out, thermal_error
 from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance, weights
 from triaxcal.uncertainty.propagation import ROWS, propagation, rows_of
 from triaxcal.uncertainty.scatter import scatter
-from triaxcal.unitfile import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
+from triaxcal.unit.description import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
 
 UNITS = Path(__file__).parent.parent / "units"
 DEVICE = Device(24, (0.75, 0.75, 0.75), 5e-7)

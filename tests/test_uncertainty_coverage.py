@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from triaxcal.fit.calibrate import calibrate
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.rig import Rig
 from triaxcal.simulation.truth import Imperfections, read_truth
 from triaxcal.uncertainty.evaluate import uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS
-from triaxcal.unitfile import StatedUncertainty, ThermalChoice, read_unit
+from triaxcal.unit.description import StatedUncertainty, ThermalChoice, read_unit
 
 AT_SIM = Path(__file__).parent.parent / "units" / "AT-SIM"
 TEMPS = np.array([-35.0, -5.0, 20.0, 48.0, 66.0])

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from strategies import unit_names
-from triaxcal.errors import RefusedError
-from triaxcal.unitfile import (
+from triaxcal.base.errors import RefusedError
+from triaxcal.unit.description import (
     _LAYOUT,
     METHODS,
     Adc,

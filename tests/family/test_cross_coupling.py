@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from triaxcal.errors import RefusedError
-from triaxcal.fit.family.cross_coupling import (
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.pair.cross_coupling import (
     condition_number,
     converged_at,
     design,

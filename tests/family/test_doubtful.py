@@ -12,8 +12,8 @@ from family_cases import COLUMNS, U0, K, directions, log, write_unit
 from test_recordings import WITH_GYRO, calibrated, left_handed
 from test_tables import AIR, HEADER, rows_of, table
 
-from triaxcal.errors import RefusedError
-from triaxcal.fit.family.outliers import worst_outlier
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.outliers import worst_outlier
 from triaxcal.model.types import FloatArray
 from triaxcal.report.temperatures import with_room
 

@@ -13,9 +13,9 @@ from family_cases import COLUMNS, U0, K, csv_text, directions, log, write_unit
 from scipy.io import savemat
 from test_recordings import calibrated, found
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
 from triaxcal.dynamic.reading import _doubles
-from triaxcal.errors import RefusedError
 
 UNITS = Path(__file__).parents[2] / "units"
 TEXT = csv_text(log(directions(10)), "t,ax,ay,az")

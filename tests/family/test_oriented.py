@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import normal_equations
 import numpy as np
 import pytest
 
-from triaxcal.fit.family import normal_equations
-from triaxcal.fit.family.harmonics import full_turn, plane_tilt
-from triaxcal.fit.family.oriented import (
+from triaxcal.fit.table.harmonics import full_turn, plane_tilt
+from triaxcal.fit.table.oriented import (
     TRACELESS,
     SerialGrid,
     inverse_linear,

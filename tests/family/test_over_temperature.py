@@ -10,9 +10,9 @@ from family_cases import COLUMNS, U0, K, directions, log, write_unit
 from scipy.optimize import least_squares
 from test_recordings import calibrated, symmetric_part
 
-from triaxcal.delivery import deliver
-from triaxcal.errors import RefusedError
-from triaxcal.fit.family.temperatures import temperature_groups
+from triaxcal.base.errors import RefusedError
+from triaxcal.deliver.unit import deliver
+from triaxcal.fit.recorded.temperatures import temperature_groups
 from triaxcal.model.types import FloatArray
 
 WITH_T = COLUMNS + '\ntemperature = "T"'

@@ -10,10 +10,10 @@ from family_cases import U0, K, directions, log, write_unit
 from test_recordings import calibrated, found, symmetric_part
 from test_tables import AIR, HEADER, wide
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.batch.plan import _order
-from triaxcal.delivery import deliver
-from triaxcal.errors import RefusedError
-from triaxcal.fit.family.cross_coupling import terms_of_pair
+from triaxcal.deliver.unit import deliver
+from triaxcal.fit.pair.cross_coupling import terms_of_pair
 from triaxcal.model.orientation import AIRCRAFT, gravity_direction
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray

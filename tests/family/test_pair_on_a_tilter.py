@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from triaxcal.delivery import Delivery, deliver
-from triaxcal.fit.calibrate import calibrate
-from triaxcal.fit.family.cross_coupling import fit_pair, pair_terms, stated_pair, terms_of_pair
+from triaxcal.deliver.unit import Delivery, deliver
+from triaxcal.fit.pair.cross_coupling import fit_pair, pair_terms, stated_pair, terms_of_pair
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray
-from triaxcal.records import MEASUREMENTS_FILE, read_measurements, write_measurements
-from triaxcal.records_csv import DEVIATIONS, READINGS
+from triaxcal.readings.measurements import MEASUREMENTS_FILE, read_measurements, write_measurements
+from triaxcal.readings.measurements_csv import DEVIATIONS, READINGS
 from triaxcal.report.passport.content import Passport, passport
 from triaxcal.simulation.dwells import simulate_codes
 from triaxcal.simulation.truth import Truth, read_truth
 from triaxcal.uncertainty.evaluate import uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.description import read_unit
 
 AT_SIM = Path(__file__).parent.parent.parent / "units" / "AT-SIM"
 PAIR = '\n[quadratic]\ncross_coupling = "pair.csv"\naxes = ["x", "y"]\n'

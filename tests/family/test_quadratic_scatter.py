@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from family_cases import U0, K, directions, write_unit
 
-from triaxcal.fit.family.route import calibrate_recording
-from triaxcal.fit.family.scalar import VISIBLE
+from triaxcal.fit.recorded.magnitude import VISIBLE
+from triaxcal.fit.route import calibrate_recording
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import products
 from triaxcal.uncertainty.evaluate import uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.description import read_unit
 
 SINGLE = 'rows = "poses"\nacceleration = ["ax", "ay", "az"]\nacceleration_unit = "m/s^2"'
 

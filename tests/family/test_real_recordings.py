@@ -11,12 +11,12 @@ import pytest
 from scipy.optimize import least_squares
 
 from recordings import recording
-from triaxcal.fit.calibrate import Calibration
-from triaxcal.fit.family.drift import Drift, study
-from triaxcal.fit.family.route import calibrate_recording
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.core.drift import Drift, study
+from triaxcal.fit.route import calibrate_recording
 from triaxcal.model.types import FloatArray
-from triaxcal.recording.samples import read_samples
-from triaxcal.unitfile import read_unit
+from triaxcal.readings.samples import read_samples
+from triaxcal.unit.description import read_unit
 
 # mikoff/imu-calib, real_imu_table.png: scale errors in %, misalignments in deg, biases in m/s^2.
 PUBLISHED = {

@@ -10,8 +10,8 @@ from click.testing import CliRunner
 from family_cases import COLUMNS, directions, log, write_unit
 from test_doubtful import FACES, LABELS, labelled
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
-from triaxcal.errors import RefusedError
 
 
 def run(*arguments: str) -> str:

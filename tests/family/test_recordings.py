@@ -10,12 +10,12 @@ import pytest
 from family_cases import COLUMNS, U0, K, csv_text, directions, log, write_unit
 from scipy.io import savemat
 
-from triaxcal.delivery import deliver
-from triaxcal.errors import RefusedError
-from triaxcal.fit.calibrate import Calibration
-from triaxcal.fit.family.route import calibrate_recording
+from triaxcal.base.errors import RefusedError
+from triaxcal.deliver.unit import deliver
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.route import calibrate_recording
 from triaxcal.model.types import FloatArray
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.description import read_unit
 
 
 def calibrated(folder: Path) -> Calibration:

@@ -10,18 +10,18 @@ import pytest
 from family_cases import U0, K, write_unit
 from test_recordings import calibrated
 
-from triaxcal.delivery import deliver
-from triaxcal.errors import RefusedError
-from triaxcal.fit.family.route import calibrate_recording
-from triaxcal.fit.family.tables import _angle_residuals
+from triaxcal.base.errors import RefusedError
+from triaxcal.deliver.unit import deliver
+from triaxcal.fit.route import calibrate_recording
+from triaxcal.fit.table.calibrate import _angle_residuals
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.orientation import AIRCRAFT, INCLINOMETER, gravity_direction
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray
-from triaxcal.recordinglayout import Angles
 from triaxcal.uncertainty.evaluate import uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.description import read_unit
+from triaxcal.unit.recording import Angles
 
 ARCSEC = np.pi / 180.0 / 3600.0
 QUADRATIC = np.array([[1, -1, 0, 1, 0, 0], [0, 1, -1, 0, 0, 1], [0, 0, 0, 0, 1, 0]])

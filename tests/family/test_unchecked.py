@@ -11,9 +11,9 @@ from click.testing import CliRunner
 from family_cases import U0, K, directions, log, write_unit
 from test_recordings import found
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
-from triaxcal.delivery import deliver
-from triaxcal.errors import RefusedError
+from triaxcal.deliver.unit import deliver
 from triaxcal.model.types import FloatArray
 from triaxcal.report.dcc import certificate_xml
 from triaxcal.report.passport.content import passport

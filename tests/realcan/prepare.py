@@ -9,12 +9,12 @@ import numpy as np
 
 from triaxcal.cli.rig_fil import build_node
 from triaxcal.codegen.crosscheck import python_routine
-from triaxcal.delivery import deliver
+from triaxcal.deliver.unit import deliver
 from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import BATCH, vectors
 from triaxcal.rig.plan import read_plan
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.description import read_unit
 
 SAMPLES = 5000
 REPO = Path(__file__).parents[2]

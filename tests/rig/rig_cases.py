@@ -12,7 +12,7 @@ from triaxcal.rig.runner import Robot
 from triaxcal.rig.simorders import read_fault
 from triaxcal.rig.simulator import RigSettings, SimulatedRig
 from triaxcal.simulation.truth import read_truth
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.description import read_unit
 
 REPO = Path(__file__).parents[2]
 BENCH = REPO / "units" / "AT-SIM-BENCH"

@@ -12,7 +12,7 @@ import pytest
 from rig_cases import rig_of, short_setup
 from test_candump import mixed, same
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.rig.candump import format_frames
 from triaxcal.rig.dbc import default_dbc
 from triaxcal.rig.export import WRITERS, export_log

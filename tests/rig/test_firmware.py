@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from rig_cases import REPO, dbc, short_setup
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.rig_fil import build_node, firmware_in_the_loop, node_on
 from triaxcal.codegen.compiler import compile_library
 from triaxcal.codegen.crosscheck import python_routine
-from triaxcal.delivery import deliver
-from triaxcal.errors import RefusedError
+from triaxcal.deliver.unit import deliver
 from triaxcal.rig.dbc import REQUIRED
 from triaxcal.rig.e2e import frame_crc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import exchange, packing_source, vectors
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.description import read_unit
 
 FIRMWARE = REPO / "rig" / "firmware"
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rig_cases import dbc
 
 from recordings import recording
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.rig.candump import read_log
 from triaxcal.rig.dbc import REQUIRED, default_dbc, layout_of, load_database, read_dbc
 from triaxcal.rig.e2e import crc8, crc32p4

@@ -21,8 +21,8 @@ import pytest
 from rig_cases import rig_of, short_setup
 from test_cli_rig import bench_copy, triaxcal
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.rig import rig
-from triaxcal.errors import RefusedError
 from triaxcal.rig.candump import parse
 from triaxcal.rig.check import findings
 from triaxcal.rig.frames import empty

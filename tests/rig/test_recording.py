@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from rig_cases import play, rig_of, short_setup
 
-from triaxcal.errors import RefusedError
-from triaxcal.records import read_measurements
+from triaxcal.base.errors import RefusedError
+from triaxcal.readings.measurements import read_measurements
 from triaxcal.rig.events import Redo
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.journal import Journal, read_journal
@@ -271,7 +271,7 @@ def test_a_full_disk_ends_the_session_with_an_intact_prefix(tmp_path, limit):
         "import resource, signal, sys; from pathlib import Path\n"
         "sys.path[:0] = [sys.argv[3]]\n"
         "from rig_cases import *; from triaxcal.rig.recording import Recording\n"
-        "from triaxcal.errors import RefusedError\n"
+        "from triaxcal.base.errors import RefusedError\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "folder = Path(sys.argv[1]); setup = short_setup(folder, temps='[20]')\n"
         "n = int(sys.argv[2]); resource.setrlimit(resource.RLIMIT_FSIZE, (n, n))\n"

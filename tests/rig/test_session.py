@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rig_cases import bench_unit, play, rig_of, short_setup
 
-from triaxcal.errors import RefusedError, UsageError
+from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.events import Agree, Redo
 from triaxcal.rig.orientation import recognised

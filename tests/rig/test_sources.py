@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rig_cases import rig_of, short_setup
 
-from triaxcal.errors import RefusedError, UsageError
+from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.rig.frames import concatenate
 from triaxcal.rig.socketcan import SocketSource, open_refusal, packed
 from triaxcal.rig.sources import SimulatedSource, open_bus

@@ -20,10 +20,10 @@ from plans import (
     random_rows,
     with_quadratic,
 )
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import Provenance, render_constants, render_routine
-from triaxcal.errors import RefusedError
-from triaxcal.resources import shipped
 from triaxcal.targets import bench_table, cores, counting, matrix
 from triaxcal.targets.bench import Subject, _write_subject, cost_of
 from triaxcal.targets.build import TargetError, Toolset, build, emulate

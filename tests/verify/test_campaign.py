@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from triaxcal.errors import RefusedError
-from triaxcal.jsontext import json_bytes
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.jsontext import json_bytes
 from triaxcal.verify import campaign
 from triaxcal.verify.campaign import CHECKS, exit_code, verify_files
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome

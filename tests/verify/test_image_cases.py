@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.image_cases import ROW_LIMIT, check_images, image_cases, sum_of_floors
 from triaxcal.codegen.routines import Generated, Reference, start_generated, start_reference
-from triaxcal.errors import RefusedError
 from triaxcal.verify.shapes import SHAPES, Subject
 from triaxcal.verify.workspace import IMAGE, Workspace
 from verify.conftest import Planter

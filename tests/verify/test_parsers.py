@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from triaxcal.errors import RefusedError
-from triaxcal.records import read_measurements
-from triaxcal.unitfile import read_unit
+from triaxcal.base.errors import RefusedError
+from triaxcal.readings.measurements import read_measurements
+from triaxcal.unit.description import read_unit
 from verify.conftest import UNITS
 
 PIECES = st.sampled_from([

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlsplit
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Make, Order, Outcome, filled, refused
 from triaxcal.batch.toolchain import toolchain
-from triaxcal.errors import RefusedError
 
 UNDER_WAY = 3
 """Units sent for each thread of the workers: none waits for us, and few are in memory."""

@@ -12,9 +12,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.publish import renew
 from triaxcal.batch.order import Outcome
-from triaxcal.errors import RefusedError
-from triaxcal.publish import renew
 
 JOURNAL_FILE = "series.jsonl"
 FORMAT = 1

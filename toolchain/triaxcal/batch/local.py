@@ -19,8 +19,8 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Make, Order, Outcome, filled, refused
-from triaxcal.errors import RefusedError
 
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """A worker is a core's worth: libraries that would start threads of their own are told so."""

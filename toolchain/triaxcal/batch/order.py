@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import has_table, read_toml
 from triaxcal.batch import journal
 from triaxcal.batch.order import Order, Outcome, planned, refused
 from triaxcal.batch.toolchain import toolchain
-from triaxcal.errors import RefusedError
-from triaxcal.recordinglayout import is_in_folder
-from triaxcal.records import MEASUREMENTS_FILE
-from triaxcal.tomltable import has_table, read_toml
-from triaxcal.unitfile import UNIT_FILE, find_unit, list_units
+from triaxcal.readings.measurements import MEASUREMENTS_FILE
+from triaxcal.unit.description import UNIT_FILE, find_unit, list_units
+from triaxcal.unit.recording import is_in_folder
 
 
 @dataclass(frozen=True)

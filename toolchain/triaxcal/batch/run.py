@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.publish import publish
 from triaxcal.batch import journal
 from triaxcal.batch.order import Make, Outcome, Runner
 from triaxcal.batch.plan import Work
-from triaxcal.errors import RefusedError
-from triaxcal.publish import publish
 
 
 @dataclass

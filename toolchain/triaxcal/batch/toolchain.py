@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal import __version__
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import find_compiler
-from triaxcal.resources import shipped
 
 
 @cache

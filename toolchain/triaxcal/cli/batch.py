@@ -18,14 +18,14 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.publish import renew
 from triaxcal.batch import journal
 from triaxcal.batch.cluster import connect, run_cluster, workers
 from triaxcal.batch.local import cores, run_local
 from triaxcal.batch.order import Make, Order, Outcome, Runner
 from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import Series, run_series
-from triaxcal.errors import RefusedError
-from triaxcal.publish import renew
 from triaxcal.report.files import SOMETIMES
 from triaxcal.report.series.page import PAGE_FILE, series_files
 from triaxcal.report.series.summary import series_summary

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.design.problem import read_problem
 from triaxcal.design.search import best, usual
 from triaxcal.design.words import comparison, rig_plan
-from triaxcal.errors import RefusedError
 
 
 @click.command()

@@ -14,7 +14,7 @@ from click.termui import progressbar
 from triaxcal.cli.options import unit_and_build
 
 if TYPE_CHECKING:
-    from triaxcal.imudelivery import ImuDelivery
+    from triaxcal.deliver.imu import ImuDelivery
 
 
 @click.command()
@@ -34,7 +34,7 @@ def dynamic(unit: Path, build: Path, plan: bool) -> None:
 
 def tell_plan(unit: Path) -> None:
     """Print what a planned motion will let see; nothing is written."""
-    from triaxcal.imuplan import plan_unit  # noqa: PLC0415
+    from triaxcal.design.imu import plan_unit  # noqa: PLC0415
     from triaxcal.report.dynamic import plan_summary  # noqa: PLC0415
 
     with _bar() as progress:
@@ -44,7 +44,7 @@ def tell_plan(unit: Path) -> None:
 
 def calibrate_imu(unit: Path, build: Path) -> None:
     """Do the work of `triaxcal dynamic`, and of `triaxcal calib` for a unit with [dynamic]."""
-    from triaxcal.publish import publish  # noqa: PLC0415
+    from triaxcal.base.publish import publish  # noqa: PLC0415
     from triaxcal.report.dynamic import dynamic_files, dynamic_summary  # noqa: PLC0415
     from triaxcal.report.imuc import C_FILES  # noqa: PLC0415
 
@@ -57,7 +57,7 @@ def calibrate_imu(unit: Path, build: Path) -> None:
 
 def delivered_imu(unit: Path) -> ImuDelivery:
     """Calibrate the IMU and make its C, with a bar of progress."""
-    from triaxcal.imudelivery import deliver_imu  # noqa: PLC0415
+    from triaxcal.deliver.imu import deliver_imu  # noqa: PLC0415
 
     with _bar() as progress:
         return deliver_imu(unit, progress)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.delivery import Delivery
+from triaxcal.deliver.unit import Delivery
 from triaxcal.report.history import contradiction, history_text
 from triaxcal.uncertainty.history import (
     Calibrated,
@@ -15,7 +15,7 @@ from triaxcal.uncertainty.history import (
     read_history,
     repeatability,
 )
-from triaxcal.unitfile import read_unit
+from triaxcal.unit.description import read_unit
 
 
 @click.command()

@@ -10,9 +10,8 @@ from pathlib import Path
 import click
 
 from triaxcal import __version__
-from triaxcal.cli.entry import INTERRUPTED
+from triaxcal.base.errors import RefusedError
 from triaxcal.cli.options import unit_and_build
-from triaxcal.errors import RefusedError
 
 
 class _Commands(click.Group):
@@ -47,16 +46,16 @@ def calib(unit: Path, build: Path) -> None:
 
     A unit whose unit.toml has [dynamic] is an IMU: the same as `triaxcal dynamic`.
     """
-    from triaxcal.tomltable import has_table  # noqa: PLC0415
-    from triaxcal.unitfile import find_unit  # noqa: PLC0415
+    from triaxcal.base.tomltable import has_table  # noqa: PLC0415
+    from triaxcal.unit.description import find_unit  # noqa: PLC0415
 
     if has_table(find_unit(unit), "dynamic"):
         from triaxcal.cli.dynamic import calibrate_imu  # noqa: PLC0415
 
         calibrate_imu(unit, build)
         return
-    from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
-    from triaxcal.publish import publish  # noqa: PLC0415
+    from triaxcal.base.publish import publish  # noqa: PLC0415
+    from triaxcal.deliver.unit import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415
@@ -112,7 +111,7 @@ def run() -> None:
         wrong.show()
         sys.exit(2)
     except click.Abort:
-        _leave(INTERRUPTED, 1)
+        raise KeyboardInterrupt from None  # click's word for it; `entry` says it
     except BrokenPipeError:
         # The reader of our output went away; what was to be written has been.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -13,7 +13,7 @@ import click
 def poses(unit: Path, picture: Path | None) -> None:
     """Show the poses in the recording of UNIT, a folder with unit.toml."""
     from triaxcal.cli.recorded import recorded, write_picture  # noqa: PLC0415
-    from triaxcal.recording.poses import find_poses  # noqa: PLC0415
+    from triaxcal.poses.poses import find_poses  # noqa: PLC0415
     from triaxcal.report.studies import poses_picture, poses_text  # noqa: PLC0415
 
     layout, samples = recorded(unit)

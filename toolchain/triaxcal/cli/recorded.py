@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 
 if TYPE_CHECKING:
-    from triaxcal.recording.samples import Samples
-    from triaxcal.recordinglayout import RecordingLayout
+    from triaxcal.readings.samples import Samples
+    from triaxcal.unit.recording import RecordingLayout
 
 
 def recorded(folder: Path) -> tuple[RecordingLayout, Samples]:
@@ -20,9 +20,9 @@ def recorded(folder: Path) -> tuple[RecordingLayout, Samples]:
     RefusedError
         When the unit has none, or it cannot be read.
     """
-    from triaxcal.recording.samples import read_samples  # noqa: PLC0415
-    from triaxcal.tomltable import has_table  # noqa: PLC0415
-    from triaxcal.unitfile import find_unit, read_unit  # noqa: PLC0415
+    from triaxcal.base.tomltable import has_table  # noqa: PLC0415
+    from triaxcal.readings.samples import read_samples  # noqa: PLC0415
+    from triaxcal.unit.description import find_unit, read_unit  # noqa: PLC0415
 
     if has_table(find_unit(folder), "dynamic"):
         raise RefusedError(

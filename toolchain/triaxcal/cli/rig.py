@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 
 if TYPE_CHECKING:
     from triaxcal.rig.engine import Setup
@@ -73,11 +73,11 @@ _SESSIONS = click.option(
 
 
 def _setup(unit: str, plan: Path | None, dbc: Path | None) -> Setup:
-    from triaxcal.resources import shipped  # noqa: PLC0415
+    from triaxcal.base.shipped import shipped  # noqa: PLC0415
     from triaxcal.rig.dbc import default_dbc, read_dbc  # noqa: PLC0415
     from triaxcal.rig.engine import Setup  # noqa: PLC0415
     from triaxcal.rig.plan import read_plan  # noqa: PLC0415
-    from triaxcal.unitfile import read_unit  # noqa: PLC0415
+    from triaxcal.unit.description import read_unit  # noqa: PLC0415
 
     folder = Path(unit) if "/" in unit else Path("units") / unit
     description = read_unit(folder)

@@ -9,11 +9,11 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS, find_compiler
 from triaxcal.codegen.crosscheck import python_routine
-from triaxcal.delivery import deliver
-from triaxcal.errors import RefusedError
-from triaxcal.resources import shipped
+from triaxcal.deliver.unit import deliver
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import CODE_BITS, NODE_SOURCES, Agreement, exchange, packing_source, vectors
 from triaxcal.rig.socketcan import can_socket, open_refusal

@@ -18,7 +18,7 @@ import click
 from rich.console import Console
 from rich.live import Live
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.rig import recording, runner, store
 from triaxcal.rig.engine import Setup

@@ -28,7 +28,7 @@ def test(unit: Path | None, build: Path) -> None:
     UNIT is a folder with unit.toml and measurements.csv; without it, the shapes of the shipped
     units in units/ are tried. Exit code 1 unless every build was done and passed.
     """
-    from triaxcal.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
+    from triaxcal.base.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.targets.matrix import (  # noqa: PLC0415
         PASSED,
         Outcome,
@@ -72,7 +72,7 @@ def bench(build: Path, page: Path | None) -> None:
 
     Exit code 1 unless everything was measured.
     """
-    from triaxcal.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
+    from triaxcal.base.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.targets.bench import Cost, compiler_versions, run_bench  # noqa: PLC0415
     from triaxcal.targets.bench_table import (  # noqa: PLC0415
         bench_json,

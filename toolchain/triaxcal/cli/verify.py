@@ -19,8 +19,8 @@ def verify(unit: Path, build: Path) -> None:
     UNIT is calibrated as by `calib`; the results go into its verification.json. Exit code 1 when
     a check failed; tools that are not installed are named, and their checks count as not done.
     """
-    from triaxcal.tomltable import has_table  # noqa: PLC0415
-    from triaxcal.unitfile import find_unit  # noqa: PLC0415
+    from triaxcal.base.tomltable import has_table  # noqa: PLC0415
+    from triaxcal.unit.description import find_unit  # noqa: PLC0415
 
     run = _verify_imu if has_table(find_unit(unit), "dynamic") else _verify_accelerometer
     target, code = run(unit, build)
@@ -29,8 +29,8 @@ def verify(unit: Path, build: Path) -> None:
 
 
 def _verify_accelerometer(unit: Path, build: Path) -> tuple[Path, int]:
-    from triaxcal.delivery import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
-    from triaxcal.publish import publish, renew  # noqa: PLC0415
+    from triaxcal.base.publish import publish, renew  # noqa: PLC0415
+    from triaxcal.deliver.unit import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.report.files import SOMETIMES, all_files, passport_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.verify.campaign import (  # noqa: PLC0415
@@ -57,9 +57,9 @@ def _verify_accelerometer(unit: Path, build: Path) -> tuple[Path, int]:
 
 
 def _verify_imu(unit: Path, build: Path) -> tuple[Path, int]:
+    from triaxcal.base.publish import publish, renew  # noqa: PLC0415
     from triaxcal.cli.dynamic import delivered_imu  # noqa: PLC0415
     from triaxcal.dynamic.description import read_dynamic  # noqa: PLC0415
-    from triaxcal.publish import publish, renew  # noqa: PLC0415
     from triaxcal.report.dynamic import dynamic_files  # noqa: PLC0415
     from triaxcal.report.dynamicpage import dynamic_page  # noqa: PLC0415
     from triaxcal.report.imuc import C_FILES, refuse_no_device  # noqa: PLC0415

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 
 FLAGS = (
     "-std=c99", "-O2", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion",

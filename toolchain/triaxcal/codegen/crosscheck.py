@@ -13,10 +13,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.forces import forces_of, rates_of
 from triaxcal.codegen.routines import Answers, Generated, Int32Array, Routine
 from triaxcal.codegen.ties import ties
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.exact import exact_error_lsb
 from triaxcal.fixedpoint.integer_model import (
     STATUS_OK,

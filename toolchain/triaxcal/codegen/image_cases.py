@@ -16,24 +16,30 @@ from random import Random
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.image import QUADRATIC, RATE, SENSITIVITY, header_names, terms_word
+from triaxcal.codegen.image_layout import (
+    GAIN,
+    INT32_MAX,
+    INT32_MIN,
+    ORIGIN,
+    RATE_GAIN,
+    RATE_MAX,
+    RATE_MIN,
+    RATE_WORDS,
+    Layout,
+)
 from triaxcal.codegen.inverse_edges import inverse_edges
 from triaxcal.codegen.rate_ties import rate_ties
 from triaxcal.codegen.routines import Generated, Reference
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.integer_model import STATUS_BAD_IMAGE, STATUS_OK
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.compensation import INVERSE
 
-INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
-ROW_LIMIT, ROW_LIMIT_WITH_TERMS = 2**32 - 8, 3 * 2**30
 QUADRATIC_LIMIT, SENSITIVITY_LIMIT = 2**31 - 1, 2**29
 _TABLES = {0: (0, 0), QUADRATIC: (6, QUADRATIC_LIMIT), SENSITIVITY: (3, SENSITIVITY_LIMIT)}
-_RATE_MIN, _RATE_MAX, _RATE_GAIN, _RATE_WORDS = range(4)
-"""Columns and limit of a row of the table of terms."""
 SEED = 20130527
 WILD_IMAGES = 48
-_FIRST, _ORIGIN, _GAIN, _COEFFICIENTS = range(4)
 
 
 @dataclass(frozen=True)
@@ -43,96 +49,6 @@ class ImageCase:
     name: str
     image: bytes
     accepted: bool
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where the words of an image of one shape stand, and step R for them."""
-
-    header: int
-    segments: int
-    order: int
-    inverse: bool
-    columns: int = 0
-    limit: int = 0
-    rate: bool = False
-
-    @property
-    def temp_min(self) -> int:
-        """Index of temp_min_code."""
-        return self.header
-
-    @property
-    def temp_max(self) -> int:
-        """Index of temp_max_code."""
-        return self.header + 1
-
-    @property
-    def row_limit(self) -> int:
-        """Limit of a row."""
-        return ROW_LIMIT_WITH_TERMS if self.columns else ROW_LIMIT
-
-    def segment(self, s: int) -> int:
-        """Index of the first word of a segment."""
-        return self.header + 2 + s * (_COEFFICIENTS + 12 * (self.order + 1))
-
-    def term(self, row: int, k: int) -> int:
-        """Index of a word of the table of terms."""
-        return self.segment(self.segments) + self.columns * row + k
-
-    def coefficient(self, s: int, f: int, k: int) -> int:
-        """Index of c_k of a function."""
-        return self.segment(s) + _COEFFICIENTS + f * (self.order + 1) + k
-
-    def reaches(self, words: list[int]) -> list[tuple[int, int, int]]:
-        """First word of each segment, and its first and last temperature code."""
-        starts = [self.segment(s) for s in range(self.segments)]
-        firsts = [words[at] for at in starts]
-        lasts = [f - 1 for f in firsts[1:]] + [words[self.temp_max]]
-        return list(zip(starts, firsts, lasts, strict=True))
-
-    def is_safe(self, words: list[int]) -> bool:
-        """Step R: whether no arithmetic can overflow with these constants."""
-        low, high = words[self.temp_min], words[self.temp_max]
-        _, firsts, lasts = zip(*self.reaches(words), strict=True)
-        if firsts[0] != low or any(not low < f <= high for f in firsts[1:]):
-            return False
-        if self.rate and not self._rate_is_safe(words):
-            return False
-        for row in range(3):
-            if sum(abs(words[self.term(row, k)]) for k in range(self.columns)) > self.limit:
-                return False
-        return all(self._segment_is_safe(words, s, lasts[s]) for s in range(self.segments))
-
-    def rate_word(self, k: int) -> int:
-        """Index of a word of the term in dT/dt."""
-        return self.segment(self.segments) + 3 * self.columns + k
-
-    def _rate_is_safe(self, words: list[int]) -> bool:
-        low, high, gain = (words[self.rate_word(k)] for k in (_RATE_MIN, _RATE_MAX, _RATE_GAIN))
-        return low <= 0 <= high and gain > 0 and max(-low, high) * gain <= INT32_MAX
-
-    def _segment_is_safe(self, words: list[int], s: int, last: int) -> bool:
-        at = self.segment(s)
-        first, origin, gain = words[at : at + 3]
-        if gain <= 0 or first > last:
-            return False
-        if max(abs(first - origin), abs(last - origin)) * gain > INT32_MAX:
-            return False
-        ends = []
-        for f in range(12):
-            bound = 0
-            for k in range(self.order, -1, -1):
-                halved = 0 if k == self.order else bound // 2 + 1
-                bound = abs(words[self.coefficient(s, f, k)]) + halved
-                if bound > INT32_MAX:
-                    return False
-            ends.append(bound)
-        if self.rate:
-            for i in range(3):
-                ends[4 * i + 3] += abs(words[self.rate_word(_RATE_WORDS + i)]) // 2 + 1
-        rows = [sum(ends[4 * i : 4 * i + 3]) + 2 * ends[4 * i + 3] for i in range(3)]
-        return self.inverse or max(rows) < self.row_limit
 
 
 def check_images(plan: Plan, image: bytes, generated: Generated, reference: Reference) -> int:
@@ -224,36 +140,36 @@ def _temperature_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
     for value in (low - 1, low + 1):
         yield "temp_min_code", {layout.temp_min: value}
         yield "first_code", {starts[0]: value}
-    last_origin, last_gain = words[starts[-1] + _ORIGIN], words[starts[-1] + _GAIN]
+    last_origin, last_gain = words[starts[-1] + ORIGIN], words[starts[-1] + GAIN]
     reach = INT32_MAX // last_gain
     for value in (last_origin + reach, last_origin + reach + 1, low, low - 1, INT32_MAX, INT32_MIN):
         yield f"temp_max_code {value}", {layout.temp_max: value}
-    reach = INT32_MAX // words[starts[0] + _GAIN]
+    reach = INT32_MAX // words[starts[0] + GAIN]
     for beyond in (0, 1):
-        value = words[starts[0] + _ORIGIN] - reach - beyond
+        value = words[starts[0] + ORIGIN] - reach - beyond
         yield f"temp_min_code {value}", {layout.temp_min: value, starts[0]: value}
     firsts = [words[at] for at in starts]
     lasts = [f - 1 for f in firsts[1:]] + [high]
     for s, at in enumerate(starts):
         fullest = _fullest_gain(layout, words, s)
         for gain in (INT32_MIN, -1, 0, 1, fullest, fullest + 1, INT32_MAX):
-            yield f"gain {gain} of segment {s}", {at + _GAIN: gain}
+            yield f"gain {gain} of segment {s}", {at + GAIN: gain}
         for origin in (INT32_MIN, INT32_MAX, firsts[s], lasts[s]):
-            yield f"origin {origin} of segment {s}", {at + _ORIGIN: origin}
+            yield f"origin {origin} of segment {s}", {at + ORIGIN: origin}
         for beyond in (0, 1):
             # INT32_MAX is prime: only a gain of 1 reaches it exactly.
             origin = lasts[s] - INT32_MAX - beyond
-            yield f"origin {origin} of segment {s}", {at + _ORIGIN: origin, at + _GAIN: 1}
+            yield f"origin {origin} of segment {s}", {at + ORIGIN: origin, at + GAIN: 1}
         if s:
             # The segment before ends where its x does, or one code later.
             before = starts[s - 1]
-            end = words[before + _ORIGIN] + INT32_MAX // words[before + _GAIN]
+            end = words[before + ORIGIN] + INT32_MAX // words[before + GAIN]
             for first in (end + 1, end + 2):
-                yield f"first_code {first} of segment {s}, near", {at: first, at + _GAIN: 1}
+                yield f"first_code {first} of segment {s}, near", {at: first, at + GAIN: 1}
             # The order of the segments, with gains that any reach allows.
             for first in (INT32_MIN, low, low + 1, firsts[s - 1], high, high + 1, INT32_MAX):
                 yield f"first_code {first} of segment {s}", {
-                    at: first, at + _GAIN: 1, starts[s - 1] + _GAIN: 1
+                    at: first, at + GAIN: 1, starts[s - 1] + GAIN: 1
                 }  # fmt: skip
 
 
@@ -291,7 +207,7 @@ def _row_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
             }
             left -= sum(w * floors for w in weights)
             if layout.rate:
-                left -= 2 * (abs(words[layout.rate_word(_RATE_WORDS + row)]) // 2 + 1)
+                left -= 2 * (abs(words[layout.rate_word(RATE_WORDS + row)]) // 2 + 1)
             order = [j for j in range(4) if j != last] + [last]
             for j in order:
                 most = INT32_MAX - floors
@@ -315,7 +231,7 @@ def sum_of_floors(order: int) -> int:
 def _fullest_gain(layout: Layout, words: list[int], s: int) -> int:
     """The largest gain of a segment for which its x fits int32."""
     at, first, last = layout.reaches(words)[s]
-    return INT32_MAX // max(1, words[at + _ORIGIN] - first, last - words[at + _ORIGIN])
+    return INT32_MAX // max(1, words[at + ORIGIN] - first, last - words[at + ORIGIN])
 
 
 def _wild(layout: Layout, words: list[int]) -> Iterator[Change]:
@@ -325,7 +241,7 @@ def _wild(layout: Layout, words: list[int]) -> Iterator[Change]:
     """
     rng = Random(SEED)
     gains = {
-        layout.segment(s) + _GAIN: _fullest_gain(layout, words, s) for s in range(layout.segments)
+        layout.segment(s) + GAIN: _fullest_gain(layout, words, s) for s in range(layout.segments)
     }
     for number in range(WILD_IMAGES):
         size = 1 << rng.randrange(1, 31)
@@ -345,7 +261,7 @@ def _wild(layout: Layout, words: list[int]) -> Iterator[Change]:
             limit = layout.limit // (2 if number % 8 == 0 else layout.columns)
             change[layout.term(row, k)] = rng.randint(-limit, limit)
         for k in range(3 if layout.rate else 0):
-            change[layout.rate_word(_RATE_WORDS + k)] = rng.randint(-size // 2, size // 2)
+            change[layout.rate_word(RATE_WORDS + k)] = rng.randint(-size // 2, size // 2)
         yield f"wild {number}", change
 
 
@@ -391,13 +307,13 @@ def _rate_edges(layout: Layout, words: list[int]) -> Iterator[Change]:
         return
     at = layout.rate_word
     for low, high in ((0, 0), (1, 1), (-1, -1), (0, INT32_MAX), (-INT32_MAX, 0), (INT32_MIN, 0)):
-        yield f"rates {low} to {high}", {at(_RATE_MIN): low, at(_RATE_MAX): high, at(_RATE_GAIN): 1}
-    fastest = max(-words[at(_RATE_MIN)], words[at(_RATE_MAX)])
+        yield f"rates {low} to {high}", {at(RATE_MIN): low, at(RATE_MAX): high, at(RATE_GAIN): 1}
+    fastest = max(-words[at(RATE_MIN)], words[at(RATE_MAX)])
     fullest = INT32_MAX // fastest
     for gain in (INT32_MIN, -1, 0, 1, fullest, fullest + 1, INT32_MAX):
-        yield f"gain {gain} of the rate", {at(_RATE_GAIN): gain}
+        yield f"gain {gain} of the rate", {at(RATE_GAIN): gain}
     for row in range(3):
-        here = at(_RATE_WORDS + row)
+        here = at(RATE_WORDS + row)
         for value in (INT32_MIN, -INT32_MAX, INT32_MAX):
             yield f"rate word {value} of row {row}", {here: value}
         nothing = {

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal import __version__
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.crosscheck import RANDOM_VECTORS, CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images
@@ -33,7 +34,6 @@ from triaxcal.codegen.routines import (
     start_generated_imu,
     start_reference,
 )
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.integer_model import STATUS_BAD_IMAGE, STATUS_OK, apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan, Triad, make_plan

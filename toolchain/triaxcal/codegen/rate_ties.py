@@ -7,14 +7,10 @@ that border nowhere, so that a half that is one off would not be seen.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from triaxcal.codegen.image_layout import RATE_GAIN, RATE_MAX, RATE_MIN, RATE_WORDS, Layout
 from triaxcal.fixedpoint.shape import Shape
 
-if TYPE_CHECKING:
-    from triaxcal.codegen.image_cases import Layout
-
-_MIN, _MAX, _GAIN, _WORDS = range(4)
 _PRODUCTS = {"just below a half": (1, 2**31 - 1), "a half": (2, 2**30)}
 """Factors of r w = 2^31 - 1, which rounds to 0, and of 2^31, which rounds to 1."""
 
@@ -37,8 +33,11 @@ def rate_ties(layout: Layout, shape: Shape) -> Iterator[tuple[str, dict[int, int
             for k in range(layout.order + 1)
         }
         alone |= {layout.term(row, k): 0 for k in range(layout.columns)}
-        alone |= {layout.rate_word(_MIN): -1, layout.rate_word(_MAX): 1}
+        alone |= {layout.rate_word(RATE_MIN): -1, layout.rate_word(RATE_MAX): 1}
         for name, (word, gain) in _PRODUCTS.items():
             for sign in (1, -1):
-                words = {layout.rate_word(_WORDS + row): sign * word, layout.rate_word(_GAIN): gain}
+                words = {
+                    layout.rate_word(RATE_WORDS + row): sign * word,
+                    layout.rate_word(RATE_GAIN): gain,
+                }
                 yield f"{name} of row {row}, {sign:+d}", {**alone, **words}

@@ -11,6 +11,7 @@ from typing import Any
 import jinja2
 
 from triaxcal import __version__
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.image import header_names, header_words, image_size
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.gyro import SENSITIVITY_LIMIT, SENSITIVITY_NAMES, sensitivity_log2
@@ -21,8 +22,7 @@ from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.compensation import INVERSE
 from triaxcal.model.terms import PRODUCT_NAMES
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.resources import shipped
-from triaxcal.unitfile import TemperatureSensor
+from triaxcal.unit.description import TemperatureSensor
 
 ROUTINE_FILES = ("triax_comp.h", "triax_comp.c")
 _TERM_TABLES = (

@@ -11,11 +11,11 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import Compilation, compile_library
 from triaxcal.codegen.forces import forces_of, rates_of
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.rate import RatePlan
-from triaxcal.resources import shipped
 
 Int32Array = npt.NDArray[np.int32]
 UInt32Array = npt.NDArray[np.uint32]

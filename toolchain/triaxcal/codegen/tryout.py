@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.routines import Routine
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.integer_model import STATUS_OK
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import quadratic_log2
@@ -17,8 +17,8 @@ from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import products
 from triaxcal.model.thermal import ThermalModel
 from triaxcal.model.types import FloatArray
-from triaxcal.records import Dwell
-from triaxcal.unitfile import UnitDescription
+from triaxcal.readings.measurements import Dwell
+from triaxcal.unit.description import UnitDescription
 
 BEFORE = "before"
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import Layout, Table, read_tables
 from triaxcal.model.positions import AXES, TEST_POSITIONS
-from triaxcal.tomltable import Layout, Table, read_tables
-from triaxcal.unitfile import PLAUSIBLE_DEGC, T0_TOLERANCE_DEGC
+from triaxcal.unit.description import PLAUSIBLE_DEGC, T0_TOLERANCE_DEGC
 
 FORMAT = 1
 CANDIDATES_MAX = 16

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.block import StateBlock
 from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.blocks.base import BASE
@@ -19,7 +20,6 @@ from triaxcal.dynamic.preintegrate import NODES
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.survey import Survey, survey
 from triaxcal.dynamic.window import Frame
-from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
 
 BLOCK_TURN_RAD = 0.2

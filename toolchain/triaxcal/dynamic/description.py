@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import Layout, Table, has_table, read_tables
 from triaxcal.dynamic.block import StateBlock
 from triaxcal.dynamic.device import DEVICE_KEYS, Device, device_of
 from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT, Turntable
 from triaxcal.dynamic.registry import extensions
-from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
-from triaxcal.tomltable import Layout, Table, has_table, read_tables
-from triaxcal.unitfile import FORMAT, PLAUSIBLE_DEGC, check_unit_name, find_unit
+from triaxcal.unit.description import FORMAT, PLAUSIBLE_DEGC, check_unit_name, find_unit
 
 _LAYOUT: Layout = {
     "": {"format": True, "serial": True, "description": False},

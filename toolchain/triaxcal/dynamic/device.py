@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from triaxcal.errors import RefusedError
-from triaxcal.tomltable import Table
-from triaxcal.unitfile import OUTPUT_Q_RANGE, PLAUSIBLE_DEGC, Adc, TemperatureSensor
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import Table
+from triaxcal.unit.description import OUTPUT_Q_RANGE, PLAUSIBLE_DEGC, Adc, TemperatureSensor
 
 DEVICE_KEYS = {
     "accel_bits": True,

@@ -14,7 +14,7 @@ from triaxcal.dynamic.window import gamma_matrix
 from triaxcal.model.imu import ImuModel, constants_from_errors
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
-from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
 
 IN_MODEL = (
     "accelerometer-bias",

@@ -13,10 +13,10 @@ from itertools import permutations, product
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.attitude import skew
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import Windows
-from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
 
 GRAVITY_TOLERANCE = 0.25

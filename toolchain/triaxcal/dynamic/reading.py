@@ -15,11 +15,11 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import did_you_mean
 from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording, ImuSamples
-from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
-from triaxcal.tomltable import did_you_mean
 
 PIECE = 1 << 16
 FULL_SCALE = 0.999

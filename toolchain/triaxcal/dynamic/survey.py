@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.plausibility import refuse_wrong_units
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import WINDOW_S, Windows, read_windows
-from triaxcal.errors import RefusedError
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
 STILL_MIN_S = 5.0

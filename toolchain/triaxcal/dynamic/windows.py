@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording
-from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray, IntArray
 
 WINDOW_S = 0.1

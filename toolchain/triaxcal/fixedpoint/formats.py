@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, saturate_int32
 from triaxcal.fixedpoint.inversion import (
     InverseShifts,
@@ -17,7 +17,7 @@ from triaxcal.fixedpoint.inversion import (
 )
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.unitfile import OUTPUT_Q_RANGE
+from triaxcal.unit.description import OUTPUT_Q_RANGE
 
 MAX_SPARE_BITS = 16
 MIN_SPARE_BITS = -4

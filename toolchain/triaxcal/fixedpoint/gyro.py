@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import round_half_up
 from triaxcal.fixedpoint.plan import Plan, Triad, triad_plan
 from triaxcal.model.imu import ImuCompensation
 from triaxcal.model.positions import AXES
 from triaxcal.model.thermal import PiecewisePolynomial
 from triaxcal.model.types import FloatArray
-from triaxcal.unitfile import Adc, TemperatureSensor
+from triaxcal.unit.description import Adc, TemperatureSensor
 
 SENSITIVITY_LIMIT = 2**29
 """A row's words sum to this at most: the largest int32 of specific force then comes to 1/8 of the

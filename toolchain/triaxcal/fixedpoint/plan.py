@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, round_half_up
 from triaxcal.fixedpoint.formats import choose_inverse, choose_matrix_bits, choose_spare_bits
 from triaxcal.fixedpoint.horner import Segment, horner, segment_of
@@ -26,7 +26,7 @@ from triaxcal.fixedpoint.rate import RatePlan, largest_offset_g, plan_rate
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.compensation import INVERSE, Compensation
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.unitfile import Adc, TemperatureSensor
+from triaxcal.unit.description import Adc, TemperatureSensor
 
 MAX_TEMPERATURE_CODES = 2**17
 """Proof and cross-check visit every temperature code: this many take some seconds."""

@@ -19,7 +19,7 @@ from itertools import accumulate, chain, islice, pairwise, repeat
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import INT32_MAX
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.horner import Segment

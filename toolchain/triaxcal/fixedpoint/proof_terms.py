@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.gyro import SENSITIVITY_LIMIT
 from triaxcal.fixedpoint.integer_model import State
 from triaxcal.fixedpoint.plan import Plan

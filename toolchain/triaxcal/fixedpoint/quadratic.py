@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import high_word, round_half_up
 from triaxcal.model.positions import AXES
 from triaxcal.model.terms import PRODUCT_AXES, PRODUCT_NAMES

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, high_word, round_half_up
 from triaxcal.model.terms import RateTerm
 from triaxcal.model.types import FloatArray, IntArray

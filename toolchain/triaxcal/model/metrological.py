@@ -49,3 +49,12 @@ def force_from_voltage(constants: FloatArray, voltage_v: FloatArray) -> FloatArr
     K, U0 = unpack_constants(constants)
     solution = np.linalg.solve(K, (voltage_v - U0)[..., None])[..., 0]
     return solution.astype(np.float64)
+
+
+def pack_blocks(blocks: FloatArray) -> FloatArray:
+    """(..., 3, 4, 4), one block an output, as (..., 12, 12) in the order of `CONSTANT_NAMES`."""
+    full = np.zeros((*blocks.shape[:-3], 12, 12))
+    for i in range(3):
+        index = np.array([3 * i, 3 * i + 1, 3 * i + 2, 9 + i])
+        full[..., index[:, None], index] = blocks[..., i, :, :]
+    return full

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 
 from triaxcal import __version__
 from triaxcal.codegen.render import environment, function_format
-from triaxcal.delivery import Delivery
+from triaxcal.deliver.unit import Delivery
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
 from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.compensation import INVERSE
 from triaxcal.model.positions import AXES
-from triaxcal.unitfile import TemperatureSensor
+from triaxcal.unit.description import TemperatureSensor
 
 SYMBOL = "TRIAX_CALIB"
 _WORD = 4

@@ -13,13 +13,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from triaxcal import __version__
-from triaxcal.certificate import CertificateDetails
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.report.passport.content import Passport
 from triaxcal.uncertainty.coverage import LEVEL
-from triaxcal.unitfile import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.certificate import CertificateDetails
+from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"

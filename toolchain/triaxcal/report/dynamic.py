@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from triaxcal import __version__
+from triaxcal.base.jsontext import json_bytes
+from triaxcal.deliver.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Observability
 from triaxcal.dynamic.unit import DynamicUnit
-from triaxcal.imudelivery import ImuDelivery
-from triaxcal.jsontext import json_bytes
 from triaxcal.report.dynamicpage import digits, dynamic_page, verdict, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
 

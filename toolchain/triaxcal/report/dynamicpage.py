@@ -10,9 +10,9 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.codegen.render import environment
+from triaxcal.deliver.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Weak
-from triaxcal.imudelivery import ImuDelivery
 from triaxcal.report.firmware import file_rows, tool_rows
 from triaxcal.report.imuc import NO_C, imu_verification
 from triaxcal.report.passport.words import signed, thousands

@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from triaxcal import __version__
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.jsontext import json_bytes
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import CrossCheck
 from triaxcal.codegen.render import shape_id
+from triaxcal.deliver.imu import METHOD, ImuC, ImuDelivery
 from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.device import REQUIRED
-from triaxcal.errors import RefusedError
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
-from triaxcal.imudelivery import METHOD, ImuC, ImuDelivery
-from triaxcal.jsontext import json_bytes
 from triaxcal.report.firmware import checked_words, proven_words
 from triaxcal.report.passport.words import g_in_words, significant, thousands
 

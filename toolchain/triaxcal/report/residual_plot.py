@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from triaxcal.codegen.render import environment
 from triaxcal.codegen.tryout import BEFORE, MethodResult
-from triaxcal.delivery import Delivery
+from triaxcal.deliver.unit import Delivery
 from triaxcal.report.temperatures import by_temperature, degrees, position_order, with_room
-from triaxcal.unitfile import Limits
+from triaxcal.unit.description import Limits
 
 WIDTH = 960.0
 LEFT, RIGHT, TOP, GAP = 64.0, 16.0, 84.0, 8.0

@@ -7,13 +7,13 @@ import math
 from typing import Any
 
 from triaxcal import __version__
+from triaxcal.base.jsontext import json_bytes
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.render import shape_id
 from triaxcal.codegen.tryout import BEFORE
-from triaxcal.delivery import Delivery
-from triaxcal.fit.calibrate import Calibration
-from triaxcal.fit.thermal import relative_coefficients
-from triaxcal.jsontext import json_bytes
+from triaxcal.deliver.unit import Delivery
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.core.thermal import relative_coefficients
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.terms import PRODUCT_NAMES
 from triaxcal.model.types import FloatArray

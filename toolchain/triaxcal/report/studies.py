@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.fit.family.cross_coupling import NAMES, UNITS, PairFit, Recursion, converged_at
-from triaxcal.fit.family.drift import Drift
+from triaxcal.fit.core.drift import Drift
+from triaxcal.fit.pair.cross_coupling import NAMES, UNITS, PairFit, Recursion, converged_at
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
-from triaxcal.recording.poses import PoseSet
-from triaxcal.recording.samples import Samples
-from triaxcal.recordinglayout import RecordingLayout
+from triaxcal.poses.poses import PoseSet
+from triaxcal.readings.samples import Samples
 from triaxcal.report.line_plot import BAD, COLOURS, GOOD, Band, Line, Panel, line_plot
 from triaxcal.report.summary import table
+from triaxcal.unit.recording import RecordingLayout
 
 _ARCSEC_PER_RAD = 180.0 * 3600.0 / np.pi
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from triaxcal.delivery import Delivery
-from triaxcal.fit.calibrate import Calibration
-from triaxcal.fit.family.result import RecordingFit
-from triaxcal.fit.selection import Candidate
+from triaxcal.deliver.unit import Delivery
+from triaxcal.fit.core.calibration import Calibration, Candidate
+from triaxcal.fit.core.recorded import RecordingFit
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.report.measured import measured_words

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import AXES
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.frames import Frames, concatenate

@@ -12,9 +12,9 @@ import numpy as np
 from cantools.database import Database
 from cantools.database.can import Message
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.shipped import shipped
 from triaxcal.model.types import IntArray
-from triaxcal.resources import shipped
 from triaxcal.rig.e2e import frame_crc
 from triaxcal.rig.frames import BoolArray, ByteArray, Frames
 from triaxcal.rig.signals import Signal

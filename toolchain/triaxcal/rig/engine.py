@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import shown
 from triaxcal.rig.blocks import BlockBuilder
 from triaxcal.rig.dbc import RigDbc
 from triaxcal.rig.events import Command, Event
@@ -14,8 +15,7 @@ from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.samples import SampleDecoder
 from triaxcal.rig.session import Session
 from triaxcal.rig.simulator import serial_crc
-from triaxcal.tomltable import shown
-from triaxcal.unitfile import UnitDescription, list_units, read_unit
+from triaxcal.unit.description import UnitDescription, list_units, read_unit
 
 
 @dataclass(frozen=True)

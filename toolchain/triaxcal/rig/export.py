@@ -10,7 +10,7 @@ from pathlib import Path
 import can
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.rig.candump import NS_PER_US, read_log
 from triaxcal.rig.export_columns import mf4_writer, parquet_writer
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, Frames

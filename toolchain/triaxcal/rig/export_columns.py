@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import FloatArray
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, BoolArray, Frames, widened
 

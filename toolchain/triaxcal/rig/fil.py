@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from cantools.database.can.c_source import generate
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import IntArray
 from triaxcal.rig.burst import FD_BYTES
 from triaxcal.rig.dbc import FrameLayout, RigDbc, load_database

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 
 Record = Mapping[str, Any]
 

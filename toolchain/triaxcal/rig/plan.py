@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import Layout, Table, read_tables
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.types import FloatArray
 from triaxcal.rig.dbc import LAYOUTS
-from triaxcal.tomltable import Layout, Table, read_tables
-from triaxcal.unitfile import PLAUSIBLE_DEGC, UnitDescription
+from triaxcal.unit.description import PLAUSIBLE_DEGC, UnitDescription
 
 FORMAT = 1
 

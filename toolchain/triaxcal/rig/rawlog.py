@@ -6,7 +6,7 @@ import hashlib
 import os
 from pathlib import Path
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.rig.candump import format_frames
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.journal import disk_refusal, sync_folder, write_all

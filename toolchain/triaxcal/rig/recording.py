@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal import __version__
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.rig.candump import NS_PER_US, read_log
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.events import DURABLE, AcceptedDwell, Agree, Command, Event, Redo

@@ -17,7 +17,7 @@ from triaxcal.rig.faults import complaint, fault
 from triaxcal.rig.orientation import described, recognised
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.stillness import Reference, average, make_reference, motion, refusals
-from triaxcal.unitfile import UnitDescription
+from triaxcal.unit.description import UnitDescription
 
 _COVERED = 0.9
 """Share of the window's seconds that must have a temperature."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from triaxcal.errors import UsageError
-from triaxcal.tomltable import did_you_mean, shown
+from triaxcal.base.errors import UsageError
+from triaxcal.base.tomltable import did_you_mean, shown
 
 KINDS = {
     "nudge": "value milli-g for 0.3 s",

@@ -20,7 +20,7 @@ from triaxcal.rig.simframes import FrameMaker, with_frame_faults
 from triaxcal.rig.simorders import Fault
 from triaxcal.simulation.tilts import truth_force_g
 from triaxcal.simulation.truth import Truth, codes_of_voltage
-from triaxcal.unitfile import UnitDescription
+from triaxcal.unit.description import UnitDescription
 
 EPOCH_NS = 1_700_000_000 * 10**9
 """When simulated sessions begin."""

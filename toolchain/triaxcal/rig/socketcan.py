@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.rig.burst import (
     CLASSIC_BYTES,
     FD_BYTES,

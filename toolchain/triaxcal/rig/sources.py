@@ -9,10 +9,10 @@ from typing import Any, Protocol
 import can
 import numpy as np
 
-from triaxcal.errors import RefusedError, UsageError
+from triaxcal.base.errors import RefusedError, UsageError
+from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG, Frames, empty
 from triaxcal.rig.simulator import SimulatedRig
-from triaxcal.tomltable import did_you_mean, shown
 
 WAIT_S = 0.05
 PACE_S = 0.02

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from triaxcal.records import MEASUREMENTS_FILE, write_measurements
-from triaxcal.records_csv import DEVIATIONS, READINGS
+from triaxcal.readings.measurements import MEASUREMENTS_FILE, write_measurements
+from triaxcal.readings.measurements_csv import DEVIATIONS, READINGS
 from triaxcal.rig.events import AcceptedDwell
 from triaxcal.rig.journal import disk_refusal
 from triaxcal.rig.session import Session

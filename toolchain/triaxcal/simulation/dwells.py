@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.records import Dwell, MeasurementSet, volts
+from triaxcal.readings.measurements import Dwell, MeasurementSet, volts
 from triaxcal.simulation.rig import Rig
 from triaxcal.simulation.truth import Plan, Truth, codes_of_voltage
-from triaxcal.unitfile import UnitDescription
+from triaxcal.unit.description import UnitDescription
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.recording import Turntable
-from triaxcal.errors import RefusedError
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.imu_polynomials import Pieces, PiecewiseMotion, smooth_move, smooth_step
 from triaxcal.simulation.imu_truth import Three

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import Layout, Table, read_tables, read_toml
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording
-from triaxcal.errors import RefusedError
-from triaxcal.records import write_measurements
+from triaxcal.readings.measurements import write_measurements
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import EFFECTS, GRADES, draw_truth
 from triaxcal.simulation.imu_motion import (
@@ -22,8 +23,7 @@ from triaxcal.simulation.imu_motion import (
 )
 from triaxcal.simulation.imu_truth import ARCSEC
 from triaxcal.simulation.truth import SEED_MAX, check_seed
-from triaxcal.tomltable import Layout, Table, read_tables, read_toml
-from triaxcal.unitfile import find_unit
+from triaxcal.unit.description import find_unit
 
 FORMAT = 1
 IMU_TRUTH_FILE = "imu_truth.toml"

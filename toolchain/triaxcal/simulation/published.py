@@ -5,12 +5,12 @@ from __future__ import annotations
 from decimal import Decimal
 from pathlib import Path
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import Layout, read_tables
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.positions import TEST_POSITIONS
-from triaxcal.records import MEASUREMENTS_FILE, write_measurements
-from triaxcal.tomltable import Layout, read_tables
-from triaxcal.unitfile import PLAUSIBLE_DEGC, UnitDescription
+from triaxcal.readings.measurements import MEASUREMENTS_FILE, write_measurements
+from triaxcal.unit.description import PLAUSIBLE_DEGC, UnitDescription
 
 FORMAT = 1
 TABLES_FILE = "tables.toml"

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.truth import (
@@ -29,7 +29,7 @@ from triaxcal.simulation.truth import (
     read_truth_tables,
 )
 from triaxcal.simulation.unit import write_simulated_unit
-from triaxcal.unitfile import UNIT_FILE, read_unit
+from triaxcal.unit.description import UNIT_FILE, read_unit
 
 COUNT_MAX = 9999
 FIRST_DAY = datetime.date(2026, 1, 5)

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import Layout, Table, read_tables, shown
 from triaxcal.model.metrological import CONSTANT_NAMES, voltage_from_force
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.tomltable import Layout, Table, read_tables, shown
-from triaxcal.unitfile import PLAUSIBLE_DEGC, Adc
+from triaxcal.unit.description import PLAUSIBLE_DEGC, Adc
 
 FORMAT = 1
 TRUTH_FILE = "truth.toml"

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from triaxcal.errors import RefusedError
-from triaxcal.records import MEASUREMENTS_FILE, write_measurements
-from triaxcal.records_csv import DEVIATIONS, READINGS
+from triaxcal.base.errors import RefusedError
+from triaxcal.readings.measurements import MEASUREMENTS_FILE, write_measurements
+from triaxcal.readings.measurements_csv import DEVIATIONS, READINGS
 from triaxcal.simulation.dwells import simulate_codes
 from triaxcal.simulation.imu_unit import IMU_TRUTH_FILE, write_simulated_recording
 from triaxcal.simulation.published import TABLES_FILE, write_published_measurements
 from triaxcal.simulation.truth import TRUTH_FILE, check_seed, read_truth
-from triaxcal.unitfile import find_unit, read_unit
+from triaxcal.unit.description import find_unit, read_unit
 
 
 def write_simulated_unit(folder: Path, seed: int | None = None) -> Path:

@@ -7,7 +7,7 @@ import json
 from collections.abc import Sequence
 
 from triaxcal import __version__
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 from triaxcal.targets.bench import DOUBLE, FLOAT, OPTIMISATION, SIZE_OPTIMISATION, Cost
 from triaxcal.targets.counting import Span
 from triaxcal.targets.matrix import ARITHMETIC_NAMES

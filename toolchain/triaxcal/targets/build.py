@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS
-from triaxcal.resources import shipped
 from triaxcal.targets.cores import Core
 
 WARNINGS = tuple(f for f in FLAGS if not f.startswith("-O"))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import find_compiler
-from triaxcal.resources import shipped
 from triaxcal.targets.build import TargetError, emulate, run
 from triaxcal.targets.cores import Core
 

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.resources import shipped
+from triaxcal.base.shipped import shipped
 from triaxcal.targets.build import TargetError, Toolset, build, emulate
 from triaxcal.targets.cores import CORES, install_advice, missing_tools
 from triaxcal.targets.shapes import CUBIC, Case

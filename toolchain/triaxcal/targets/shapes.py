@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import (
     CONSTANTS_FILE,
@@ -15,15 +16,15 @@ from triaxcal.codegen.render import (
     render_constants,
     render_routine,
 )
-from triaxcal.delivery import compensation_of, inputs_sha256
-from triaxcal.errors import RefusedError
-from triaxcal.fit.calibrate import Calibration, calibrate
+from triaxcal.deliver.unit import compensation_of, inputs_sha256
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.model.imu import EXAMPLE_SENSITIVITY, ImuCompensation
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS
-from triaxcal.records import MEASUREMENTS_FILE, read_measurements
-from triaxcal.unitfile import UnitDescription, read_unit
+from triaxcal.readings.measurements import MEASUREMENTS_FILE, read_measurements
+from triaxcal.unit.description import UnitDescription, read_unit
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.resources import shipped
+from triaxcal.base.shipped import shipped
 from triaxcal.targets.build import Toolset, link_command, run
 
 

@@ -9,10 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from triaxcal.fit.calibrate import Calibration
+from triaxcal.fit.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
-from triaxcal.records import MeasurementSet
+from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.uncertainty.budget import Budget, Line, budget
 from triaxcal.uncertainty.coverage import coverage_factor
 from triaxcal.uncertainty.device_sources import (
@@ -39,7 +39,7 @@ from triaxcal.uncertainty.rig_sources import (
 from triaxcal.uncertainty.scatter import Scatter, scatter
 from triaxcal.uncertainty.source import Source
 from triaxcal.uncertainty.terms_sources import pair_source
-from triaxcal.unitfile import UnitDescription
+from triaxcal.unit.description import UnitDescription
 
 TEMPERATURES = 23
 """Of the working range, evenly, besides T0 and the calibrated ones."""

@@ -20,15 +20,16 @@ from statistics import NormalDist
 
 import numpy as np
 
-from triaxcal.errors import RefusedError
-from triaxcal.fit.calibrate import Calibration, calibrate
-from triaxcal.fit.family.cross_coupling import stated_pair
-from triaxcal.fit.family.result import PairTerms
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.core.recorded import PairTerms
+from triaxcal.fit.pair.cross_coupling import stated_pair
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
-from triaxcal.records import MEASUREMENTS_FILE, MeasurementSet, read_measurements
+from triaxcal.readings.measurements import MEASUREMENTS_FILE, MeasurementSet, read_measurements
 from triaxcal.uncertainty.evaluate import uncertainty
-from triaxcal.unitfile import UnitDescription
+from triaxcal.unit.description import UnitDescription
 
 HISTORY_FOLDER = "history"
 EN_MAX = NormalDist().inv_cdf(1.0 - 0.05 / 72.0) / NormalDist().inv_cdf(0.975)

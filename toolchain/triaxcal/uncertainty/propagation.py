@@ -17,15 +17,15 @@ from functools import cached_property
 
 import numpy as np
 
-from triaxcal.fit.calibrate import Calibration
-from triaxcal.fit.curves import TilterData, parameter_operator, shifted_voltage
-from triaxcal.fit.grouping import group_dwells, grouped_readings
-from triaxcal.fit.tilter import estimator_operators
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.core.grouping import group_dwells, grouped_readings
+from triaxcal.fit.tilter.curves import TilterData, parameter_operator, shifted_voltage
+from triaxcal.fit.tilter.estimators import estimator_operators
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.model.types import FloatArray
-from triaxcal.records import MeasurementSet
-from triaxcal.unitfile import UnitDescription
+from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.unit.description import UnitDescription
 
 RADIANS_PER_ARCSEC = np.pi / 180.0 / 3600.0
 ROWS = (0, 1, 2, 4, 5, 6, 8, 9, 10, 3, 7, 11)

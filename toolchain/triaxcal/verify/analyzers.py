@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
-from triaxcal.resources import shipped
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.rows import rows_of
 from triaxcal.verify.tools import Answer, MissingToolError, Tool, run

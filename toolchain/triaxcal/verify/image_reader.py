@@ -10,7 +10,7 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-from triaxcal.errors import RefusedError
+from triaxcal.base.errors import RefusedError
 
 HEADER_WORDS = 15
 FUNCTIONS = 12

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from triaxcal.base.shipped import shipped
 from triaxcal.codegen.imu import IMU_FILES, IMU_IMAGE_FILE, ImuBuild, imu_answers, imu_vectors
 from triaxcal.codegen.render import environment, gyro_text
-from triaxcal.resources import shipped
 from triaxcal.verify import analyzers, cppcheck, eva
 from triaxcal.verify.campaign import delivery_outcomes, guarded, verify_files
 from triaxcal.verify.image_reader import image_length

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from triaxcal.errors import RefusedError
-from triaxcal.jsontext import json_bytes
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.jsontext import json_bytes
 from triaxcal.verify.outcome import Outcome
 
 FILE = "verification.json"

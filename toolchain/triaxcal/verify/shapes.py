@@ -17,15 +17,15 @@ from triaxcal.codegen.render import (
     render_constants,
     render_routine,
 )
-from triaxcal.delivery import IMAGE_FILE, compensation_of, inputs_sha256
-from triaxcal.fit.calibrate import calibrate
+from triaxcal.deliver.unit import IMAGE_FILE, compensation_of, inputs_sha256
+from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.imu import EXAMPLE_SENSITIVITY, ImuCompensation
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS
-from triaxcal.records import MEASUREMENTS_FILE, read_measurements
-from triaxcal.unitfile import UnitDescription, read_unit
+from triaxcal.readings.measurements import MEASUREMENTS_FILE, read_measurements
+from triaxcal.unit.description import UnitDescription, read_unit
 
 
 @dataclass(frozen=True)

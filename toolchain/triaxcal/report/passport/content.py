@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from triaxcal.codegen.tryout import MethodResult, Residual
-from triaxcal.delivery import Delivery
+from triaxcal.deliver.unit import Delivery
 from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
-from triaxcal.unitfile import near_t0
+from triaxcal.unit.description import near_t0
 
 LENGTH = 3
 

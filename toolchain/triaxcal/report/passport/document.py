@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal import __version__
-from triaxcal.jsontext import json_bytes
+from triaxcal.base.jsontext import json_bytes
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Passport
 from triaxcal.uncertainty.budget import Budget

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal import __version__
+from triaxcal.base.jsontext import json_bytes
 from triaxcal.batch.run import Series
 from triaxcal.batch.statistics import (
     FEWEST_UNITS,
@@ -23,7 +24,6 @@ from triaxcal.batch.statistics import (
     runs,
 )
 from triaxcal.codegen.render import environment
-from triaxcal.jsontext import json_bytes
 from triaxcal.report.passport.curves import ticks
 
 PAGE_FILE, JSON_FILE = "series.html", "series.json"

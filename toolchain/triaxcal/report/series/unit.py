@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from triaxcal import __version__
+from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Order, Outcome, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.codegen.routines import Reference, start_reference
-from triaxcal.delivery import Delivery, deliver
-from triaxcal.errors import RefusedError
+from triaxcal.deliver.unit import Delivery, deliver
 from triaxcal.model.thermal import ThermalModel
 from triaxcal.model.types import FloatArray
-from triaxcal.recordinglayout import is_in_folder
 from triaxcal.report.files import all_files
 from triaxcal.report.passport.content import Passport, passport
+from triaxcal.unit.recording import is_in_folder
 
 _GRID = 23
 

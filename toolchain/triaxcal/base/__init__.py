@@ -1,0 +1,1 @@
+"""What every room stands on: errors, strict TOML, JSON text, shipped files, files in place."""

@@ -1,0 +1,119 @@
+"""Putting finished files in place: all of them, or none."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import tempfile
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+from triaxcal.base.errors import RefusedError
+
+
+def publish(files: Mapping[str, bytes], target: Path, sometimes: Collection[str] = ()) -> None:
+    """Make the folder `target` hold exactly these files.
+
+    They are written to a folder beside it, which takes its place when it is complete. `sometimes`
+    names files that an earlier delivery may have had besides.
+
+    Raises
+    ------
+    RefusedError
+        When the disk refuses, or `target` holds anything but an earlier delivery; `target` is then
+        as it was.
+    """
+    _refuse_foreign(target, {*files, *sometimes})
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
+    except OSError as error:
+        raise _refusal(target.parent, error) from error
+    try:
+        for name, content in files.items():
+            (staging / name).write_bytes(content)
+        staging.chmod(0o777 & ~_umask())
+        _replace(staging, target)
+    except OSError as error:
+        raise _refusal(target, error) from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def renew(files: Mapping[str, bytes], target: Path) -> None:
+    """Give files of the folder `target` new content, each in one step.
+
+    Raises
+    ------
+    RefusedError
+        When the disk refuses; a file is then either as it was or new.
+    """
+    for name, content in files.items():
+        try:
+            handle, staging = tempfile.mkstemp(prefix=f".{name}.", dir=target)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(content)
+                Path(staging).chmod(0o666 & ~_umask())
+                Path(staging).replace(target / name)
+            finally:
+                Path(staging).unlink(missing_ok=True)
+        except OSError as error:
+            raise _refusal(target / name, error) from error
+
+
+def _refuse_foreign(target: Path, files: Collection[str]) -> None:
+    """Nobody's own files are replaced: only what an earlier run wrote."""
+    if target.is_symlink() or (target.exists() and not target.is_dir()):
+        raise RefusedError(
+            str(target),
+            "is not a folder of results",
+            expected="nothing there, or what an earlier run wrote",
+            remedy="move it away, or name another folder with --build",
+        )
+    if not target.is_dir():
+        return
+    try:
+        foreign = sorted(path.name for path in target.iterdir() if path.name not in files)
+    except OSError as error:
+        raise _refusal(target, error) from error
+    if foreign:
+        raise RefusedError(
+            str(target),
+            f"holds {foreign[0]!r}, which no delivery has"
+            + (f", and {len(foreign) - 1} more" if len(foreign) > 1 else ""),
+            expected="only what an earlier run wrote: the folder is replaced as a whole",
+            remedy="move it away, or name another folder with --build",
+        )
+
+
+def _replace(staging: Path, target: Path) -> None:
+    if not target.exists():
+        staging.rename(target)
+        return
+    old = staging.with_name(f"{staging.name}.old")
+    try:
+        target.rename(old)
+        staging.rename(target)
+    except BaseException:
+        if old.exists() and not target.exists():
+            old.rename(target)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _umask() -> int:
+    current = os.umask(0o022)
+    os.umask(current)
+    return current
+
+
+def _refusal(where: Path, error: OSError) -> RefusedError:
+    reason = (error.strerror or str(error)).lower()
+    remedy = "check its permissions, or name another folder with --build"
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        remedy = "free some space, or name another folder with --build"
+    if error.errno in (errno.EEXIST, errno.ENOTDIR):
+        remedy = "a file is in the way: move it, or name another folder with --build"
+    return RefusedError(str(where), f"cannot be written: {reason}", remedy=remedy)

@@ -1,0 +1,1 @@
+"""The whole road for one unit, or one IMU: readings to files."""

@@ -1,0 +1,171 @@
+"""The whole road for one IMU: recording, filter, model, C of both triads, proof, cross-check.
+
+Nothing is written here; `triaxcal.base.publish` puts the files in place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.compiler import find_compiler
+from triaxcal.codegen.imu import ImuBuild, build_imu
+from triaxcal.codegen.render import Provenance
+from triaxcal.deliver.unit import files_sha256
+from triaxcal.dynamic.description import DynamicDescription, read_dynamic
+from triaxcal.dynamic.device import Device
+from triaxcal.dynamic.imumodel import imu_model, left_out
+from triaxcal.dynamic.unit import DynamicUnit, calibrate_unit
+from triaxcal.fixedpoint.gyro import TriadDescription
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.model.compensation import (
+    Compensation,
+    exact_gain_and_offset,
+    worst_force_error_g,
+)
+from triaxcal.model.imu import ImuCompensation, ImuModel, compensate_imu
+from triaxcal.model.thermal import ThermalModel
+from triaxcal.model.types import FloatArray
+from triaxcal.unit.description import Adc
+
+METHOD = "matrix"
+ACCEL_MODEL_ERROR_MAX_G = 1e-6
+GYRO_MODEL_ERROR_MAX_DEG_PER_H = 0.01
+"""How far N(T) may be from K(T)^-1: a tilter's default, and what P2 demands of a gyro drift."""
+
+
+@dataclass(frozen=True)
+class ImuC:
+    """The C of an IMU and what was shown of it.
+
+    Attributes
+    ----------
+    device : Device
+    model : ImuModel
+    build : ImuBuild
+    accel_model_error_g, gyro_model_error_deg_per_h : float
+        Largest error of the functions that the device evaluates against K(T)^-1 (U - U0(T)), at
+        any temperature code and any raw code.
+    left_out : tuple of str
+        Titles of effects that were estimated and that the C does not correct.
+    """
+
+    device: Device
+    model: ImuModel
+    build: ImuBuild
+    accel_model_error_g: float
+    gyro_model_error_deg_per_h: float
+    left_out: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ImuDelivery:
+    """A calibrated IMU; `c` is None where unit.toml has no [device]."""
+
+    done: DynamicUnit
+    inputs_sha256: str
+    c: ImuC | None
+
+
+def deliver_imu(folder: Path, progress: Callable[[str, float], None] | None = None) -> ImuDelivery:
+    """Calibrate the IMU in `folder` and, where its unit.toml has [device], make and check its C.
+
+    Raises
+    ------
+    RefusedError
+        As `calibrate_unit` and `build_imu`; when the inputs change meanwhile.
+    """
+    unit = read_dynamic(folder)
+    if unit.device is not None:
+        find_compiler()  # before minutes of filtering, not after
+    inputs = _inputs_sha256(unit) if unit.recording.is_file() else ""
+    done = calibrate_unit(folder, progress)
+    if _inputs_sha256(unit) != inputs:
+        raise RefusedError(str(folder), "changed while it was read", remedy="run it again")
+    c = None if unit.device is None else _imu_c(done, unit.device, inputs)
+    return ImuDelivery(done, inputs, c)
+
+
+def _inputs_sha256(unit: DynamicDescription) -> str:
+    return files_sha256((unit.path, unit.recording), "put it there, or correct [dynamic] recording")
+
+
+def _imu_c(done: DynamicUnit, device: Device, inputs: str) -> ImuC:
+    model = imu_model(done.result, device.range_degc)
+    adcs = device.accel_adc, device.gyro_adc
+    limits = ACCEL_MODEL_ERROR_MAX_G, math.radians(GYRO_MODEL_ERROR_MAX_DEG_PER_H / 3600)
+    functions = compensate_imu(
+        model, METHOD, device.range_degc, (_largest(adcs[0]), _largest(adcs[1])), limits
+    )
+    name, sensor = done.unit.name, device.temperature_sensor
+    triads = (
+        TriadDescription(name, adcs[0], sensor, device.accel_q),
+        TriadDescription(name, adcs[1], sensor, device.gyro_rate_q),
+    )
+    omitted = left_out(done.result)
+    build = build_imu(functions, triads, _provenance(done, device, inputs, omitted))
+    errors = _model_errors(model, functions, device, build.accel)
+    _refuse_model_errors(done.unit, errors)
+    return ImuC(device, model, build, *errors, omitted)
+
+
+def _largest(adc: Adc) -> float:
+    return max(abs(adc.code_min), abs(adc.code_max)) * adc.volts_per_code
+
+
+def _provenance(
+    done: DynamicUnit, device: Device, inputs: str, omitted: tuple[str, ...]
+) -> Provenance:
+    low, high = device.range_degc
+    accel, gyro = device.accel_adc, device.gyro_adc
+    gyro_deg_per_s = math.degrees(gyro.full_scale_v)
+    return Provenance(
+        done.unit.serial,
+        inputs,
+        (
+            f"both triads from {done.unit.recording.name}, {low:g} to {high:g} degC",
+            f"accelerometer code: {accel.bits} bits for {accel.full_scale_v:.9g} g full scale",
+            f"gyro code: {gyro.bits} bits for {gyro_deg_per_s:.9g} deg/s full scale",
+            "V below stands for g in the accelerometer, for rad/s in the gyro",
+            *(f"not corrected: {title}" for title in omitted),
+        ),
+    )
+
+
+def _model_errors(
+    model: ImuModel, functions: ImuCompensation, device: Device, plan: Plan
+) -> tuple[float, float]:
+    """In g and in deg/h; the accelerometer's passes to the gyro through the g-sensitivity."""
+    sensor = device.temperature_sensor
+    temps = plan.temp_codes.astype(np.float64) * sensor.degc_per_code + sensor.degc_at_zero
+    accel = _triad_error(model.accel, functions.accel, temps, device.accel_adc)
+    gyro = _triad_error(model.gyro, functions.gyro, temps, device.gyro_adc)
+    gyro = gyro + accel @ np.abs(model.g_sensitivity).T
+    return float(accel.max()), float(np.rad2deg(gyro.max()) * 3600)
+
+
+def _triad_error(
+    thermal: ThermalModel, functions: Compensation, temps: FloatArray, adc: Adc
+) -> FloatArray:
+    exact = exact_gain_and_offset(thermal.constants_at(temps))
+    return worst_force_error_g(functions.gain_and_offset(temps), exact, _largest(adc))
+
+
+def _refuse_model_errors(unit: DynamicDescription, errors: tuple[float, float]) -> None:
+    """The order of N(T) is chosen on a grid; what counts is every temperature code."""
+    for what, error, limit, name in (
+        ("accelerometer", errors[0] * 1e6, ACCEL_MODEL_ERROR_MAX_G * 1e6, "micro-g"),
+        ("gyro", errors[1], GYRO_MODEL_ERROR_MAX_DEG_PER_H, "deg/h"),
+    ):
+        if error > limit:
+            raise RefusedError(
+                f"{unit.path}, [device] range_degc",
+                f"N(T) of the {what} is {error:.4g} {name} off the fitted model",
+                expected=f"at most {limit:g} {name}",
+                remedy="narrow the range, or check the temperature coefficients",
+            )

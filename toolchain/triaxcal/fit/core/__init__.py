@@ -1,0 +1,1 @@
+"""What every fit uses: groups of readings, thermal functions, outliers, results."""

@@ -1,0 +1,257 @@
+"""One orientation over temperature: what the outputs do, heating against cooling.
+
+The record is cut at the turning points of its temperature into half-cycles. Each candidate, a
+function of temperature with or without a term in dT/dt, is fitted to all half-cycles but one and
+judged on that one, at the temperatures that the others cover. Samples are weighted so that each
+degree counts the same: a slow ramp has more samples, not more to say.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.readings.samples import Samples
+
+SMOOTH_S = 60.0
+"""Window of the temperature's slope: units warm over minutes, thermometers jitter by tenths."""
+TURN_DEGC = 5.0
+"""A half-cycle goes at least so far."""
+ORDERS = (0, 1, 2, 3, 4, 5)
+KNOTS = 10
+
+
+@dataclass(frozen=True)
+class HalfCycle:
+    """A stretch of rising or falling temperature: samples start to stop, stop excluded."""
+
+    start: int
+    stop: int
+    rising: bool
+
+    def label(self, temp_degc: FloatArray) -> str:
+        """Words for tables."""
+        first, last = temp_degc[self.start], temp_degc[self.stop - 1]
+        return f"{'heating' if self.rising else 'cooling'} {first:.0f} to {last:.0f} degC"
+
+
+@dataclass(frozen=True)
+class DriftRow:
+    """One candidate, its errors in reading units.
+
+    Attributes
+    ----------
+    fitted : array, shape (3,)
+        Rms residual per output, each degree weighted alike.
+    held_out : array, shape (half-cycles, 3), or None
+        Rms error on each half-cycle left out; None with fewer than two.
+    rate : array, shape (3,), or None
+        Coefficient of dT/dt, reading units per K/s.
+    """
+
+    label: str
+    parameters: int
+    fitted: FloatArray
+    held_out: FloatArray | None
+    rate: FloatArray | None
+
+    @property
+    def score(self) -> float:
+        """Rms held-out error over half-cycles and outputs."""
+        return math.inf if self.held_out is None else float(np.sqrt(np.mean(self.held_out**2)))
+
+
+@dataclass(frozen=True)
+class Drift:
+    """The study of one record.
+
+    Attributes
+    ----------
+    temp_degc, rate_k_per_s : arrays, shape (n,)
+        Smoothed.
+    halves : tuple of HalfCycle
+    rows : tuple of DriftRow
+    chosen : DriftRow
+        The best held out, or the simplest within a tenth of it.
+    hysteresis : array, shape (3,)
+        Largest difference of heating and cooling at one temperature, reading units.
+    hysteresis_degc : array, shape (3,)
+        Where.
+    """
+
+    temp_degc: FloatArray
+    rate_k_per_s: FloatArray
+    halves: tuple[HalfCycle, ...]
+    rows: tuple[DriftRow, ...]
+    chosen: DriftRow
+    hysteresis: FloatArray
+    hysteresis_degc: FloatArray
+
+
+def study(samples: Samples) -> Drift:
+    """Half-cycles, hysteresis and candidates of a record in one orientation.
+
+    Raises
+    ------
+    RefusedError
+        When there is no temperature, or it does not move.
+    """
+    if samples.temp_degc is None:
+        raise RefusedError(
+            samples.source,
+            "no temperature column",
+            expected="[recording] temperature",
+            remedy="name the column of the temperature",
+        )
+    temp, rate = smoothed(samples)
+    halves = half_cycles(temp)
+    if not halves:
+        raise RefusedError(
+            samples.source,
+            f"the temperature stays within {np.ptp(temp):.2g} degC",
+            expected=f"a change of {TURN_DEGC:g} degC at least",
+        )
+    rows = _rows(samples.reading, temp, rate, halves)
+    best = min(row.score for row in rows)
+    # A tenth: half-cycles are few, and an rms of three is known to no better than a third.
+    chosen = min(
+        (row for row in rows if row.score <= 1.1 * best or math.isinf(best)),
+        key=lambda row: (row.parameters, row.score),
+    )
+    size, where = hysteresis(samples.reading, temp, halves)
+    return Drift(temp, rate, halves, rows, chosen, size, where)
+
+
+def smoothed(samples: Samples) -> tuple[FloatArray, FloatArray]:
+    """Temperature and its slope, each (n,), by a straight line in a centred window."""
+    assert samples.temp_degc is not None
+    t, temp = samples.time_s, samples.temp_degc
+    half = max(2, round(SMOOTH_S / samples.step_s / 2.0))
+    n = len(t)
+    low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
+    sums = [np.concatenate([[0.0], np.cumsum(v)]) for v in (t, temp, t * t, t * temp)]
+    st, sy, stt, sty = (s[high] - s[low] for s in sums)
+    count = high - low
+    rate = (sty - st * sy / count) / (stt - st * st / count)
+    middle = sy / count + rate * (t - st / count)
+    return middle, rate
+
+
+def half_cycles(temp: FloatArray) -> tuple[HalfCycle, ...]:
+    """Stretches between turning points at least `TURN_DEGC` apart."""
+    turns = [0]
+    extreme, rising = 0, None
+    for k in range(1, len(temp)):
+        if rising is None:
+            if abs(temp[k] - temp[0]) >= TURN_DEGC:
+                rising, extreme = bool(temp[k] > temp[0]), k
+            continue
+        if (temp[k] > temp[extreme]) == rising:
+            extreme = k
+        elif abs(temp[k] - temp[extreme]) >= TURN_DEGC:
+            turns.append(extreme)
+            rising, extreme = not rising, k
+    if rising is None:
+        return ()
+    ends = [*turns, len(temp)]
+    return tuple(HalfCycle(a, b, bool(temp[b - 1] > temp[a])) for a, b in pairwise(ends))
+
+
+def hysteresis(
+    reading: FloatArray, temp: FloatArray, halves: tuple[HalfCycle, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Largest difference of heating and cooling in one degree, (3,), and at which, (3,)."""
+    degree = np.floor(temp).astype(np.int64)
+    rising = np.zeros(len(temp), dtype=np.bool_)
+    for half in halves:
+        rising[half.start : half.stop] = half.rising
+    size, where = np.zeros(3), np.zeros(3)
+    for d in np.unique(degree):
+        up, down = (degree == d) & rising, (degree == d) & ~rising
+        if up.any() and down.any():
+            apart = np.abs(reading[up].mean(axis=0) - reading[down].mean(axis=0))
+            where = np.where(apart > size, d + 0.5, where)
+            size = np.maximum(size, apart)
+    return size, where
+
+
+def _rows(
+    reading: FloatArray, temp: FloatArray, rate: FloatArray, halves: tuple[HalfCycle, ...]
+) -> tuple[DriftRow, ...]:
+    x = (temp - temp.mean()) / (np.ptp(temp) / 2.0)
+    scale = float(np.abs(rate).max()) or 1.0
+    bases = [(f"polynomial of order {k}", np.vander(x, k + 1, increasing=True)) for k in ORDERS]
+    bases.append((f"piecewise-linear, {KNOTS} knots", _hats(temp)))
+    rows = []
+    for label, basis in bases:
+        rows.append(_row(label, basis, reading, temp, halves, rate_scale=None))
+        with_rate = np.column_stack([basis, rate / scale])
+        rows.append(_row(f"{label} and dT/dt", with_rate, reading, temp, halves, rate_scale=scale))
+    return tuple(rows)
+
+
+def _hats(temp: FloatArray) -> FloatArray:
+    knots = np.linspace(temp.min(), temp.max(), KNOTS)
+    eye = np.eye(KNOTS)
+    return np.stack([np.interp(temp, knots, eye[k]) for k in range(KNOTS)], axis=1)
+
+
+def _row(
+    label: str,
+    basis: FloatArray,
+    reading: FloatArray,
+    temp: FloatArray,
+    halves: tuple[HalfCycle, ...],
+    *,
+    rate_scale: float | None,
+) -> DriftRow:
+    every = np.ones(len(temp), dtype=np.bool_)
+    solution = _solve(basis, reading, temp, every)
+    held_out = []
+    for half in halves if len(halves) > 1 else ():
+        kept = every.copy()
+        kept[half.start : half.stop] = False
+        part = _solve(basis, reading, temp, kept)
+        low, high = temp[kept].min(), temp[kept].max()
+        judged = ~kept & (low <= temp) & (temp <= high)
+        if judged.any():
+            held_out.append(_rms(basis, reading, temp, judged, part))
+    return DriftRow(
+        label=label,
+        parameters=basis.shape[1],
+        fitted=_rms(basis, reading, temp, every, solution),
+        held_out=np.array(held_out) if held_out else None,
+        rate=None if rate_scale is None else solution[-1] / rate_scale,
+    )
+
+
+def degree_weights(temp: FloatArray) -> FloatArray:
+    """Weights, shape (n,), mean 1, with which each degree counts the same."""
+    _, index, count = np.unique(np.floor(temp), return_inverse=True, return_counts=True)
+    weight = 1.0 / count[index]
+    result: FloatArray = weight / weight.mean()
+    return result
+
+
+def _solve(basis: FloatArray, reading: FloatArray, temp: FloatArray, kept: BoolArray) -> FloatArray:
+    root = np.sqrt(degree_weights(temp[kept]))[:, None]
+    found = np.linalg.lstsq(root * basis[kept], root * reading[kept], rcond=1e-10)[0]
+    return found.astype(np.float64)
+
+
+def _rms(
+    basis: FloatArray,
+    reading: FloatArray,
+    temp: FloatArray,
+    judged: BoolArray,
+    solution: FloatArray,
+) -> FloatArray:
+    error = reading[judged] - basis[judged] @ solution
+    weight = degree_weights(temp[judged])[:, None]
+    result: FloatArray = np.sqrt(np.mean(weight * error**2, axis=0))
+    return result

@@ -1,1 +1,0 @@
-"""Calibrations from other static recordings than the tilter's: known and unknown orientations."""

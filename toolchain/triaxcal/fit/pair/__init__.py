@@ -1,0 +1,1 @@
+"""An orthogonal pair of accelerometers on a dividing head."""

@@ -1,0 +1,67 @@
+"""What readings of a pair on a dividing head must look like before P3's coefficients mean anything.
+
+Source: P3 (3), (5): A swings as -g cos(theta), B as g sin(theta), but for small coefficients.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.outliers import left_out_residuals, worst_outlier
+from triaxcal.model.types import FloatArray
+
+SIZE_MAX = 1.5
+"""A sensitivity further from 1 than by this factor is another unit, no scale error."""
+TURNED_MAX_DEG = 15.0
+"""P3 is of first order in the coefficients and the head's zero: beyond are other axes or signs."""
+_UNITS = {9.80665: "m/s^2", 1000.0: "mg"}
+
+
+def refuse_other_readings(
+    source: str, theta_rad: FloatArray, a_g: FloatArray, b_g: FloatArray, gravity_g: float
+) -> None:
+    """Refuse readings in another unit, of other axes, or from another zero of the head.
+
+    Raises
+    ------
+    RefusedError
+        Naming the column and what it swings as.
+    """
+    s, c = np.sin(theta_rad), np.cos(theta_rad)
+    design = np.stack([np.ones_like(s), s, c], axis=-1)
+    for name, reading, nominal in (("a_g", a_g, (0.0, -1.0)), ("b_g", b_g, (1.0, 0.0))):
+        swing = np.linalg.lstsq(design, reading / gravity_g, rcond=None)[0][1:]
+        size = float(np.hypot(*swing))
+        if not 1 / SIZE_MAX < size < SIZE_MAX:
+            unit = next((u for k, u in _UNITS.items() if abs(np.log(size / k)) < 0.2), "")
+            raise RefusedError(
+                f"{source}, column {name}",
+                f"the readings swing by {size:.4g} g over a turn" + (f" ({unit}?)" if unit else ""),
+                expected="about 1 g",
+                remedy="give them in g",
+            )
+        turned = np.degrees(np.arctan2(swing[1], swing[0]) - np.arctan2(nominal[1], nominal[0]))
+        turned = (turned + 180.0) % 360.0 - 180.0
+        if abs(turned) > TURNED_MAX_DEG:
+            expected = "-cos(theta)" if name == "a_g" else "sin(theta)"
+            raise RefusedError(
+                f"{source}, column {name}",
+                f"the readings swing as {expected} turned by {turned:+.0f} deg",
+                expected=f"{expected}, within {TURNED_MAX_DEG:g} deg",
+                remedy="look at the order of the columns, at their signs, and at the head's zero: "
+                "at theta = 0 A reads -1 g, at 90 deg B reads +1 g",
+            )
+
+
+def doubtful_position(residual_g2: FloatArray, H: FloatArray) -> str:
+    """The position that the others contradict, in words; "" where there is none."""
+    left_out = left_out_residuals(residual_g2, H)
+    found = worst_outlier(residual_g2[:, None], left_out[:, None], H.shape[1])
+    if found is None:
+        return ""
+    k = found.indices[0]
+    return (
+        f"position {k + 1} is {abs(float(left_out[k])):.2g} g^2 in Z from what the others say, "
+        f"they fit within {found.others:.2g}: look at its row"
+    )

@@ -1,0 +1,1 @@
+"""Recordings of poses whose directions are unknown: |a| = g, and labelled faces."""

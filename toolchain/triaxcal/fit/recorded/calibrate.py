@@ -1,0 +1,387 @@
+"""A recording of poses in unknown orientations -> the calibration of its unit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from triaxcal.fit.core.calibration import Calibration, CalibrationPoint
+from triaxcal.fit.core.outliers import left_out_residuals, worst_outlier
+from triaxcal.fit.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
+from triaxcal.fit.core.thermal import polynomial_shape
+from triaxcal.fit.recorded.checks import (
+    crowd_finding,
+    refuse_few,
+    refuse_left_handed,
+    refuse_plane,
+    refuse_unseen,
+    refuse_wrong_unit,
+)
+from triaxcal.fit.recorded.frame import CASE, case_rotation, turned_constants, turned_quadratic
+from triaxcal.fit.recorded.magnitude import (
+    MODELS,
+    NINE,
+    ScalarData,
+    ScalarModel,
+    fit_scalar,
+    scalar_data,
+)
+from triaxcal.fit.recorded.rate import half_cycle_turns, pose_rates
+from triaxcal.fit.recorded.temperatures import (
+    recording_range,
+    temperature_findings,
+    temperature_groups,
+    thermal_orders,
+)
+from triaxcal.fit.recorded.trials import (
+    TURNS_MAX,
+    Judged,
+    PoseClimate,
+    Trial,
+    choose,
+    folds,
+    judge,
+    reason,
+    unscored,
+    without_idle_rates,
+)
+from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.terms import RateTerm, Terms
+from triaxcal.model.types import FloatArray
+from triaxcal.poses.poses import PoseSet, find_poses, orientation_groups
+from triaxcal.readings.measurements import Dwell, MeasurementSet
+from triaxcal.readings.samples import Samples
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.recording import RecordingLayout
+
+ESTIMATOR = "|a| = g"
+_UNCHECKED = (
+    "NOT CHECKED: {count} constants from {count} poses fit whatever the poses say; the residuals "
+    "are 0 by themselves, and how well the constants are known is unknown; record more poses, in "
+    "other orientations"
+)
+BEYOND_1_G = "quadratic terms were seen at 1 g; beyond it they grow with the square, unchecked"
+
+
+def calibrate_poses(
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples, known: FloatArray
+) -> tuple[MeasurementSet, Calibration]:
+    """Calibrate from poses of which only |a| = g is known; `known` is a part of Q, (3, 6).
+
+    Raises
+    ------
+    RefusedError
+        When the poses are too few, alike, in one plane, in another unit or left-handed, or do not
+        carry what unit.toml asks for.
+    """
+    poses = find_poses(samples, layout)
+    data, temps, findings = _prepared(unit, layout, samples, poses)
+    orientations, temperatures = _groups(data, temps)
+    halves = half_cycle_turns(temps)
+    rates = pose_rates(samples, poses, layout) if halves else None
+    if rates is None:
+        halves = []  # they judge a term in dT/dt; without a clock the rows' order says nothing
+    climate = PoseClimate(temps, rates, unit.loss)
+    left_out = folds(orientations, temperatures, len(temps)) + halves
+    trials = [
+        replace(trial, model=replace(trial.model, known=known))
+        for trial in _trials(unit, climate, temperatures)
+    ]
+    rows = [judge(trial, data, climate, left_out) for trial in trials]
+    turns = _turns(orientations, temperatures, len(halves))
+    if unscored(rows):
+        # Single poses, not half-cycles, are spared here: nothing could judge a term in dT/dt.
+        halves, trials = [], [trial for trial in trials if not trial.rate]
+        left_out = folds([[k] for k in range(len(temps))], temperatures, len(temps))
+        rows = [judge(trial, data, climate, left_out) for trial in trials]
+        turns = f"{len(temps)} single poses, alike ones staying in,"
+    if not any(row.able for row in rows):
+        largest = max(rows, key=lambda row: -row.trial.parameters)
+        refuse_unseen(poses, largest.fit.condition, largest.fit.unseen())
+        refuse_few(poses, len(orientations), rows[0].trial.parameters + 1)
+    values = sum(int(judged.sum()) for _, judged in left_out)
+    able = without_idle_rates(rows, sum(int(judged.sum()) for _, judged in halves))
+    best = choose(able)
+    why = reason(able, best, turns, values)
+    findings += _outlier(_widest_linear(rows, best), poses, unit.loss) + (
+        [BEYOND_1_G] if len(best.fit.model.quadratic) else []
+    )
+    shown = climate.rates if best.trial.rate else None
+    measurements = MeasurementSet(poses.source, pose_dwells(poses, temps, shown))
+    made = _Made(unit, layout, poses, climate, rows, best, why, findings)
+    return measurements, made.calibration()
+
+
+def _prepared(
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples, poses: PoseSet
+) -> tuple[ScalarData, FloatArray, list[str]]:
+    """Scaled poses with weights, their temperatures, and what has been found so far."""
+    findings = [*poses.findings]
+    refuse_wrong_unit(poses.source, poses.readings, layout)
+    recorded = poses.temps_degc
+    temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
+    refuse_few(poses, len(poses.poses), MODELS[0].parameters)
+    ones = np.ones(len(temps))
+    rough = scalar_data(poses.readings, ones[:, None], ones, unit.gravity_g)
+    axes = refuse_left_handed(samples, layout, rough.centre)
+    orientations, _ = _groups(rough, temps)
+    refuse_few(poses, len(orientations), MODELS[0].parameters)
+    refuse_plane(poses, rough.radius)
+    crowd = crowd_finding(orientations, poses)
+    if crowd:
+        findings.append(crowd)
+    findings += temperature_findings(unit, recorded)
+    findings.append(axes)
+    weight = np.ones(len(temps))
+    for group in _cells(orientations, temps):
+        weight[group] = 1.0 / math.sqrt(len(group))
+    data = scalar_data(poses.readings, ones[:, None], weight, unit.gravity_g)
+    return data, temps, findings
+
+
+def _directions(data: ScalarData) -> FloatArray:
+    unit: FloatArray = data.reading / np.linalg.norm(data.reading, axis=1, keepdims=True)
+    return unit
+
+
+def _groups(data: ScalarData, temps: FloatArray) -> tuple[list[list[int]], list[list[int]]]:
+    """Poses by orientation, and by temperature (rising)."""
+    return orientation_groups(_directions(data)), temperature_groups(temps)
+
+
+def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
+    """Poses alike in orientation and temperature: they say one thing, and count as one."""
+    return [
+        [group[k] for k in cell]
+        for group in orientations
+        for cell in temperature_groups(temps[group])
+    ]
+
+
+def _trials(
+    unit: UnitDescription, climate: PoseClimate, temperatures: list[list[int]]
+) -> list[Trial]:
+    """Every model at one temperature, and the nine constants with each thermal order.
+
+    With a term in dT/dt besides, where there are half-cycles to judge it on.
+    """
+    trials = []
+    temps = climate.temps_degc
+    for order in thermal_orders(unit, temps, temperatures):
+        shape = polynomial_shape(temps, unit.t0_degc, order)
+        if order == 0:
+            trials += [Trial(model, shape, 1) for model in _models(unit)]
+        else:
+            gains = sorted({1, order, order + 1})
+            trials += [Trial(NINE, shape, g) for g in gains]
+            if climate.rates is not None:
+                trials += [Trial(NINE, shape, g, rate=True) for g in gains]
+    return trials
+
+
+def _models(unit: UnitDescription) -> tuple[ScalarModel, ...]:
+    kept = {"auto": MODELS, "linear": MODELS[:3], "quadratic": MODELS[3:]}
+    return kept[unit.terms]
+
+
+def _turns(orientations: list[list[int]], temperatures: list[list[int]], halves: int) -> str:
+    inner = max(len(temperatures) - 2, 0) if len(temperatures) >= 4 else 0
+    bundles = f" in {TURNS_MAX} bundles" if len(orientations) > TURNS_MAX else ""
+    words = f"{len(orientations)} orientations{bundles}"
+    words += f" and {inner} temperatures" if inner else ""
+    return words + (f" and {halves} half-cycles" if halves else "")
+
+
+def _widest_linear(rows: list[Judged], best: Judged) -> Judged:
+    """The chosen row or the one with most constants that is linear and follows temperature alike.
+
+    One wrong pose can make a small model win, in which all residuals are as large as its own.
+    """
+    alike = [
+        row
+        for row in rows
+        if row.able
+        and not len(row.trial.model.quadratic)
+        and row.trial.shape.parameters == best.trial.shape.parameters
+        and row.trial.gain_functions == best.trial.gain_functions
+        and row.trial.rate == best.trial.rate
+    ]
+    return max([best, *alike], key=lambda row: row.trial.parameters)
+
+
+def _outlier(judge: Judged, poses: PoseSet, loss: str) -> list[str]:
+    """Names a pose that the others contradict, by its leverage in a least-squares fit."""
+    fit = judge.fit
+    if loss != "linear":  # leverage and F are those of least squares
+        fit = fit_scalar(fit.model, fit.data, fit.gain_functions, start=fit.theta)
+    weighted = fit.residual_g * fit.data.weight
+    left_out = left_out_residuals(weighted, fit.jacobian)
+    found = worst_outlier(weighted[:, None], left_out[:, None], len(fit.theta))
+    if found is None:
+        return []
+    worst = found.indices[0]
+    numbers = " or ".join(f"pose {poses.poses[k].number}" for k in found.indices[:4])
+    error = left_out[worst] / fit.data.weight[worst] * 1e3
+    remedy = 'take it out, or set [fit] loss = "huber"' if loss == "linear" else "or take it out"
+    told = (
+        f"{numbers} (line {poses.poses[worst].line}) stands out: |a| is {error:+.3g} mg off by the "
+        f"other poses, which are within {found.others * 1e3:.2g} mg rms; look at it, {remedy}"
+    )
+    return [told]
+
+
+def pose_dwells(
+    poses: PoseSet, temps: FloatArray, rates: FloatArray | None = None
+) -> tuple[Dwell, ...]:
+    """Poses as dwells, named P and their number; with dT/dt where a term in it is fitted."""
+    rates = np.zeros(len(temps)) if rates is None else rates
+    return tuple(
+        Dwell(
+            row=pose.line,
+            position=f"P{pose.number}",
+            temp_degc=float(temp),
+            voltage_v=pose.reading,
+            count=None,
+            sd_v=None,
+            rate_k_per_s=float(rate),
+        )
+        for pose, temp, rate in zip(poses.poses, temps, rates, strict=True)
+    )
+
+
+@dataclass(frozen=True)
+class _Made:
+    """What a calibration is put together from."""
+
+    unit: UnitDescription
+    layout: RecordingLayout
+    poses: PoseSet
+    climate: PoseClimate
+    rows: list[Judged]
+    best: Judged
+    why: str
+    findings: list[str]
+
+    def calibration(self) -> Calibration:
+        """The calibration, in the frame of the layout."""
+        fit = self.best.fit
+        constants, slopes = fit.constants(), fit.constants_jacobian()
+        quadratic, patterns = fit.quadratic, fit.model.quadratic
+        findings = list(self.findings)
+        if self.layout.frame == CASE:
+            force = force_from_voltage(fit.data.basis @ constants.T, self.poses.readings)
+            rotation, told = case_rotation(self.poses.source, force)
+            findings.append(told)
+            constants = turned_constants(constants, rotation)
+            quadratic = turned_quadratic(quadratic, rotation)
+            patterns = np.array([turned_quadratic(pattern, rotation) for pattern in patterns])
+            turned = [turned_constants(slopes[..., k], rotation) for k in range(slopes.shape[-1])]
+            slopes = np.stack(turned, axis=-1)
+        rate = self._rate_term(constants) if self.best.trial.rate else None
+        known = NO_TERMS_COVARIANCE
+        if len(patterns):
+            count, pattern = len(patterns), patterns.reshape(-1, 18)
+            mixed = fit.covariance[:, -count:] @ pattern
+            own = pattern.T @ fit.covariance[-count:, -count:] @ pattern
+            known = TermsCovariance(own, slopes @ mixed)
+        if rate is not None:
+            known = TermsCovariance(rate_g2=self._rate_covariance(constants, slopes))
+            findings.append(rate_in_words(rate))
+            constants, slopes = constants[:, :-1], slopes[:, :-1]
+        covariance = np.einsum("apk,kl,bql->apbq", slopes, fit.covariance, slopes)
+        if len(fit.residual_g) == len(fit.theta):
+            covariance = np.full_like(covariance, np.nan)
+            findings.insert(0, _UNCHECKED.format(count=len(fit.theta)))
+        terms = Terms(quadratic if quadratic.any() else None, rate)
+        return self._calibration(constants, terms, covariance, known, findings)
+
+    def _rate_term(self, constants: FloatArray) -> RateTerm:
+        """The biases' last function, reading units at the largest rate, as an offset of a at T0."""
+        rates, shape = self.climate.rates, self.best.trial.shape
+        assert rates is not None
+        at_t0 = constants[:9, :-1] @ shape.basis(self.unit.t0_degc)
+        per_rate = constants[9:, -1] / np.abs(rates).max()
+        offset = -np.linalg.solve(at_t0.reshape(3, 3), per_rate).astype(np.float64)
+        # A hundredth beyond: the fastest pose must not be clamped by the rounding of its code.
+        low, high = 1.01 * min(float(rates.min()), 0.0), 1.01 * max(float(rates.max()), 0.0)
+        return RateTerm(offset, (low, high))
+
+    def _rate_covariance(self, constants: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Covariance (3, 3) of the offset at the largest rate and T0, g^2."""
+        at_t0 = constants[:9, :-1] @ self.best.trial.shape.basis(self.unit.t0_degc)
+        offset = np.linalg.solve(at_t0.reshape(3, 3), slopes[9:, -1])
+        result: FloatArray = offset @ self.best.fit.covariance @ offset.T
+        return result
+
+    def _calibration(
+        self,
+        constants: FloatArray,
+        terms: Terms,
+        covariance: FloatArray,
+        known: TermsCovariance,
+        findings: list[str],
+    ) -> Calibration:
+        fit, t0, shape = self.best.fit, self.unit.t0_degc, self.best.trial.shape
+        thermal = shape.model(constants)
+        basis = shape.basis(t0)
+        dof = len(fit.residual_g) - len(fit.theta)
+        result = RecordingFit(
+            poses=self.poses,
+            route=f"only |a| = g known; frame: {self.layout.frame}",
+            covariance=covariance,
+            dof=dof,
+            rms_g=fit.rms_g,
+            rms_free_g=math.sqrt(float((fit.residual_g**2).sum()) / dof) if dof else math.nan,
+            held_out_g=self.best.held_out_g,
+            left_out_length_g=self.best.length_g(len(self.poses.poses)),
+            condition=fit.condition,
+            weakest=fit.unseen(),
+            residual_g=fit.residual_g,
+            findings=tuple(findings),
+            terms=known,
+        )
+        return Calibration(
+            serial=self.unit.serial,
+            estimator=ESTIMATOR,
+            thermal=thermal,
+            shape=shape,
+            range_degc=recording_range(self.unit, self.poses, self.climate.temps_degc),
+            points=(
+                CalibrationPoint(
+                    temp_degc=t0,
+                    constants=thermal.constants_at(t0),
+                    covariance=np.einsum("p,apbq,q->ab", basis, covariance, basis),
+                    position_residual_g=fit.rms_g,
+                    curve_residual_g=fit.rms_g,
+                ),
+            ),
+            parameter_covariance=covariance_blocks(covariance),
+            covariance_source="scatter of |a| - g over the poses, "
+            f"{dof} degree{'s' * (dof != 1)} of freedom",
+            candidates=tuple(
+                row.candidate(ESTIMATOR, chosen=row is self.best) for row in self.rows
+            ),
+            selection_reason=self.why,
+            check_dwells=(),
+            terms=terms,
+            recording=result,
+            reading_unit=self.layout.acceleration_unit,
+        )
+
+
+def rate_in_words(rate: RateTerm) -> str:
+    """What a term in dT/dt is, and what the firmware does about it."""
+    offset = ", ".join(f"{v * 1e3 / 60.0:.3g}" for v in rate.offset_g_s_per_k)
+    low, high = (60.0 * v for v in rate.range_k_per_s)
+    return (
+        f"a term in dT/dt is fitted: {offset} mg for 1 K/min in x, y, z, from {low:.3g} to "
+        f"{high:+.3g} K/min; the firmware gives the rate by triax_set_temperature_rate"
+    )
+
+
+def covariance_blocks(covariance: FloatArray) -> FloatArray:
+    """The blocks of each output, (3, 4, P, 4, P), of (12, P, 12, P)."""
+    rows = np.array([[3 * i, 3 * i + 1, 3 * i + 2, 9 + i] for i in range(3)])
+    return np.stack([covariance[r][:, :, r] for r in rows])

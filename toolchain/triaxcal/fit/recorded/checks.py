@@ -1,0 +1,226 @@
+"""What is wrong with a set of poses before anything is fitted, each fault with what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations, product
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+from triaxcal.poses.poses import ALIKE_DEG, PoseSet
+from triaxcal.readings.samples import Samples
+from triaxcal.unit.recording import SAMPLES, RecordingLayout
+
+CONDITION_MAX = 100.0
+"""Of the scaled Jacobian: beyond it a hundredth of a constant's effect tells it from the others."""
+_PLANE = 0.02
+"""Rms distance of the poses from a plane, of 1 g: a bias across it has 50 times their noise."""
+_CROWD = 0.6
+"""Of the poses in one orientation: a crowd that is told."""
+_HANDED_MIN = 0.35
+"""Correlation of the movement with the gyro that can decide: logs turned by hand have about 0.5."""
+_MOVING_MIN = 50
+"""Samples of movement that can decide."""
+_COUNTS_MIN = 50.0
+"""Length of 1 g in counts: a code of a 50th of 1 g, 20 mg, is coarser than any sensor."""
+_SIZES = {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3}
+_HANDED_UNKNOWN = (
+    "note: |a| is the same with left-handed axes and with all signs turned, so neither can be seen "
+    "here: an axis that points up must read more than its bias, and x, y, z must be right-handed"
+)
+_SIGN_UNKNOWN = (
+    "note: the axes turn as the gyro says; that all three signs are turned cannot be seen here: an "
+    "axis that points up must read more than its bias"
+)
+
+
+def refuse_wrong_unit(source: str, readings: FloatArray, layout: RecordingLayout) -> None:
+    """Refuse readings whose length is not near 1 g in the unit that is stated.
+
+    The median over the poses: biases and scale errors stay far within a factor of two.
+    """
+    one_g = layout.reading_of_1_g
+    length = float(np.median(np.linalg.norm(readings, axis=1)))
+    if one_g is None:
+        _refuse_no_counts(source, layout, length)
+        return
+    if 0.5 * one_g <= length <= 2.0 * one_g:
+        return
+    near = [u for u, size in _SIZES.items() if 0.7 * size <= length <= 1.4 * size]
+    remedy = (
+        f'{near[0]} taken for {layout.acceleration_unit}? then acceleration_unit = "{near[0]}"'
+        if near
+        else 'if these are raw codes, acceleration_unit = "count"'
+    )
+    raise RefusedError(
+        source,
+        f"the poses' readings are about {length:.4g} {layout.acceleration_unit} long",
+        expected=f"about {one_g:g} at rest",
+        remedy=remedy,
+    )
+
+
+def _refuse_no_counts(source: str, layout: RecordingLayout, length: float) -> None:
+    """Refuse counts that are so small that they are none: a code would be a big step."""
+    if layout.acceleration_unit != "count" or length > _COUNTS_MIN:
+        return
+    near = [u for u, size in _SIZES.items() if 0.7 * size <= length <= 1.4 * size]
+    raise RefusedError(
+        source,
+        f"the poses' readings are about {length:.4g} counts long",
+        expected=f"more than {_COUNTS_MIN:g}: the firmware computes from whole counts",
+        remedy=f'{near[0]} taken for counts? then acceleration_unit = "{near[0]}"'
+        if near
+        else "give the unit of the readings, acceleration_unit",
+    )
+
+
+def turned_columns(layout: RecordingLayout, order: Sequence[int], turned: Sequence[bool]) -> str:
+    """Line for unit.toml: the layout's own columns in another order, some with the other sign."""
+    words = []
+    for k, negative in zip(order, turned, strict=True):
+        column = layout.acceleration[k]
+        minus = (column.sign < 0) != bool(negative)
+        if isinstance(column.column, int):
+            words.append(str(-column.column if minus else column.column))
+        else:
+            words.append(f'"{"-" * minus}{column.column}"')
+    return f"acceleration = [{', '.join(words)}]"
+
+
+def refuse_left_handed(samples: Samples, layout: RecordingLayout, centre: FloatArray) -> str:
+    """Refuse readings that turn the other way than the gyro says; `centre` is a rough bias, (3,).
+
+    What the recording cannot tell of its axes is returned, in words.
+
+    A force fixed in the world, seen from the turning unit, obeys da/dt = a x w. Over slow movement
+    both sides correlate for one way of naming and signing the axes: it must be theirs.
+    """
+    if samples.gyro is None or layout.rows != SAMPLES or len(samples.reading) < _MOVING_MIN:
+        return _HANDED_UNKNOWN
+    window = max(1, round(0.1 / samples.step_s))
+    force = _smooth(samples.reading - centre, window)
+    rate = _smooth(samples.gyro - np.median(samples.gyro, axis=0), window)
+    change = np.gradient(force, axis=0)
+    length, speed = np.linalg.norm(force, axis=1), np.linalg.norm(rate, axis=1)
+    middle = float(np.median(length))
+    # Where |a| is far from 1 g the hand pushes, and it is not gravity that is seen.
+    moving = (np.abs(length - middle) < 0.1 * middle) & (speed > np.percentile(speed, 70))
+    if moving.sum() < _MOVING_MIN:
+        return _HANDED_UNKNOWN
+    scores = {
+        turned: _correlation(change[moving] @ matrix.T, force[moving] @ matrix.T, rate[moving])
+        for turned, matrix in _TURNS.items()
+    }
+    best = max(scores, key=lambda turned: scores[turned])
+    own = scores["x, y, z"]
+    if own >= _HANDED_MIN and scores[best] < 2.0 * own:
+        return _SIGN_UNKNOWN
+    if scores[best] < _HANDED_MIN or scores[best] < 2.0 * own:
+        return _HANDED_UNKNOWN
+    matrix = _TURNS[best]
+    order = np.abs(matrix).argmax(axis=1).tolist()
+    columns = turned_columns(layout, order, (matrix.sum(axis=1) < 0.0).tolist())
+    raise RefusedError(
+        samples.source,
+        f"the readings turn with the gyro as x, y, z = {best} would (correlation "
+        f"{scores[best]:.2f}; {own:.2f} as they are)",
+        expected="da/dt = a x w, right-handed axes for both",
+        remedy=f"left-handed axes? then {columns}; if only the gyro is turned, leave it out",
+    )
+
+
+def _correlation(change: FloatArray, force: FloatArray, rate: FloatArray) -> float:
+    predicted = np.cross(force, rate)
+    size = float(np.linalg.norm(change) * np.linalg.norm(predicted))
+    return float((change * predicted).sum()) / size if size else 0.0
+
+
+def _turns() -> dict[str, FloatArray]:
+    """The 24 ways to name and sign three axes, by their names.
+
+    A sign of all three changes nothing here: of two such ways the one with fewer signs.
+    """
+    turns = {}
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            if sum(signs) < 0.0:
+                continue
+            matrix = np.zeros((3, 3))
+            matrix[np.arange(3), list(order)] = signs
+            words = [("" if s > 0 else "-") + AXES[k] for k, s in zip(order, signs, strict=True)]
+            turns[", ".join(words)] = matrix
+    return turns
+
+
+_TURNS = _turns()
+
+
+def _smooth(values: FloatArray, window: int) -> FloatArray:
+    kernel = np.ones(window) / window
+    return np.stack([np.convolve(values[:, k], kernel, mode="same") for k in range(3)], axis=1)
+
+
+def crowd_finding(groups: list[list[int]], poses: PoseSet) -> str:
+    """Sentence about poses of which most look alike; "" when they do not."""
+    largest = max(groups, key=len)
+    if len(groups) < 2 or len(largest) < _CROWD * len(poses.poses):
+        return ""
+    numbers = ", ".join(str(poses.poses[k].number) for k in largest[:6])
+    more = ", ..." if len(largest) > 6 else ""
+    return (
+        f"{len(largest)} of {len(poses.poses)} poses look alike (within {ALIKE_DEG:g} deg: poses "
+        f"{numbers}{more}); together they count as one orientation"
+    )
+
+
+def refuse_few(poses: PoseSet, orientations: int, needed: int) -> None:
+    """Refuse fewer orientations than the smallest model has constants."""
+    if orientations >= needed:
+        return
+    looked = f"{len(poses.poses)} pose{'s' * (len(poses.poses) != 1)}"
+    refused = "; ".join(f"pose {r.number}: {r.reason}" for r in poses.refused[:3])
+    raise RefusedError(
+        poses.source,
+        f"{looked} in {orientations} orientation{'s' * (orientations != 1)}"
+        + (f" ({refused})" if refused else ""),
+        expected=f"{needed} different orientations at least, 9 for all constants, 12 and more to "
+        "have some left to check on",
+        remedy="add poses that are not alike: six faces, then edges and corners"
+        + (
+            "; `triaxcal drift` shows one orientation over temperature"
+            if len(poses.poses) == 1
+            else ""
+        ),
+    )
+
+
+def refuse_plane(poses: PoseSet, radius: float) -> None:
+    """Refuse poses in a plane: no sphere is seen by a circle. `radius` is about that of 1 g."""
+    centred = poses.readings - poses.readings.mean(axis=0)
+    _, singular, directions = np.linalg.svd(centred / radius / np.sqrt(len(centred)))
+    if singular[-1] >= _PLANE:
+        return
+    normal = AXES[int(np.abs(directions[-1]).argmax())]
+    raise RefusedError(
+        poses.source,
+        f"the {len(poses.poses)} poses, which lie near one plane, leave U0{normal} and what goes "
+        f"with it open (they are within {np.degrees(singular[-1]):.2g} deg of the plane, rms)",
+        expected=f"{np.degrees(_PLANE):.2g} deg at least",
+        remedy=f"add poses with {normal} up and down, and some between",
+    )
+
+
+def refuse_unseen(poses: PoseSet, condition: float, unseen: str) -> None:
+    """Refuse poses that leave a constant open."""
+    if condition <= CONDITION_MAX:
+        return
+    raise RefusedError(
+        poses.source,
+        f"the {len(poses.poses)} poses leave {unseen} open (condition number {condition:.3g})",
+        expected=f"a condition number of at most {CONDITION_MAX:g}",
+        remedy="add poses with each axis up and down, and some between",
+    )

@@ -1,0 +1,137 @@
+"""Labelled sections of a recording, the unit on its faces: the tilter's six positions by hand."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import did_you_mean, shown
+from triaxcal.fit.core.grouping import GROUP_GAP_DEGC
+from triaxcal.fit.recorded.checks import refuse_wrong_unit
+from triaxcal.model.positions import AXES, TEST_POSITIONS
+from triaxcal.model.types import FloatArray
+from triaxcal.readings.measurements import Dwell, MeasurementSet
+from triaxcal.readings.samples import Samples
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.recording import FACES, RecordingLayout
+
+_MOVING = 0.1
+"""Of 1 g: a section whose readings scatter by more was not held still."""
+
+
+def face_measurements(
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples
+) -> MeasurementSet:
+    """One dwell a face and temperature, from all samples of its sections.
+
+    A section is taken whole: who labelled it says that the unit lay still in it. Without a
+    temperature column all are at T0.
+
+    Raises
+    ------
+    RefusedError
+        When a face has no section, readings are in another unit, or the unit moved.
+    """
+    assert samples.label is not None
+    runs = _runs(samples.label)
+    faces = [(layout.faces[label], part) for label, part in runs if label in layout.faces]
+    _refuse_missing(unit, layout, samples)
+    means = np.array([samples.reading[part].mean(axis=0) for _, part in faces])
+    refuse_wrong_unit(samples.source, means, layout)
+    one_g = float(np.median(np.linalg.norm(means - means.mean(axis=0), axis=1)))
+    for _, part in faces:
+        _refuse_moving(samples, part, one_g)
+    temps = [
+        unit.t0_degc if samples.temp_degc is None else float(samples.temp_degc[part].mean())
+        for _, part in faces
+    ]
+    cells = _cells([face for face, _ in faces], temps)
+    return MeasurementSet(
+        samples.source, tuple(_dwell(samples, faces, temps, cell) for cell in cells)
+    )
+
+
+def _refuse_missing(unit: UnitDescription, layout: RecordingLayout, samples: Samples) -> None:
+    """Refuse a face without a section, by the label that it should have."""
+    assert samples.label is not None
+    unnamed = [face for face in FACES if face not in layout.faces.values()]
+    if unnamed:
+        raise RefusedError(
+            f"{unit.name}/unit.toml, [recording] faces",
+            f"no label for {', '.join(unnamed)}",
+            expected="six faces, +x, -x, +y, -y, +z and -z",
+            remedy='name the sections in which these axes point up, or leave out faces: "|a| = g" '
+            "alone then serves",
+        )
+    present = set(samples.label)
+    for face in FACES:
+        labels = [label for label, up in layout.faces.items() if up == face]
+        if present.isdisjoint(labels):
+            others = sorted(present - set(layout.faces))
+            hint = did_you_mean(labels[0], [label for label in others if label])
+            raise RefusedError(
+                samples.source,
+                f"no section {shown(labels[0])}, {face} up{hint}; sections found: "
+                + ", ".join(sorted(present)[:10]),
+                expected="one of each label in [recording] faces",
+                remedy="correct the label in faces, or record that face",
+            )
+
+
+def _runs(labels: tuple[str, ...]) -> list[tuple[str, slice]]:
+    runs, start = [], 0
+    for label, part in groupby(labels):
+        stop = start + len(list(part))
+        runs.append((label, slice(start, stop)))
+        start = stop
+    return runs
+
+
+def _cells(faces: list[str], temps: list[float]) -> list[list[int]]:
+    """Sections of one face at one temperature."""
+    cells: list[list[int]] = []
+    for k in sorted(range(len(faces)), key=lambda k: (faces[k], temps[k])):
+        last = cells[-1][-1] if cells else None
+        if last is not None and faces[last] == faces[k] and temps[k] - temps[last] < GROUP_GAP_DEGC:
+            cells[-1].append(k)
+        else:
+            cells.append([k])
+    return sorted(cells)
+
+
+def _dwell(
+    samples: Samples, faces: list[tuple[str, slice]], temps: list[float], cell: list[int]
+) -> Dwell:
+    reading: FloatArray = np.concatenate([samples.reading[faces[k][1]] for k in cell])
+    return Dwell(
+        row=int(samples.line[faces[cell[0]][1].start]),
+        position=position_of(faces[cell[0]][0]),
+        temp_degc=float(np.mean([temps[k] for k in cell])),
+        voltage_v=reading.mean(axis=0),
+        count=None,
+        sd_v=None,
+    )
+
+
+def position_of(face: str) -> str:
+    """Test position in which an axis, as "+x", points up."""
+    axis = AXES.index(face[1])
+    sign = 1 if face[0] == "+" else -1
+    return next(name for name, force in TEST_POSITIONS.items() if force[axis] == sign)
+
+
+def _refuse_moving(samples: Samples, part: slice, one_g: float) -> None:
+    deviation = samples.reading[part].std(axis=0)
+    if deviation.max() <= _MOVING * one_g:
+        return
+    axis = int(deviation.argmax())
+    assert samples.label is not None
+    raise RefusedError(
+        f"{samples.source}, line {samples.line[part.start]}",
+        f'section "{samples.label[part.start]}" moves: axis {AXES[axis]} scatters by '
+        f"{deviation[axis] / one_g:.2g} g",
+        expected=f"at most {_MOVING:g} g while the unit lies on a face",
+        remedy="cut the section to where it lies still",
+    )

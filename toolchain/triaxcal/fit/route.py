@@ -1,0 +1,111 @@
+"""Which calibration a recording gets: what unit.toml says of its poses decides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.pair.cross_coupling import stated_pair
+from triaxcal.fit.recorded.calibrate import calibrate_poses
+from triaxcal.fit.recorded.faces import face_measurements
+from triaxcal.fit.recorded.temperatures import temperature_findings
+from triaxcal.fit.table.calibrate import calibrate_table
+from triaxcal.fit.tilter.acceptance import refuse_unacceptable
+from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.readings.samples import Samples, read_samples
+from triaxcal.unit.description import Adc, UnitDescription
+from triaxcal.unit.recording import RecordingLayout
+
+_WIDTHS = (16, 17, 20, 24, 25, 32)
+"""Raw codes that are tried for counts: signed 16, unsigned 16, and so on."""
+
+
+def calibrate_recording(
+    unit: UnitDescription, layout: RecordingLayout, folder: Path
+) -> tuple[UnitDescription, MeasurementSet, Calibration]:
+    """Unit with its raw codes settled, the poses as dwells, and the calibration.
+
+    Raises
+    ------
+    RefusedError
+        When the recording cannot be read, or its poses do not carry a calibration.
+    """
+    pair = stated_pair(unit, folder)
+    known = np.zeros((3, 6)) if pair is None else pair.quadratic
+    samples = read_samples(folder, layout, unit.temperature_sensor)
+    unit = replace(unit, adc=_wide_enough(unit, layout, samples))
+    if layout.faces:
+        measurements = face_measurements(unit, layout, samples)
+        found = calibrate(unit, measurements, pair)
+        refuse_unacceptable(unit, found, measurements)
+        unseen = temperature_findings(unit, samples.temp_degc)
+        calibration = replace(
+            found,
+            reading_unit=layout.acceleration_unit,
+            notes=(*samples.findings, *found.notes, *unseen),
+        )
+        return unit, measurements, calibration
+    if layout.angles is not None:
+        measurements, calibration = calibrate_table(unit, layout, layout.angles, samples, known)
+    else:
+        measurements, calibration = calibrate_poses(unit, layout, samples, known)
+    _refuse_beyond_limits(unit, calibration)
+    recording = calibration.recording
+    assert recording is not None
+    told = () if pair is None else pair.findings
+    recording = replace(recording, findings=(*recording.findings, *told))
+    return unit, measurements, replace(calibration, recording=recording, pair=pair)
+
+
+def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Samples) -> Adc:
+    """The ADC, widened to hold the readings where unit.toml left its bits open."""
+    adc = unit.adc
+    lsb = adc.volts_per_code
+    # Half a code: readings in other units than counts are not rounded to codes.
+    low = float(samples.reading.min()) / lsb + 0.5
+    high = float(samples.reading.max()) / lsb - 0.5
+    if adc.code_min <= low and high <= adc.code_max:
+        return adc
+    fitting = [b for b in _WIDTHS if -(2 ** (b - 1)) <= low and high <= 2 ** (b - 1) - 1]
+    if unit.adc_open and fitting:
+        bits = fitting[0]
+        half = 2 ** (bits - 1)
+        return Adc(bits, lsb * half, -half, half - 1)
+    index = int(np.abs(samples.reading).max(axis=1).argmax())
+    wide = f"bits = {fitting[0]}" if fitting else "a larger lsb"
+    raise RefusedError(
+        f"{samples.source}, line {samples.line[index]}",
+        f"a reading of {np.abs(samples.reading).max():.6g} {layout.acceleration_unit}, "
+        f"{np.abs(samples.reading).max() / lsb:.0f} codes",
+        expected=f"{adc.code_min} to {adc.code_max} codes of [adc]",
+        remedy=f"set [adc] {wide}, or correct lsb, code_min and code_max",
+    )
+
+
+def _refuse_beyond_limits(unit: UnitDescription, calibration: Calibration) -> None:
+    """P1 (13) at the poses; the compiled C is asked again afterwards."""
+    recording = calibration.recording
+    if recording is None:
+        return
+    errors = recording.residual_g
+    poses = recording.poses.poses
+    temps = [unit.t0_degc if p.temp_degc is None else p.temp_degc for p in poses]
+    limits = np.array([unit.limits.at(t, unit.t0_degc)[0] for t in temps])
+    worst = int((np.abs(errors) / limits).argmax())
+    if abs(errors[worst]) <= limits[worst]:
+        return
+    pose = poses[worst]
+    key = unit.limits.at(temps[worst], unit.t0_degc)[1]
+    raise RefusedError(
+        f"{recording.poses.source}, line {pose.line}",
+        f"| |a| - g | = {abs(errors[worst]) * 1e3:.4g} mg in pose {pose.number}, rms over "
+        f"the poses {recording.rms_g * 1e3:.3g} mg",
+        expected=f"at most {limits[worst] * 1e3:g} mg ({key})",
+        remedy="look at that pose with `triaxcal poses`; if it is sound, state the limit that "
+        "this sensor keeps",
+    )

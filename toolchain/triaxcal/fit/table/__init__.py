@@ -1,0 +1,1 @@
+"""Poses with the angles of a table."""

@@ -1,0 +1,300 @@
+"""Poses with the angles of a table -> the calibration of the unit, P0."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.calibration import Calibration, CalibrationPoint
+from triaxcal.fit.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
+from triaxcal.fit.core.thermal import polynomial_shape
+from triaxcal.fit.recorded.calibrate import (
+    BEYOND_1_G,
+    covariance_blocks,
+    pose_dwells,
+)
+from triaxcal.fit.recorded.checks import CONDITION_MAX, refuse_wrong_unit
+from triaxcal.fit.recorded.temperatures import (
+    recording_range,
+    temperature_findings,
+    thermal_orders,
+)
+from triaxcal.fit.recorded.trials import beats
+from triaxcal.fit.table.candidates import (
+    LEFT_OUT_MAX,
+    TablePoses,
+    TableRow,
+    TableTrial,
+    judge_table,
+    one_temperature_trials,
+    thermal_design,
+    thermal_trials,
+    turns,
+)
+from triaxcal.fit.table.checks import (
+    known_force,
+    outlier_findings,
+    pose_temperatures,
+    refuse_degrees,
+    refuse_few_poses,
+    refuse_open,
+)
+from triaxcal.fit.table.harmonics import table_findings
+from triaxcal.fit.table.oriented import TRACELESS, table_error_g
+from triaxcal.model.orientation import angle_slopes, angles_from_force, gravity_direction
+from triaxcal.model.terms import NO_TERMS, Terms, products
+from triaxcal.model.types import FloatArray
+from triaxcal.poses.poses import PoseSet, find_poses
+from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.readings.samples import Samples
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.recording import Angles, RecordingLayout
+
+_RAD_PER_ARCSEC = math.pi / 180.0 / 3600.0
+
+
+def calibrate_table(
+    unit: UnitDescription,
+    layout: RecordingLayout,
+    angles: Angles,
+    samples: Samples,
+    known_quadratic: FloatArray,
+) -> tuple[MeasurementSet, Calibration]:
+    """Calibrate from poses whose angles are known; `known_quadratic` is a part of Q, (3, 6).
+
+    Raises
+    ------
+    RefusedError
+        When there are too few poses, the angles are in another unit, the axes are exchanged or
+        left-handed, the angles leave constants open, or a pose contradicts the others by more
+        than the limit.
+    """
+    poses = find_poses(samples, layout)
+    readings, table = poses.readings, np.array([p.angles_rad for p in poses.poses])
+    refuse_wrong_unit(poses.source, readings, layout)
+    refuse_few_poses(poses)
+    refuse_degrees(poses.source, angles, readings, table, unit.gravity_g)
+    refuse_open(poses, gravity_direction(angles.kind, table))
+    temps, temperatures = pose_temperatures(unit, poses)
+    force, sign = known_force(poses.source, layout, readings, table, unit.gravity_g)
+    known = TablePoses(readings, force, temps, known_quadratic)
+    left_out = turns(known, temperatures)
+    trials = [t for t in _trials(unit, temps, temperatures) if t.parameters <= 3 * len(temps)]
+    rows = [judge_table(trial, known, left_out) for trial in trials]
+    able = [r for r in rows if r.held_out_g is not None]
+    if not able:
+        raise _open(unit, poses, rows)
+    best, why = _choose(able, temperatures)
+    found = sign * (best.own_g + force)
+    near = min(temperatures, key=lambda group: abs(temps[group].mean() - unit.t0_degc))
+    findings = [
+        *poses.findings,
+        *outlier_findings(unit, angles, poses, table=table, sign=sign, best=best),
+        *([BEYOND_1_G] if best.trial.parameters > 12 and best.fit.quadratic is not None else []),
+        *temperature_findings(unit, poses.temps_degc),
+        *table_findings(angles, table[near], readings[near], found[near], unit.gravity_g),
+        _angle_residuals(angles, table, found),
+        *_budget(unit, angles, table, best),
+    ]
+    dwells = MeasurementSet(poses.source, pose_dwells(poses, temps))
+    return dwells, _calibration(
+        unit, layout, poses, known, rows=rows, best=best, why=why, findings=findings
+    )
+
+
+def _trials(
+    unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]
+) -> list[TableTrial]:
+    orders = thermal_orders(unit, temps, temperatures)
+    shapes = [polynomial_shape(temps, unit.t0_degc, order) for order in orders]
+    if orders != (0,):
+        if unit.terms == "quadratic":
+            raise RefusedError(
+                f"{unit.name}/unit.toml, [fit] terms",
+                f'"quadratic" with angles at {len(temperatures)} temperatures',
+                expected="one temperature, or linear terms",
+                remedy="make a unit of one temperature, or leave it out",
+            )
+        return [trial for shape in shapes for trial in thermal_trials(shape)]
+    return [
+        trial
+        for trial in one_temperature_trials(shapes[0])
+        if unit.terms == "auto" or (unit.terms == "quadratic") == trial.label.startswith("quadr")
+    ]
+
+
+def _open(unit: UnitDescription, poses: PoseSet, rows: Sequence[TableRow]) -> RefusedError:
+    """Why no candidate is scored: the condition number of all poses, or of the turn that fails."""
+    told, expected = "", "more values than constants, with each pose left out in turn"
+    numbers = [(row.open_at, row.fit.condition) for row in rows if row.open_at is not None]
+    if numbers:
+        found, of_all = min(numbers)
+        in_turn = of_all <= CONDITION_MAX
+        told = f"{' when some are left out' * in_turn} (condition number {found:.3g})"
+        expected = f"{CONDITION_MAX:g} at most"
+        if in_turn:
+            expected = f"{LEFT_OUT_MAX:g} at most, with each pose left out in turn"
+    return RefusedError(
+        poses.source,
+        f"the {len(poses.poses)} poses leave constants open{told}",
+        expected=expected,
+        remedy='add poses over both angles, or leave out terms = "quadratic"'
+        if unit.terms == "quadratic"
+        else "add poses over both angles",
+    )
+
+
+def _choose(rows: Sequence[TableRow], temperatures: list[list[int]]) -> tuple[TableRow, str]:
+    unbeaten = [r for r in rows if not any(beats(o.errors_g, r.errors_g) for o in rows)]
+    best = min(unbeaten, key=lambda r: r.trial.parameters)
+    inner = len(temperatures) - 2 if len(temperatures) >= 4 else 0
+    also = f" and {inner} temperatures" if inner else ""
+    return best, (
+        f"{best.trial.label}, {best.trial.way}: held-out error "
+        f"{(best.held_out_g or 0.0) * 1e3:.3g} mg a component, each pose{also} left out in turn; "
+        f"of {len(rows)} candidates the simplest that none is told to beat"
+    )
+
+
+def _angle_residuals(angles: Angles, table: FloatArray, force: FloatArray) -> str:
+    """P0 (8): the angles back from the compensated readings against those that were set.
+
+    The second turns the force by less where the first is steep, by nothing at pitch 90 deg, where
+    it cannot be seen: it is weighted with what it turns.
+    """
+    difference = angles_from_force(angles.kind, force) - table[:, :2]
+    wrapped = np.degrees((difference + np.pi) % (2.0 * np.pi) - np.pi) * 3600.0
+    wrapped[:, 1] *= np.linalg.norm(angle_slopes(angles.kind, table[:, :2])[..., 1], axis=-1)
+    rms = np.sqrt(np.mean(wrapped**2, axis=0))
+    names = ("pitch", "roll") if angles.kind == "aircraft" else ("zenith", "tool face")
+    return "angles back from the readings (8): " + ", ".join(
+        f"{name} {value:.3g} arcsec rms" for name, value in zip(names, rms, strict=True)
+    )
+
+
+def _budget(unit: UnitDescription, angles: Angles, table: FloatArray, best: TableRow) -> list[str]:
+    """The table's own errors in g beside sqrt(eps), where unit.toml states them; P0, section 5."""
+    stated = unit.stated
+    if stated.repeatability_arcsec is None and stated.level_arcsec is None:
+        return []
+    angle, level = stated.repeatability_arcsec or 0.0, stated.level_arcsec or 0.0
+    errors = table_error_g(
+        angles.kind, table, angle * _RAD_PER_ARCSEC, level * _RAD_PER_ARCSEC, unit.gravity_g
+    )
+    budget = float(np.sqrt(np.mean(errors**2))) * 1e6
+    found = best.fitted_g * 1e6
+    words = "as the table allows" if found <= 2.0 * budget else "more than the table explains"
+    told = (
+        f"table: {angle:g} arcsec an angle, {level:g} arcsec of level are {budget:.3g} micro-g rms"
+    )
+    return [f"{told}; sqrt(eps) is {found:.3g} micro-g, {words}"]
+
+
+def _calibration(
+    unit: UnitDescription,
+    layout: RecordingLayout,
+    poses: PoseSet,
+    known: TablePoses,
+    *,
+    rows: Sequence[TableRow],
+    best: TableRow,
+    why: str,
+    findings: Sequence[str],
+) -> Calibration:
+    shape, temps = best.fit.shape, known.temps_degc
+    thermal = shape.model(best.fit.constants)
+    covariance, terms = _covariance(best, known)
+    errors = np.linalg.norm(best.own_g + known.force, axis=1) - unit.gravity_g
+    dof = 3 * len(temps) - best.trial.parameters
+    lengths = _left_out_lengths(best, known, unit.gravity_g)
+    recording = RecordingFit(
+        poses=poses,
+        route="angles of a table known",
+        covariance=covariance,
+        dof=dof,
+        rms_g=best.fitted_g,
+        rms_free_g=math.sqrt(float((best.own_g**2).sum()) / dof),
+        held_out_g=best.held_out_g,
+        left_out_length_g=lengths,
+        condition=best.fit.condition,
+        weakest="",
+        residual_g=errors,
+        findings=tuple(findings),
+        terms=terms,
+    )
+    basis = shape.basis(unit.t0_degc)
+    point = CalibrationPoint(
+        unit.t0_degc,
+        thermal.constants_at(unit.t0_degc),
+        np.einsum("p,apbq,q->ab", basis, covariance, basis),
+        best.fitted_g,
+        best.fitted_g,
+    )
+    return Calibration(
+        serial=unit.serial,
+        estimator=best.trial.way,
+        thermal=thermal,
+        shape=shape,
+        range_degc=recording_range(unit, poses, temps),
+        points=(point,),
+        parameter_covariance=covariance_blocks(covariance),
+        covariance_source=f"residuals over the poses, {dof} degrees of freedom",
+        candidates=tuple(row.candidate(chosen=row is best) for row in rows),
+        selection_reason=why,
+        check_dwells=(),
+        terms=NO_TERMS if best.fit.quadratic is None else Terms(best.fit.quadratic),
+        recording=recording,
+        reading_unit=layout.acceleration_unit,
+    )
+
+
+def _left_out_lengths(best: TableRow, known: TablePoses, gravity_g: float) -> float | None:
+    """Rms |a| - g of each pose left out in turn."""
+    if best.errors_g is None:
+        return None
+    force = known.force + best.errors_g[: len(known.force)]
+    return float(np.sqrt(np.mean((np.linalg.norm(force, axis=1) - gravity_g) ** 2)))
+
+
+def _covariance(best: TableRow, known: TablePoses) -> tuple[FloatArray, TermsCovariance]:
+    """Covariance (12, P, 12, P) of the constants, and that of Q where it is fitted.
+
+    Least squares of (28), with the products of (29) beside it; outputs independent.
+    """
+    shape, gains = best.fit.shape, best.trial.gains
+    linear = thermal_design(shape, gains, known)
+    fitted = best.trial.parameters > 3 * linear.shape[1]
+    design = linear
+    if fitted:
+        design = np.concatenate([linear, products(known.target) @ TRACELESS.T], axis=1)
+    inverse = np.linalg.inv(design.T @ design)
+    constants = shape.basis(known.temps_degc) @ best.fit.constants.T
+    K = constants[:, :9].reshape(-1, 3, 3)
+    # The error of the force, as the outputs have it.
+    residual = np.einsum("nij,nj->ni", K, best.own_g)
+    variance = (residual**2).sum(axis=0) / max(len(design) - design.shape[1], 1)
+    count = shape.parameters
+    full = np.zeros((12, count, 12, count))
+    for i in range(3):
+        index = [(3 * i + j, p) for j in range(3) for p in range(gains)]
+        index += [(9 + i, p) for p in range(count)]
+        of_constant, of_function = (np.array(part) for part in zip(*index, strict=True))
+        rows = of_constant[:, None], of_function[:, None]
+        own = inverse[: len(index), : len(index)]
+        full[*rows, of_constant[None], of_function[None]] = variance[i] * own
+    if not fitted:
+        return full, NO_TERMS_COVARIANCE
+    # (29) has its products in the outputs: Q = -K^-1 D2, at one temperature.
+    to_force = -np.linalg.inv(K[0])
+    at = linear.shape[1]
+    D2 = TRACELESS.T @ inverse[at:, at:] @ TRACELESS
+    own_q = np.einsum("io,jo,o,kl->ikjl", to_force, to_force, variance, D2).reshape(18, 18)
+    cross = np.zeros((12, count, 3, 6))
+    for o in range(3):
+        mixed = variance[o] * inverse[:at, at:] @ TRACELESS
+        rows_of_output = [3 * o, 3 * o + 1, 3 * o + 2, 9 + o]
+        cross[rows_of_output, 0] = mixed[:, None, :] * to_force[:, o][None, :, None]
+    return full, TermsCovariance(own_q, cross.reshape(12, count, 18))

@@ -1,0 +1,1 @@
+"""Six known positions at several temperatures: the tilter."""

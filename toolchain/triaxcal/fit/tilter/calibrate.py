@@ -1,0 +1,247 @@
+"""One unit's measurements -> its calibration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.calibration import Calibration, CalibrationPoint, CheckResult, Selection
+from triaxcal.fit.core.grouping import (
+    GroupedReadings,
+    TemperatureGroup,
+    check_position_dwells,
+    group_dwells,
+    grouped_readings,
+)
+from triaxcal.fit.core.recorded import PairTerms
+from triaxcal.fit.core.thermal import (
+    EDGE_DEGC,
+    PIECEWISE_LINEAR,
+    ThermalShape,
+    refuse_undetermined,
+)
+from triaxcal.fit.tilter.contradiction import contradiction
+from triaxcal.fit.tilter.curves import (
+    TilterData,
+    fit_curves,
+    parameter_covariance,
+    shifted_voltage,
+)
+from triaxcal.fit.tilter.estimators import (
+    constants_covariance,
+    constants_of,
+    design_matrix,
+    estimator_operators,
+    pooled_variance,
+    refuse_ill_conditioned,
+)
+from triaxcal.fit.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
+from triaxcal.fit.tilter.selection import (
+    PREFERENCE,
+    candidate_shapes,
+    check_errors,
+    select,
+)
+from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.terms import NO_TERMS, Terms
+from triaxcal.model.types import FloatArray
+from triaxcal.readings.measurements import Dwell, MeasurementSet
+from triaxcal.unit.description import UnitDescription
+
+_STEP_DEGC = 0.1
+"""A working range taken from the calibrated temperatures is rounded outward to this."""
+
+
+def calibrate(
+    unit: UnitDescription, measurements: MeasurementSet, pair: PairTerms | None = None
+) -> Calibration:
+    """Fit the constants at each temperature, choose thermal function and estimator, fit curves.
+
+    The products of two axes that a `pair` has shown vanish in the six positions, and act in the
+    check dwells.
+
+    Raises
+    ------
+    RefusedError
+        When the measurements are incomplete, contradict themselves or the unit's description, or
+        do not determine what it asks for.
+    """
+    terms = NO_TERMS if pair is None else Terms(pair.quadratic)
+    groups = group_dwells(measurements, unit.t0_degc)
+    refuse_mistaken_units(measurements)
+    refuse_exchanged_positions(measurements.source, groups, unit.polarity)
+    _refuse_singular(measurements.source, groups, unit.gravity_g)
+    range_degc = _working_range(unit, groups)
+    readings = grouped_readings(groups, unit.adc.volts_per_code)
+    estimators = PREFERENCE if unit.estimator == "auto" else (unit.estimator,)
+    operators = [
+        estimator_operators(e, unit.gravity_g, readings.variance_v2, len(groups))
+        for e in estimators
+    ]
+    data = TilterData(readings, np.stack(operators), unit.gravity_g)
+    checks = check_position_dwells(measurements)
+    selection = _select(unit, data, estimators, checks, terms)
+    chosen = data.only(estimators.index(selection.estimator))
+    found = _calibration(unit, measurements, chosen, selection, range_degc, terms=terms)
+    told = () if pair is None else pair.findings
+    return replace(found, pair=pair, notes=(*contradiction(unit, groups), *told))
+
+
+def _select(
+    unit: UnitDescription,
+    data: TilterData,
+    estimators: tuple[str, ...],
+    checks: tuple[Dwell, ...],
+    terms: Terms,
+) -> Selection:
+    temps = data.readings.temps_degc
+    where = f"{unit.name}/unit.toml"
+    if unit.thermal.model == PIECEWISE_LINEAR and len(temps) < 2:
+        raise RefusedError(
+            f"{where}, [thermal] model",
+            f'"{PIECEWISE_LINEAR}" with one calibrated temperature ({temps[0]:.6g} degC)',
+            expected="two temperatures or more",
+            remedy='measure at more temperatures, or choose "polynomial" with order = 0',
+        )
+    shapes = candidate_shapes(unit.thermal, temps, unit.t0_degc)
+    asked_for = unit.thermal.model == PIECEWISE_LINEAR or unit.thermal.order is not None
+    if asked_for:
+        refuse_undetermined(where, shapes[0], temps)
+    return select(
+        data,
+        estimators,
+        shapes,
+        checks,
+        asked_for=asked_for,
+        limit_g=unit.limits.over_range_g,
+        terms=terms,
+    )
+
+
+def _calibration(
+    unit: UnitDescription,
+    measurements: MeasurementSet,
+    data: TilterData,
+    selection: Selection,
+    range_degc: tuple[float, float],
+    *,
+    terms: Terms,
+) -> Calibration:
+    shape, readings = selection.shape, data.readings
+    parameters = fit_curves(data, shape)
+    shifted = shifted_voltage(readings, shape, parameters[0], unit.gravity_g)
+    variance, source = _variance(measurements, readings, shifted)
+    checks = check_position_dwells(measurements)
+    errors = check_errors(shape, parameters, checks, unit.gravity_g, terms)[0]
+    return Calibration(
+        serial=unit.serial,
+        estimator=selection.estimator,
+        thermal=shape.model(parameters[0]),
+        shape=shape,
+        range_degc=range_degc,
+        points=_points(data, shape, parameters[0], shifted, variance),
+        parameter_covariance=parameter_covariance(data, shape, variance)[0],
+        covariance_source=source,
+        candidates=selection.candidates,
+        selection_reason=selection.reason,
+        check_dwells=tuple(
+            CheckResult(dwell, float(error)) for dwell, error in zip(checks, errors, strict=True)
+        ),
+        terms=terms,
+    )
+
+
+def _points(
+    data: TilterData,
+    shape: ThermalShape,
+    parameters: FloatArray,
+    shifted: FloatArray,
+    variance_v2: FloatArray,
+) -> tuple[CalibrationPoint, ...]:
+    operators, temps = data.operators[0], data.readings.temps_degc
+    constants = constants_of(operators, shifted)
+    covariance = constants_covariance(operators, variance_v2)
+    force = design_matrix(data.gravity_g)[:, :3]
+    on_curve = shape.basis(temps) @ parameters.T
+    residuals = [
+        np.sqrt(np.mean((force_from_voltage(c[:, None], shifted) - force) ** 2, axis=(1, 2)))
+        for c in (constants, on_curve)
+    ]
+    return tuple(
+        CalibrationPoint(
+            temp_degc=float(temps[g]),
+            constants=constants[g],
+            covariance=covariance[g],
+            position_residual_g=float(residuals[0][g]),
+            curve_residual_g=float(residuals[1][g]),
+        )
+        for g in range(len(temps))
+    )
+
+
+def _variance(
+    measurements: MeasurementSet, readings: GroupedReadings, shifted: FloatArray
+) -> tuple[FloatArray, str]:
+    """Variances of the readings, shape (G, 6, 3), and where they come from."""
+    groups = len(readings.temps_degc)
+    pooled = pooled_variance(shifted)
+    if readings.variance_v2 is not None:
+        allowed = np.mean(readings.variance_v2, axis=(0, 1))
+        ratio = math.sqrt(float(np.mean(pooled / allowed)))
+        of_all = ", sd pooled over the dwells" if readings.pooled else ""
+        return readings.variance_v2, (
+            f"the dwells' own statistics, sd^2 / count{of_all}; readings scatter over the "
+            f"positions {ratio:.2f} times what they allow (1 is noise alone, more is placement, "
+            "which the passport's budget adds)"
+        )
+    without = [
+        d.row
+        for d in measurements.dwells
+        if d.position.startswith("TP") and d.variance_of_mean_v2 is None
+    ]
+    rows = f"{len(without)} row{'s' * (len(without) != 1)}, first row {without[0]}"
+    if len(without) == 6 * groups:
+        rows = "all rows"
+    return np.broadcast_to(pooled, readings.voltage_v.shape), (
+        f"residuals over the positions, pooled over {groups} temperature{'s' * (groups != 1)} "
+        f"({2 * groups} degrees of freedom an output): count and deviations are missing in {rows}"
+    )
+
+
+def _refuse_singular(source: str, groups: tuple[TemperatureGroup, ...], gravity_g: float) -> None:
+    operator = estimator_operators("equation-10", gravity_g, None, 1)[0]
+    for group in groups:
+        voltage = np.array([d.voltage_v for d in group.dwells])
+        where = f"{source}, rows {', '.join(str(d.row) for d in group.dwells)}"
+        refuse_ill_conditioned(where, group.temp_degc, constants_of(operator, voltage))
+
+
+def _working_range(
+    unit: UnitDescription, groups: tuple[TemperatureGroup, ...]
+) -> tuple[float, float]:
+    """Range of the description, or that of the dwells at its ends, in steps of 0.1 degC.
+
+    The range spans every fitted dwell, so that none of them is clamped by the firmware, but ends
+    at most `EDGE_DEGC` from the outer groups' temperatures. One temperature alone is +-`EDGE_DEGC`.
+    """
+    low, high = groups[0].temp_degc, groups[-1].temp_degc
+    if unit.range_degc is None:
+        if len(groups) == 1:
+            return low - EDGE_DEGC, high + EDGE_DEGC
+        coldest = max(low - EDGE_DEGC, min(d.temp_degc for d in groups[0].dwells))
+        hottest = min(high + EDGE_DEGC, max(d.temp_degc for d in groups[-1].dwells))
+        # The 1e-6 forgives the rounding of decimal temperatures: 0.3 / 0.1 is 2.9999999999999996.
+        steps = math.floor(coldest / _STEP_DEGC + 1e-6), math.ceil(hottest / _STEP_DEGC - 1e-6)
+        return round(steps[0] * _STEP_DEGC, 1), round(steps[1] * _STEP_DEGC, 1)
+    if unit.range_degc[0] < low - EDGE_DEGC or unit.range_degc[1] > high + EDGE_DEGC:
+        raise RefusedError(
+            f"{unit.name}/unit.toml, [thermal] range_degc",
+            f"{unit.range_degc[0]:g} to {unit.range_degc[1]:g} degC",
+            expected=f"within {EDGE_DEGC:g} degC of the calibrated temperatures, "
+            f"{low:.6g} to {high:.6g} degC",
+            remedy="narrow the range, or measure further out: curves are not extrapolated",
+        )
+    return unit.range_degc

@@ -1,0 +1,200 @@
+"""Mistakes that readings give away before any fit: mistaken units, exchanged positions.
+
+Exchanged positions. Along the six positions output i must follow s_i a_i, the force along its own
+axis times the sign of K_ii. Let u_i be output i, mean removed, scaled to length 1, and
+
+    M[d', d] = sum_i s_i u_i[d'] a_i[d] / sqrt(2):
+
+the trace of M is the sum of the three correlations, and taking the reading of row d' for that of
+position d and vice versa changes it by M[d', d] + M[d, d'] - M[d, d] - M[d', d']. For outputs
+that follow their own axes (trace 3) any exchange loses 1 (positions of two axes: two correlations
+fall to 1/2) or 2 (of one axis: a correlation turns to -1), and undoing it gains as much. Neither
+bias nor sensitivity matters, and cross sensitivities take a few hundredths off. An exchange is
+reported when undoing it gains more than 1/4: halfway but for a margin that leaves a dead output
+(gain 0) to the check of the condition number.
+
+What cannot be seen this way: all positions turned over, or the axes relabelled in a cycle.
+
+A single reading that is off by little is not looked for here: with two degrees of freedom an
+output and temperature, and imperfect placement in them, no threshold is both sharp and free of
+false alarms. The residuals, and the acceptance limits of P1 (13), show it.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.fit.core.grouping import TemperatureGroup
+from triaxcal.fit.tilter.estimators import DEAD_OUTPUT
+from triaxcal.model.positions import AXES, TEST_POSITIONS
+from triaxcal.model.types import FloatArray
+from triaxcal.readings.measurements import Dwell, MeasurementSet
+
+_GAIN_MIN = 0.25
+_FORCES = np.array(list(TEST_POSITIONS.values()), dtype=np.float64)
+_NAMES = tuple(TEST_POSITIONS)
+_PAIRS = tuple(combinations(range(6), 2))
+_AXIS_PAIRS = {(4, 5): 0, (1, 3): 1, (0, 2): 2}
+"""Indices of the two positions along each axis: TP5/TP6 x, TP2/TP4 y, TP1/TP3 z."""
+
+Exchange = tuple[int, int]
+
+
+def refuse_mistaken_units(measurements: MeasurementSet) -> None:
+    """Refuse rows whose readings are about a thousand times those of the others, or a thousandth.
+
+    The length of (Ux, Uy, Uz) is of one size in every position; the median tells which. Within a
+    factor of ten of a thousand is near enough: nothing but a mistaken unit is in that window.
+
+    Raises
+    ------
+    RefusedError
+        Naming the rows.
+    """
+    dwells = measurements.dwells
+    lengths = np.array([float(np.linalg.norm(d.voltage_v)) for d in dwells])
+    typical = float(np.sort(lengths)[(len(lengths) - 1) // 2])
+    if typical == 0.0:
+        return
+    ratios = lengths / typical
+    for low, high, text in ((1e2, 1e4, "1000 times"), (1e-4, 1e-2, "1/1000 of")):
+        odd = [d for d, r in zip(dwells, ratios, strict=True) if low < r < high]
+        if odd:
+            temps = sorted({d.temp_degc for d in odd})
+            raise RefusedError(
+                f"{measurements.source}, {_rows(odd)}",
+                f"readings at {_temps(temps)} degC are about {text} those of the other rows",
+                expected="one unit throughout",
+                remedy="V taken for mV, or mV for V? convert these rows",
+            )
+
+
+def refuse_exchanged_positions(
+    source: str,
+    groups: tuple[TemperatureGroup, ...],
+    polarity: tuple[int, int, int] | None,
+) -> None:
+    """Refuse groups in which two positions look exchanged, and name the two.
+
+    Parameters
+    ----------
+    polarity : tuple of three signs, or None
+        Signs of Kxx, Kyy, Kzz; None means that all three are alike.
+
+    Raises
+    ------
+    RefusedError
+        Naming positions, rows and temperatures; where signs of K alone give it away at every
+        temperature, also the key that declares such a unit.
+    """
+    shapes = [_follow(group) for group in groups]
+    signs = _signs(shapes, polarity)
+    found = [_exchanges((shape * signs) @ _FORCES.T / np.sqrt(2.0)) for shape in shapes]
+    if not any(found):
+        return
+    first = next(pairs for pairs in found if pairs)
+    spoiled = [g for g, pairs in zip(groups, found, strict=True) if pairs == first]
+    if all(pairs == first for pairs in found) and all(p in _AXIS_PAIRS for p in first):
+        _refuse_signs(source, groups, first, signs, polarity)
+    row_of = [(spoiled[0].dwells[a].row, spoiled[0].dwells[b].row) for a, b in first]
+    rows = "; ".join(f"rows {min(r)} and {max(r)}" for r in row_of)
+    remedy = f"exchange {'the positions of these rows' if len(first) == 1 else 'them back'}"
+    if len(first) > 1:
+        remedy += ", or put the columns of Ux, Uy, Uz in order"
+    raise RefusedError(
+        f"{source}, {rows}",
+        f"{_exchanged(first)} look exchanged at {_temps([g.temp_degc for g in spoiled])} degC: "
+        f"Kxx, Kyy, Kzz are {_diagonal(spoiled[0], ())} V/g as recorded, "
+        f"{_diagonal(spoiled[0], first)} V/g with the exchange undone",
+        expected="each output to follow the force along its own axis",
+        remedy=remedy,
+    )
+
+
+def _refuse_signs(
+    source: str,
+    groups: tuple[TemperatureGroup, ...],
+    pairs: list[Exchange],
+    signs: FloatArray,
+    polarity: tuple[int, int, int] | None,
+) -> None:
+    turned = {_AXIS_PAIRS[pair] for pair in pairs}
+    names = " and ".join(f"K{AXES[i]}{AXES[i]}" for i in sorted(turned))
+    actual = [int(-s if i in turned else s) for i, s in enumerate(signs)]
+    expected = "signs of Kxx, Kyy, Kzz all alike"
+    if polarity is not None:
+        expected = f"those of [sensor] polarity = {list(polarity)}"
+    rows = "; ".join(
+        f"rows {min(r)} and {max(r)} ({g.temp_degc:.6g} degC)"
+        for g in groups
+        for r in [(g.dwells[a].row, g.dwells[b].row) for a, b in pairs]
+    )
+    raise RefusedError(
+        f"{source}, {rows}",
+        f"{names} has the wrong sign at every temperature: Kxx, Kyy, Kzz are "
+        f"{_diagonal(groups[0], ())} V/g; either {_exchanged(pairs)} are exchanged throughout, "
+        "or the unit has this polarity",
+        expected=expected,
+        remedy=f"correct the positions, or set polarity = {actual} under [sensor] in unit.toml",
+    )
+
+
+def _follow(group: TemperatureGroup) -> FloatArray:
+    """Outputs over the positions, shape (6, 3), mean removed and scaled to length 1.
+
+    A dead output is noise of no shape: zeros.
+    """
+    voltage = np.array([d.voltage_v for d in group.dwells])
+    centred = voltage - voltage.mean(axis=0)
+    length = np.linalg.norm(centred, axis=0)
+    alive = length > DEAD_OUTPUT * length.max()
+    shape: FloatArray = np.divide(centred, length, out=np.zeros((6, 3)), where=alive)
+    return shape
+
+
+def _signs(shapes: list[FloatArray], polarity: tuple[int, int, int] | None) -> FloatArray:
+    """Signs that K_ii must have; without polarity the common one that most readings show."""
+    if polarity is not None:
+        return np.array(polarity, dtype=np.float64)
+    correlation = sum(float(np.sum(shape * _FORCES)) for shape in shapes)
+    return np.full(3, 1.0 if correlation >= 0.0 else -1.0)
+
+
+def _exchanges(follow: FloatArray) -> list[Exchange]:
+    """Exchanges that restore the order, the most telling first; `follow` is M, shape (6, 6)."""
+    order = np.arange(6)
+    pairs: list[Exchange] = []
+    for _ in range(5):
+        M = follow[order]
+        gains = [M[a, b] + M[b, a] - M[a, a] - M[b, b] for a, b in _PAIRS]
+        best = int(np.argmax(gains))
+        if gains[best] <= _GAIN_MIN:
+            break
+        a, b = _PAIRS[best]
+        order[[a, b]] = order[[b, a]]
+        pairs.append((a, b))
+    return pairs
+
+
+def _diagonal(group: TemperatureGroup, undo: tuple[Exchange, ...] | list[Exchange]) -> str:
+    voltage = np.array([d.voltage_v for d in group.dwells])
+    for a, b in undo:
+        voltage[[a, b]] = voltage[[b, a]]
+    diagonal = np.sum(voltage * _FORCES, axis=0) / 2.0
+    return "(" + ", ".join(f"{k:+.4g}" for k in diagonal) + ")"
+
+
+def _exchanged(pairs: list[Exchange]) -> str:
+    return ", ".join(f"{_NAMES[a]} and {_NAMES[b]}" for a, b in pairs)
+
+
+def _temps(temps: list[float]) -> str:
+    return ", ".join(f"{t:.6g}" for t in temps)
+
+
+def _rows(dwells: list[Dwell]) -> str:
+    rows = [str(d.row) for d in sorted(dwells, key=lambda d: d.row)]
+    return f"row {rows[0]}" if len(rows) == 1 else "rows " + ", ".join(rows)

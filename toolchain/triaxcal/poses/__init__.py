@@ -1,0 +1,1 @@
+"""Still stretches in a stream of samples."""

@@ -1,0 +1,328 @@
+"""Poses of a recording: still stretches long and steady enough, and the reason of every refusal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+from triaxcal.poses.stillness import Stillness, duration_s, find_stillness
+from triaxcal.readings.samples import Samples
+from triaxcal.unit.recording import POSES, SECTIONS, TIME_UNITS, RecordingLayout
+
+BATCHES = 8
+_DRIFT_MAX = 6.0
+"""Of its standard error: how far the two halves of a pose may differ."""
+_STEPS_S = (5e-4, 0.5)
+"""Between samples of a logger: what tells seconds from milliseconds."""
+_SAME_RAD = 1e-6
+"""Angles of one pose are written alike in all its rows."""
+_NOTED = 0.25
+"""Of the shortest pose: still stretches shorter than this are part of the movement."""
+_MOVING = 0.1
+"""Of 1 g: a pose whose readings scatter by more was not held still."""
+ALIKE_DEG = 5.0
+"""Poses nearer than this to each other are one orientation."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Mean readings of one pose.
+
+    Attributes
+    ----------
+    number : int
+        Among all still stretches that were looked at, from 1.
+    line : int
+        Line of its first sample.
+    start_s, duration_s : float
+    reading : array, shape (3,)
+        In the unit of the layout.
+    sd_mean : array, shape (3,), or None
+        Standard error of `reading`, from batch means; None where rows are poses.
+    count : int
+        Samples.
+    temp_degc : float or None
+    label : str
+        Of its section; "" without.
+    angles_rad : array, shape (2 or 3,), or None
+    """
+
+    number: int
+    line: int
+    start_s: float
+    duration_s: float
+    reading: FloatArray
+    sd_mean: FloatArray | None
+    count: int
+    temp_degc: float | None
+    label: str
+    angles_rad: FloatArray | None
+
+
+@dataclass(frozen=True)
+class RefusedPose:
+    """A still stretch that is no pose, and why."""
+
+    number: int
+    line: int
+    start_s: float
+    duration_s: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class PoseSet:
+    """Poses of one recording.
+
+    Attributes
+    ----------
+    source : str
+    poses : tuple of Pose
+    refused : tuple of RefusedPose
+    stillness : Stillness or None
+        None where rows are poses, or sections say where they are.
+    findings : tuple of str
+    """
+
+    source: str
+    poses: tuple[Pose, ...]
+    refused: tuple[RefusedPose, ...]
+    stillness: Stillness | None
+    findings: tuple[str, ...]
+
+    @property
+    def readings(self) -> FloatArray:
+        """Shape (poses, 3)."""
+        return np.array([p.reading for p in self.poses]).reshape(-1, 3)
+
+    @property
+    def temps_degc(self) -> FloatArray | None:
+        """Shape (poses,); None when the recording has no temperature."""
+        temps = [p.temp_degc for p in self.poses if p.temp_degc is not None]
+        return np.array(temps) if len(temps) == len(self.poses) and temps else None
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """Lowest and highest readings of the file, shape (3,), and about what 1 g reads."""
+
+    low: FloatArray
+    high: FloatArray
+    one_g: float
+
+    @staticmethod
+    def of(samples: Samples, layout: RecordingLayout) -> _Scale:
+        low, high = samples.reading.min(axis=0), samples.reading.max(axis=0)
+        # Counts do not say: half of what nine tenths of the samples span on the widest axis.
+        spans = np.ptp(np.percentile(samples.reading, [5.0, 95.0], axis=0), axis=0)
+        return _Scale(low, high, layout.reading_of_1_g or float(spans.max()) / 2.0)
+
+
+def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
+    """Poses of samples: one a row, one a section or labelled face, or found by stillness.
+
+    Raises
+    ------
+    RefusedError
+        When there is none; names the longest still stretch and what to change.
+    """
+    if layout.rows == POSES:
+        return PoseSet(samples.source, _row_poses(samples), (), None, samples.findings)
+    if layout.rows == SECTIONS or layout.faces:
+        return _section_poses(samples, layout)
+    stillness = find_stillness(samples, layout.still_s)
+    scale = _Scale.of(samples, layout)
+    poses: list[Pose] = []
+    refused: list[RefusedPose] = []
+    number = 0
+    for run in stillness.runs:
+        length = duration_s(samples, run)
+        if length < _NOTED * layout.still_s:
+            continue
+        number += 1
+        pose = _pose(samples, run, number)
+        reason = _reason(samples, run, pose, layout, scale)
+        if reason:
+            refused.append(RefusedPose(number, pose.line, pose.start_s, length, reason))
+        else:
+            poses.append(pose)
+    if not poses:
+        raise _no_poses(samples, layout, refused)
+    return PoseSet(samples.source, tuple(poses), tuple(refused), stillness, samples.findings)
+
+
+def _row_poses(samples: Samples) -> tuple[Pose, ...]:
+    return tuple(
+        Pose(
+            number=k + 1,
+            line=int(samples.line[k]),
+            start_s=float(samples.time_s[k]),
+            duration_s=0.0,
+            reading=samples.reading[k],
+            sd_mean=None,
+            count=1,
+            temp_degc=None if samples.temp_degc is None else float(samples.temp_degc[k]),
+            label="" if samples.label is None else samples.label[k],
+            angles_rad=None if samples.angles_rad is None else samples.angles_rad[k],
+        )
+        for k in range(len(samples.reading))
+    )
+
+
+def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
+    """Each stretch of rows with one label is a pose; without a label it is what lies between.
+
+    With `faces` only their labels count.
+    """
+    assert samples.label is not None
+    scale = _Scale.of(samples, layout)
+    poses: list[Pose] = []
+    refused: list[RefusedPose] = []
+    start = 0
+    for label, rows in groupby(samples.label):
+        run = start, start + len(list(rows))
+        start = run[1]
+        if not label.strip() or (layout.faces and label not in layout.faces):
+            continue
+        pose = _pose(samples, run, len(poses) + len(refused) + 1)
+        reason = _moves(samples.reading[run[0] : run[1]].std(axis=0), layout, scale)
+        if samples.angles_rad is not None:
+            angles = samples.angles_rad[run[0] : run[1]]
+            pose = replace(pose, angles_rad=angles[0])
+            if np.ptp(angles, axis=0).max() > _SAME_RAD:
+                reason = "its angles change within the section"
+        if reason:
+            told = RefusedPose(pose.number, pose.line, pose.start_s, pose.duration_s, reason)
+            refused.append(told)
+        else:
+            poses.append(pose)
+    if not poses:
+        first = f": pose {refused[0].number}: {refused[0].reason}" if refused else ""
+        labels = ""
+        if layout.faces and not refused:
+            labels = f"; sections found: {', '.join(sorted(set(samples.label))[:10])}"
+        raise RefusedError(
+            samples.source,
+            f"no section is a pose{first}{labels}",
+            expected="sections held still" + ", labelled as in [recording] faces" * bool(labels),
+        )
+    return PoseSet(samples.source, tuple(poses), tuple(refused), None, samples.findings)
+
+
+def _pose(samples: Samples, run: tuple[int, int], number: int) -> Pose:
+    start, stop = run
+    reading = samples.reading[start:stop]
+    batches = min(BATCHES, len(reading))
+    means = np.array([part.mean(axis=0) for part in np.array_split(reading, batches)])
+    sd_mean = means.std(axis=0, ddof=1) / np.sqrt(batches) if batches > 1 else np.full(3, np.inf)
+    temp = None if samples.temp_degc is None else float(samples.temp_degc[start:stop].mean())
+    return Pose(
+        number=number,
+        line=int(samples.line[start]),
+        start_s=float(samples.time_s[start]),
+        duration_s=duration_s(samples, run),
+        reading=reading.mean(axis=0),
+        sd_mean=sd_mean,
+        count=stop - start,
+        temp_degc=temp,
+        label="" if samples.label is None else samples.label[start],
+        angles_rad=None,
+    )
+
+
+def _reason(
+    samples: Samples,
+    run: tuple[int, int],
+    pose: Pose,
+    layout: RecordingLayout,
+    scale: _Scale,
+) -> str:
+    """Why a still stretch is no pose; "" when it is one."""
+    if pose.duration_s < layout.still_s:
+        return f"{pose.duration_s:.1f} s still, needs {layout.still_s:.1f}"
+    reading = samples.reading[run[0] : run[1]]
+    deviation = reading.std(axis=0)
+    for axis in range(3):
+        moves = scale.low[axis] < scale.high[axis]
+        stuck = moves and deviation[axis] == 0.0 and (np.delete(deviation, axis) > 0.0).any()
+        if stuck and reading[0, axis] in (scale.low[axis], scale.high[axis]):
+            return (
+                f"axis {AXES[axis]} is clipped: it stays at {reading[0, axis]:g}, the end of what "
+                "the file shows; measure with a wider range"
+            )
+    moves_by = _moves(deviation, layout, scale)
+    if moves_by:
+        return moves_by
+    half = len(reading) // 2
+    drift = np.abs(reading[half:].mean(axis=0) - reading[:half].mean(axis=0))
+    assert pose.sd_mean is not None
+    # Halves of independent noise differ by 2 standard errors of the mean.
+    noise = 2.0 * deviation / np.sqrt(len(reading))
+    worst = int(np.argmax(drift - _DRIFT_MAX * noise))
+    if drift[worst] > _DRIFT_MAX * noise[worst] and drift[worst] > deviation[worst]:
+        return (
+            f"axis {AXES[worst]} drifts by {drift[worst]:.3g} {layout.acceleration_unit} between "
+            "its halves: it is still turning"
+        )
+    return ""
+
+
+def _moves(deviation: FloatArray, layout: RecordingLayout, scale: _Scale) -> str:
+    if deviation.max() <= _MOVING * scale.one_g:
+        return ""
+    axis = int(deviation.argmax())
+    return (
+        f"axis {AXES[axis]} scatters by {deviation[axis]:.3g} {layout.acceleration_unit}: "
+        "it is not held still"
+    )
+
+
+def _no_poses(
+    samples: Samples, layout: RecordingLayout, refused: list[RefusedPose]
+) -> RefusedError:
+    longest = max((r.duration_s for r in refused), default=0.0)
+    first = f"; pose {refused[0].number}: {refused[0].reason}" if refused else ""
+    return RefusedError(
+        samples.source,
+        f"no pose found: the longest still stretch has {longest:.3g} s{first}",
+        expected=f"poses of {layout.still_s:g} s at least",
+        remedy=_wrong_clock(samples, layout)
+        or "hold each pose longer, or lower [recording] still_s; "
+        "`triaxcal poses` shows what was found",
+    )
+
+
+def _wrong_clock(samples: Samples, layout: RecordingLayout) -> str:
+    """What to do where the whole recording is shorter than a few poses can be; "" where not."""
+    whole = float(samples.time_s[-1]) + samples.step_s
+    if whole > 4.0 * layout.still_s:
+        return ""
+    told = f"the whole recording lasts {whole:.3g} s"
+    if layout.time is None:
+        return f"{told} at {1.0 / samples.step_s:g} Hz: check sample_rate_hz"
+    scale = TIME_UNITS[layout.time_unit]
+    near = [
+        u for u, s in TIME_UNITS.items() if _STEPS_S[0] < samples.step_s / scale * s < _STEPS_S[1]
+    ]
+    return f"{told}: check time_unit" + (f', as time_unit = "{near[0]}"' if near else "")
+
+
+def orientation_groups(directions: FloatArray, angle_deg: float = ALIKE_DEG) -> list[list[int]]:
+    """Indices of poses that point alike: those within `angle_deg` of a first one, and so on.
+
+    Not chained: a hundred poses all round must not become one orientation.
+    """
+    near = directions @ directions.T >= np.cos(np.radians(angle_deg))
+    left = np.ones(len(directions), dtype=np.bool_)
+    groups: list[list[int]] = []
+    for first in range(len(directions)):
+        if left[first]:
+            group = np.flatnonzero(near[first] & left)
+            left[group] = False
+            groups.append(group.tolist())
+    return groups

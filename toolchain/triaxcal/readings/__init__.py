@@ -1,0 +1,1 @@
+"""Everything that can be read: one reader interface, one file a format; columns, units, clocks."""

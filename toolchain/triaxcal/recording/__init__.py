@@ -1,1 +1,0 @@
-"""Recordings of other makers: files to samples, samples to poses."""

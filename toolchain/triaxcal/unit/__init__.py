@@ -1,0 +1,1 @@
+"""The description of a unit, unit.toml: each of its tables a file."""
