@@ -125,7 +125,9 @@ def tree_of(path: Path) -> ast.Module:
 
 @pytest.mark.parametrize("path", sources(), ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_doors_go_one_way(path: Path) -> None:
-    assert room_of(module_name(path)) in {*MAY_IMPORT, "__init__", "cli"}, "a new room: say what it may import"
+    assert room_of(module_name(path)) in {*MAY_IMPORT, "__init__", "cli"}, (
+        "a new room: say what it may import"
+    )
     assert wrong_imports(module_name(path), tree_of(path)) == []
 
 
