@@ -46,14 +46,14 @@ ONLY_IN = {
     "can": {"rig"},
     "cantools": {"rig"},
     "asammdf": {"rig"},
-    "pyarrow": {"rig", "dynamic"},
+    "pyarrow": {"rig", "readings"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report"},
     "rich": {"rig", "cli"},
     "dask": {"batch"},
     "distributed": {"batch"},
-    "h5py": {"dynamic"},
+    "h5py": {"readings"},
 }
 
 

@@ -1,0 +1,191 @@
+"""A recording opened: its format found, its columns by name or number, its damage in one line."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import did_you_mean, shown
+from triaxcal.readings.format import FORMATS, Block, Format
+from triaxcal.unit.recordingfile import Column, FileLayout
+
+_HEAD = 4096
+"""Bytes at the start of a file by which its format is found."""
+_NAMES_SHOWN = 20
+_BINARY = (
+    (b"PK\x03\x04", "a ZIP archive"),
+    (b"\xd0\xcf\x11\xe0", "an old Excel workbook"),
+    (b"\x1f\x8b", "packed by gzip"),
+)
+
+
+class RecordingFile:
+    """A recording opened by the format that it has; found by its content, then by its name.
+
+    Attributes
+    ----------
+    path : Path
+    layout : FileLayout
+    source : Source
+    """
+
+    def __init__(self, path: Path, layout: FileLayout) -> None:
+        """Open `path`.
+
+        Raises
+        ------
+        RefusedError
+            When the file cannot be read, is of no known format or damaged, or needs a package that
+            is missing.
+        """
+        self.path, self.layout = path, layout
+        self._stamp = _stamp(path, layout)
+        self._format = _format_of(path, layout)
+        if self._format.package and importlib.util.find_spec(self._format.package) is None:
+            raise RefusedError(
+                str(path),
+                f"the package {self._format.package} is missing",
+                expected=f"it, to read {self._format.label}",
+                remedy=f"install it: pip install 'triaxcal[{self._format.extra}]'",
+            )
+        with self._one_line():
+            self.source = self._format.open(path, layout)
+
+    def index(self, column: Column, key: str) -> int:
+        """Index of a column by its name or number; `key` is the key that names it.
+
+        Raises
+        ------
+        RefusedError
+            When there is none of that name or number, or more than one.
+        """
+        key = f"[{self.layout.table}] {key}"
+        names = self.source.names
+        if isinstance(column, int):
+            count = len(self.source.numbered)
+            if column <= count:
+                return self.source.numbered[column - 1]
+            if not count:
+                raise RefusedError(
+                    str(self.path),
+                    f"holds {_some(names) or 'no numbers'}",
+                    expected=f"one matrix for column {column} ({key})",
+                    remedy='name it: variable = "..."',
+                )
+            raise RefusedError(
+                str(self.path),
+                f"{count} columns",
+                expected=f"column {column} ({key})",
+                remedy="columns are counted from 1; check the delimiter"
+                if self.source.row_word == "line"
+                else "columns are counted from 1",
+            )
+        lowered = [name.lower() for name in names]
+        for among, wanted in ((list(names), column), (lowered, column.lower())):
+            if among.count(wanted) == 1:
+                return among.index(wanted)
+        if column in names:
+            raise RefusedError(
+                str(self.path),
+                f"{names.count(column)} columns {shown(column)} ({key})",
+                expected="one of that name",
+                remedy="give its number from 1",
+            )
+        if not any(names):
+            raise RefusedError(
+                str(self.path),
+                f"no header, so no column {shown(column)} ({key})",
+                expected="column numbers from 1",
+                remedy="give numbers, or header = true if the first line is one",
+            )
+        hint = did_you_mean(column, names)
+        raise RefusedError(
+            str(self.path),
+            f"no column {shown(column)} ({key}){hint}",
+            expected="one of " + _some(names),
+        )
+
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int] = ()) -> Iterator[Block]:
+        """Blocks of the wanted columns, as `Source.blocks`.
+
+        Raises
+        ------
+        RefusedError
+            When the file holds what is no number there, is damaged, or changes while it is read.
+        """
+        with self._one_line():
+            yield from self.source.blocks(numbers, texts)
+        if _stamp(self.path, self.layout) != self._stamp:
+            raise RefusedError(
+                str(self.path),
+                "changed while it was read",
+                expected="a recording that is complete",
+                remedy="wait until the logger has closed it, or copy it first",
+            )
+
+    @contextmanager
+    def _one_line(self) -> Iterator[None]:
+        """What a package raises over a file, as an error of one line."""
+        try:
+            yield
+        except RefusedError:
+            raise
+        except Exception as error:
+            if not self._format.package:
+                raise
+            text = str(error).strip().split("\n")[0] or type(error).__name__
+            raise RefusedError(
+                str(self.path), f"damaged, or not {self._format.label}: {text[:200]}"
+            ) from error
+
+
+def _some(names: Sequence[str]) -> str:
+    more = ", ..." if len(names) > _NAMES_SHOWN else ""
+    return ", ".join(name for name in names[:_NAMES_SHOWN] if name) + more
+
+
+def _stamp(path: Path, layout: FileLayout) -> tuple[int, int, int]:
+    """What changes with a file's content."""
+    try:
+        found = path.stat()
+    except OSError as error:
+        raise _unreadable(path, layout, error) from error
+    return found.st_size, found.st_mtime_ns, found.st_ino
+
+
+def _unreadable(path: Path, layout: FileLayout, error: OSError) -> RefusedError:
+    key = "file" if layout.table == "recording" else "recording"
+    return RefusedError(
+        str(path),
+        f"cannot be read: {(error.strerror or str(error)).lower()}",
+        remedy=f"put the recording there, or correct [{layout.table}] {key}",
+    )
+
+
+def _format_of(path: Path, layout: FileLayout) -> Format:
+    if layout.format is not None:
+        return FORMATS[layout.format]
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError as error:
+        raise _unreadable(path, layout, error) from error
+    suffix = path.suffix.lower()
+    entries = [e for e in FORMATS if e.sniff(head)]
+    entries += [e for e in FORMATS if suffix in e.extensions]
+    if entries:
+        return entries[0]
+    raise RefusedError(
+        str(path),
+        f"a binary file{_what_binary(head)}",
+        expected=", ".join(entry.label for entry in FORMATS),
+        remedy="export it as CSV",
+    )
+
+
+def _what_binary(head: bytes) -> str:
+    """What a well-known binary file is."""
+    return next((f", {name}" for start, name in _BINARY if head.startswith(start)), "")
