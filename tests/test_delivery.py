@@ -17,7 +17,8 @@ from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants
 from triaxcal.codegen.routines import Generated, start_generated
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.deliver import unit as delivery_module
-from triaxcal.deliver.unit import Delivery, compensation_of, deliver
+from triaxcal.deliver.firmware import compensation_of
+from triaxcal.deliver.unit import Delivery, deliver
 from triaxcal.fit.core.calibration import Calibration
 from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.plan import make_plan
@@ -252,7 +253,7 @@ def test_sim_is_within_3_standard_deviations_of_the_truth_in_every_axis(
             noise, rounding = allowed_variance(delivery.calibration, unit, temp, force_g)
             # Not noise: the arithmetic, and N(T) against K(T)^-1 at this temperature.
             fixed = delivery.bound.lsb * LSB_G + worst_force_error_g(
-                delivery.compensation.gain_and_offset(temp),
+                delivery.firmware.compensation.gain_and_offset(temp),
                 exact_gain_and_offset(delivery.calibration.thermal.constants_at(temp)),
                 float(np.abs(raw).max()) * unit.adc.volts_per_code,
             )

@@ -17,7 +17,8 @@ import pytest
 
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.tryout import model_error_g
-from triaxcal.deliver.unit import IMAGE_FILE, Delivery
+from triaxcal.deliver.firmware import IMAGE_FILE
+from triaxcal.deliver.unit import Delivery
 from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g
 from triaxcal.report.files import all_files
 
@@ -138,7 +139,7 @@ def test_stated_model_error_is_that_of_the_planned_functions(
     temps = delivery.plan.temp_codes * delivery.unit.temperature_sensor.degc_per_code
     adc = delivery.unit.adc
     expected = worst_force_error_g(
-        delivery.compensation.gain_and_offset(temps),
+        delivery.firmware.compensation.gain_and_offset(temps),
         exact_gain_and_offset(delivery.calibration.thermal.constants_at(temps)),
         max(-adc.code_min, adc.code_max) * adc.volts_per_code,
     ).max()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from builds import UNITS
-from triaxcal.deliver import unit as delivery
+from triaxcal.deliver import fitted
 from triaxcal.deliver.unit import Delivery, deliver
 from triaxcal.fit.core.calibration import Calibration
 from triaxcal.fit.tilter.calibrate import calibrate
@@ -33,7 +33,7 @@ def made() -> Delivery:
         return replace(calibrate(unit, measurements), terms=SMALL)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(delivery, "calibrate", with_terms)
+        patch.setattr(fitted, "calibrate", with_terms)
         return deliver(UNITS / "AT-CHERNIAK")
 
 

@@ -11,6 +11,7 @@ from family_cases import COLUMNS, U0, K, csv_text, directions, log, write_unit
 from scipy.io import savemat
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.deliver.fitted import fit_folder, refuse_beyond_limits
 from triaxcal.deliver.unit import deliver
 from triaxcal.fit.core.calibration import Calibration
 from triaxcal.fit.route import calibrate_recording
@@ -19,9 +20,9 @@ from triaxcal.unit.description import read_unit
 
 
 def calibrated(folder: Path) -> Calibration:
-    unit = read_unit(folder)
-    assert unit.recording is not None
-    return calibrate_recording(unit, unit.recording, folder)[2]
+    fitted = fit_folder(read_unit(folder), folder)
+    refuse_beyond_limits(fitted)
+    return fitted.calibration
 
 
 def symmetric_part(matrix: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The errors a user can cause, each told in one line.
+"""The errors that a user can cause, each reported in one line.
 
 RefusedError            the data or the result was refused: exit code 1
   UsageError            what was asked for does not exist or fit together: exit code 2
@@ -12,9 +12,12 @@ from __future__ import annotations
 class RefusedError(Exception):
     """The data or the result was refused.
 
-    Parameters
+    Its four parts are attributes, so that a program can show them in its own way; `str` is the line
+    that the command line prints.
+
+    Attributes
     ----------
-    where : str
+    place : str
         File, row, key: as near to the cause as is known.
     found : str
         What is there.
@@ -22,16 +25,18 @@ class RefusedError(Exception):
         What should be there.
     remedy : str
         What to do about it.
+    exit_code : int
+        Of the command line: 1, or 2 for a `UsageError`.
     """
 
     exit_code = 1
 
-    def __init__(self, where: str, found: str, *, expected: str = "", remedy: str = "") -> None:
-        self.where = where
+    def __init__(self, place: str, found: str, *, expected: str = "", remedy: str = "") -> None:
+        self.place = place
         self.found = found
         self.expected = expected
         self.remedy = remedy
-        text = f"{where}: {found}"
+        text = f"{place}: {found}"
         if expected:
             text += f"; expected {expected}"
         if remedy:

@@ -14,7 +14,6 @@ from triaxcal.fit.recorded.calibrate import calibrate_poses
 from triaxcal.fit.recorded.faces import face_measurements
 from triaxcal.fit.recorded.temperatures import temperature_findings
 from triaxcal.fit.table.calibrate import calibrate_table
-from triaxcal.fit.tilter.acceptance import refuse_unacceptable
 from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.readings.samples import Samples, read_samples
@@ -42,7 +41,6 @@ def calibrate_recording(
     if layout.faces:
         measurements = face_measurements(unit, layout, samples)
         found = calibrate(unit, measurements, pair)
-        refuse_unacceptable(unit, found, measurements)
         unseen = temperature_findings(unit, samples.temp_degc)
         calibration = replace(
             found,
@@ -54,7 +52,6 @@ def calibrate_recording(
         measurements, calibration = calibrate_table(unit, layout, layout.angles, samples, known)
     else:
         measurements, calibration = calibrate_poses(unit, layout, samples, known)
-    _refuse_beyond_limits(unit, calibration)
     recording = calibration.recording
     assert recording is not None
     told = () if pair is None else pair.findings
@@ -87,7 +84,7 @@ def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Sample
     )
 
 
-def _refuse_beyond_limits(unit: UnitDescription, calibration: Calibration) -> None:
+def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) -> None:
     """P1 (13) at the poses; the compiled C is asked again afterwards."""
     recording = calibration.recording
     if recording is None:

@@ -16,7 +16,8 @@ from triaxcal.codegen.render import (
     render_constants,
     render_routine,
 )
-from triaxcal.deliver.unit import compensation_of, inputs_sha256
+from triaxcal.deliver.firmware import compensation_of
+from triaxcal.deliver.inputs import inputs_sha256
 from triaxcal.fit.core.calibration import Calibration
 from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.gyro import make_gyro_plan

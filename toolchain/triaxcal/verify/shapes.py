@@ -17,7 +17,8 @@ from triaxcal.codegen.render import (
     render_constants,
     render_routine,
 )
-from triaxcal.deliver.unit import IMAGE_FILE, compensation_of, inputs_sha256
+from triaxcal.deliver.firmware import IMAGE_FILE, compensation_of
+from triaxcal.deliver.inputs import inputs_sha256
 from triaxcal.fit.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan

@@ -1,0 +1,78 @@
+"""A unit and its readings -> its calibration, and whether it keeps the unit's limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.deliver.inputs import inputs_sha256
+from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fit.pair.cross_coupling import stated_pair
+from triaxcal.fit.tilter.acceptance import refuse_unacceptable
+from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.readings.measurements import (
+    MEASUREMENTS_FILE,
+    MeasurementSet,
+    read_measurements,
+)
+from triaxcal.unit.description import UnitDescription
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A unit, what was measured, and the calibration.
+
+    Attributes
+    ----------
+    unit : UnitDescription
+        Its raw codes settled, where a recording left them open.
+    measurements : MeasurementSet
+        Dwells, or the poses of a recording as dwells.
+    inputs_sha256 : str
+        Hash of the files, or of the arrays, that went in.
+    calibration : Calibration
+    """
+
+    unit: UnitDescription
+    measurements: MeasurementSet
+    inputs_sha256: str
+    calibration: Calibration
+
+
+def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
+    """Calibration of a unit from the readings in its folder, whether or not it keeps the limits.
+
+    Raises
+    ------
+    RefusedError
+        When the readings cannot be read, do not carry a calibration, or change meanwhile.
+    """
+    inputs = inputs_sha256(folder, unit)
+    if unit.recording is not None:
+        # SciPy's optimizers take as long to import as a whole tilter's calibration does.
+        from triaxcal.fit.route import calibrate_recording  # noqa: PLC0415
+
+        unit, measurements, calibration = calibrate_recording(unit, unit.recording, folder)
+    else:
+        measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
+        calibration = calibrate(unit, measurements, stated_pair(unit, folder))
+    if inputs_sha256(folder, unit) != inputs:
+        raise RefusedError(str(folder), "changed while it was read", remedy="run it again")
+    return Fitted(unit, measurements, inputs, calibration)
+
+
+def refuse_beyond_limits(fitted: Fitted) -> None:
+    """Refuse a calibration that misses its own readings by more than the unit's limits, P1 (13).
+
+    Raises
+    ------
+    RefusedError
+        Names the readings at fault, or the thermal function, and what to do.
+    """
+    if fitted.calibration.recording is None:
+        refuse_unacceptable(fitted.unit, fitted.calibration, fitted.measurements)
+        return
+    from triaxcal.fit.route import refuse_poses_beyond_limits  # noqa: PLC0415
+
+    refuse_poses_beyond_limits(fitted.unit, fitted.calibration)
