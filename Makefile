@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 DEVELOPER := $(VENV)/.developer
+WRITER := $(VENV)/.writer
 
 # A file stays on one core, so that its compiled fixtures are made once.
 PYTEST := $(BIN)/pytest -q -n auto --dist loadfile
@@ -17,7 +18,7 @@ NAMED = case "$$UNIT" in \
     */*) echo "make: UNIT=$$UNIT is a path; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; esac
 
 .DEFAULT_GOAL := help
-.PHONY: help series test-long test-verify rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden clean test-targets bench-target
+.PHONY: help series test-long test-verify rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden docs clean test-targets bench-target
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -69,6 +70,10 @@ nightly: $(DEVELOPER)  ## The slow campaigns as well
 golden: $(DEVELOPER)  ## Write the golden files anew; look at the difference before committing it
 	@$(BIN)/pytest -q tests/test_golden.py --update-golden
 
+docs: $(WRITER)  ## The documentation as a site: docs/_build/html/index.html
+	@$(BIN)/python -m sphinx -q -W --keep-going -E -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
 bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 	@$(BIN)/python bench/calib_header.py
 	@$(BIN)/python bench/series.py
@@ -87,11 +92,11 @@ rig-demo: $(DEVELOPER)  ## A whole session on the simulated rig, to a header (2 
 test-targets: $(INSTALLED)  ## The generated C on other cores under QEMU (all shapes, or UNIT=<name>)
 	@$(BIN)/triaxcal target test $${UNIT:+"units/$$UNIT"}
 
-bench-target: $(INSTALLED)  ## What a call costs on each core, beside floating point; into docs/targets.md
-	@$(BIN)/triaxcal target bench --page docs/targets.md
+bench-target: $(INSTALLED)  ## What a call costs on each core, beside floating point; into docs/reference/targets.md
+	@$(BIN)/triaxcal target bench --page docs/reference/targets.md
 
 clean:  ## Remove what make made
-	rm -rf build $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build docs/_build $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 $(INSTALLED): pyproject.toml constraints.txt
 	@command -v python3 >/dev/null || { echo "make: python3 not found; sudo apt-get install python3" >&2; exit 1; }
@@ -104,4 +109,9 @@ $(INSTALLED): pyproject.toml constraints.txt
 $(DEVELOPER): $(INSTALLED)
 	@echo "adding the developers' tools to $(VENV) (once) ..."
 	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[dev,rig,series]'
+	@touch $@
+
+$(WRITER): $(INSTALLED)
+	@echo "adding the documentation's tools to $(VENV) (once) ..."
+	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[docs,plot,rig]'
 	@touch $@

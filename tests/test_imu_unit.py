@@ -108,7 +108,7 @@ def test_too_short_a_recording_is_refused(unit: Path) -> None:
 
 
 def test_the_docs_name_every_key_of_an_imu_with_its_table() -> None:
-    text = (REPO / "docs/file-formats.md").read_text(encoding="utf-8")
+    text = (REPO / "docs/reference/file-formats.md").read_text(encoding="utf-8")
     section = text.split("## unit.toml of an IMU")[1].split("\n## ")[0]
     table, documented = "", set()
     for line in section.splitlines():
@@ -120,15 +120,15 @@ def test_the_docs_name_every_key_of_an_imu_with_its_table() -> None:
 
 
 def test_the_docs_name_every_extension() -> None:
-    text = (REPO / "docs/dynamic.md").read_text(encoding="utf-8")
+    text = (REPO / "docs/how-to/imu.md").read_text(encoding="utf-8")
     rows = [line.split("|")[1] for line in text.splitlines() if line.count("|") == 4]
     named = {name.strip() for row in rows for name in row.split(",")}
     assert set(extensions()) <= named, set(extensions()) - named
 
 
 def test_the_example_of_the_docs_is_read(tmp_path: Path) -> None:
-    """The two examples of docs/dynamic.md with [table] and [device], joined."""
-    blocks = (REPO / "docs/dynamic.md").read_text(encoding="utf-8").split("```toml\n")[1:]
+    """The two examples of docs/how-to/imu.md with [table] and [device], joined."""
+    blocks = (REPO / "docs/how-to/imu.md").read_text(encoding="utf-8").split("```toml\n")[1:]
     (tmp_path / "IMU-001").mkdir()
     text = "".join(block.split("```")[0] for block in blocks)
     (tmp_path / "IMU-001" / "unit.toml").write_text(text, encoding="utf-8")

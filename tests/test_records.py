@@ -103,7 +103,9 @@ def test_shipped_measurements_are_readable() -> None:
         assert len(read_back.dwells) == dwells
 
 
-@pytest.mark.parametrize(("page", "rows"), [("file-formats.md", 2), ("add-a-unit.md", 1)])
+@pytest.mark.parametrize(
+    ("page", "rows"), [("reference/file-formats.md", 2), ("how-to/add-a-unit.md", 1)]
+)
 def test_the_example_of_the_docs_is_read(tmp_path: Path, page: str, rows: int) -> None:
     text = (REPO / "docs" / page).read_text(encoding="utf-8")
     blocks = [block for block in text.split("```")[1::2] if "\nTP1," in block]
@@ -112,7 +114,7 @@ def test_the_example_of_the_docs_is_read(tmp_path: Path, page: str, rows: int) -
 
 
 def test_the_docs_name_every_column() -> None:
-    text = (REPO / "docs/file-formats.md").read_text(encoding="utf-8")
+    text = (REPO / "docs/reference/file-formats.md").read_text(encoding="utf-8")
     columns = {"position", "temp_degc", "temp_code", "count"}
     columns |= {c for names in READINGS.values() for c in names} | set(DEVIATIONS["v"])
     assert all(f"`{column}`" in text for column in columns)
@@ -301,7 +303,7 @@ HEADERS = [
 @pytest.mark.parametrize(("header", "expected"), HEADERS)
 def test_a_wrong_header_is_refused(tmp_path: Path, header: str, expected: str) -> None:
     message = refusal(tmp_path, f"# comment\n{header}\nTP1,20,0.5,0,0\n")
-    assert message.removesuffix("; columns: see docs/file-formats.md") == (
+    assert message.removesuffix("; columns: see docs/reference/file-formats.md") == (
         f", row 2 (header): {expected}"
     )
 

@@ -1,4 +1,4 @@
-"""docs/bench.md lists every setting with its default, every command and every fault."""
+"""docs/how-to/bench.md lists every setting with its default, every command and every fault."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from triaxcal.rig.dbc import REQUIRED
 from triaxcal.rig.plan import Stillness, Thermal
 from triaxcal.rig.simorders import KINDS
 
-PAGE = (REPO / "docs" / "bench.md").read_text(encoding="utf-8")
+PAGE = (REPO / "docs/how-to/bench.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("settings", [Stillness(), Thermal()])
@@ -35,5 +35,5 @@ def test_every_fault_is_named():
 
 
 def test_every_message_is_named():
-    page = (REPO / "docs" / "can.md").read_text(encoding="utf-8")
+    page = (REPO / "docs/reference/can.md").read_text(encoding="utf-8")
     assert [name for name in REQUIRED if name not in page and not name.startswith("COMP")] == []

@@ -1,0 +1,41 @@
+"""Settings of the documentation; `make docs` builds it, without a network."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from triaxcal import __version__
+
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+
+project = "triaxcal"
+author = "the triaxcal authors"
+project_copyright = "the triaxcal authors, MIT licence"
+version = release = __version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "sphinx_click",
+    "external_links",
+]
+exclude_patterns = ["_build", "_ext"]
+source_suffix = {".md": "markdown"}
+
+myst_enable_extensions = ["deflist"]
+myst_heading_anchors = 4
+
+nitpicky = True
+autosummary_generate = False
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+autodoc_typehints = "none"  # the docstrings give shapes and units, which types do not
+
+html_theme = "furo"
+html_title = f"triaxcal {release}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sphinx = False
