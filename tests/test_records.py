@@ -303,7 +303,7 @@ HEADERS = [
 @pytest.mark.parametrize(("header", "expected"), HEADERS)
 def test_a_wrong_header_is_refused(tmp_path: Path, header: str, expected: str) -> None:
     message = refusal(tmp_path, f"# comment\n{header}\nTP1,20,0.5,0,0\n")
-    assert message.removesuffix("; columns: see docs/reference/file-formats.md") == (
+    assert message.removesuffix("; columns: see docs/file-formats.md") == (
         f", row 2 (header): {expected}"
     )
 
