@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from plans import SENSOR
+from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
+from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.routines import Generated
 from triaxcal.fixedpoint.plan import Plan
 
@@ -19,7 +20,7 @@ def write_generated(plan: Plan, folder: Path) -> None:
     """Write what a delivery writes for the firmware."""
     folder.mkdir(parents=True, exist_ok=True)
     texts = render_routine(plan)
-    texts[CONSTANTS_FILE] = render_constants(plan, SENSOR, PROVENANCE)
+    texts |= render_constants(plan, SENSOR, PROVENANCE)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.codegen.render import function_format
+from triaxcal.codegen.constants import function_format
 from triaxcal.deliver.unit import Delivery
 from triaxcal.report.a2l import calib_a2l, calib_words
 from triaxcal.report.dcc import DCC, SI, certificate_xml

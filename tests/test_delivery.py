@@ -12,8 +12,9 @@ import pytest
 from scipy import stats
 
 from triaxcal.base.tomltable import read_toml
+from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.crosscheck import vector_sets
-from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
+from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.routines import Generated, start_generated
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.deliver import unit as delivery_module
@@ -305,7 +306,7 @@ def test_the_papers_two_segments_are_a_hundred_times_worse_on_sim(
     prove(plan)
     texts = render_routine(plan)
     provenance = Provenance("SIM", "0" * 64, ())
-    texts[CONSTANTS_FILE] = render_constants(plan, unit.temperature_sensor, provenance)
+    texts |= render_constants(plan, unit.temperature_sensor, provenance)
     paper = compiled({k: v.encode() for k, v in texts.items()}, tmp_path / "paper")
     ours = compiled(delivery.files, tmp_path / "ours")
     temps = np.repeat(TEMPS_BETWEEN, 6)

@@ -27,8 +27,8 @@ from plans import (
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
+from triaxcal.codegen.forms import limb_split
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import limb_split
 from triaxcal.codegen.routines import Answers, Generated, Reference
 from triaxcal.fixedpoint.plan import Plan
 

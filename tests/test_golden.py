@@ -9,12 +9,8 @@ import pytest
 
 from builds import PROVENANCE
 from plans import GOLDEN, SENSOR
-from triaxcal.codegen.render import (
-    CONSTANTS_FILE,
-    ROUTINE_FILES,
-    render_constants,
-    render_routine,
-)
+from triaxcal.codegen.constants import CONSTANTS_FILE, render_constants
+from triaxcal.codegen.render import ROUTINE_FILES, render_routine
 
 FOLDER = Path(__file__).parent / "golden"
 REMEDY = "if the change is meant: make golden (pytest --update-golden), read git diff, commit"
@@ -24,7 +20,7 @@ def rendered(name: str) -> dict[str, str]:
     plan = GOLDEN[name]
     return {
         **render_routine(plan),
-        CONSTANTS_FILE: render_constants(plan, SENSOR, PROVENANCE),
+        **render_constants(plan, SENSOR, PROVENANCE),
     }
 
 

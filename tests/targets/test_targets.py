@@ -22,8 +22,9 @@ from plans import (
 )
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.shipped import shipped
+from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import Provenance, render_constants, render_routine
+from triaxcal.codegen.render import render_routine
 from triaxcal.targets import bench_table, cores, counting, matrix
 from triaxcal.targets.bench import Subject, _write_subject, cost_of
 from triaxcal.targets.build import TargetError, Toolset, build, emulate
@@ -304,7 +305,7 @@ def test_assembly_at_the_limits_of_every_shape(name: str) -> None:
     if shape.quadratic:
         plan = with_quadratic(plan, random_quadratic(rng, full=True))
     files = render_routine(plan)
-    files["triax_calib.h"] = render_constants(plan, SENSOR, Provenance("S", "0" * 64, ("limits",)))
+    files |= render_constants(plan, SENSOR, Provenance("S", "0" * 64, ("limits",)))
     case = Case(name, "", plan, files, image_bytes(plan))
     by_name = {core.name: core for core in cores.CORES}
     ways = (("Cortex-M0", THUMB1), ("Cortex-M3", THUMB2), ("Cortex-M4F", THUMB2))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import CONSTANTS_FILE, Provenance, render_constants, render_routine
+from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.tryout import model_error_g
 from triaxcal.deliver.fitted import Fitted
 from triaxcal.fit.core.calibration import Calibration
@@ -89,7 +90,7 @@ def _files(fitted: Fitted, compensation: Compensation, plan: Plan) -> dict[str, 
         unit.serial, fitted.inputs_sha256, (*summary, *_constants_at_t0(calibration))
     )
     texts = render_routine(plan)
-    texts[CONSTANTS_FILE] = render_constants(plan, unit.temperature_sensor, provenance)
+    texts |= render_constants(plan, unit.temperature_sensor, provenance)
     files = {name: text.encode() for name, text in texts.items()}
     files[IMAGE_FILE] = image_bytes(plan)
     return files

@@ -12,7 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from triaxcal import __version__
-from triaxcal.codegen.render import environment, function_format
+from triaxcal.codegen.constants import function_format
+from triaxcal.codegen.templates import environment
 from triaxcal.deliver.unit import Delivery
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.plan import Plan
@@ -65,7 +66,7 @@ def calib_a2l(delivery: Delivery) -> bytes:
         "words": words,
         "methods": list({w.method.name: w.method for w in words}.values()),
     }
-    return environment().get_template("triax_calib.a2l.j2").render(context).encode()
+    return environment().get_template("a2l/triax_calib.a2l.j2").render(context).encode()
 
 
 def calib_words(delivery: Delivery) -> list[Word]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal import __version__
-from triaxcal.codegen.render import environment
+from triaxcal.codegen.templates import environment
 from triaxcal.deliver.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Weak
@@ -109,7 +109,7 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
         ],
         "files": [] if made.c is None else file_rows(made.c.build.files),
     }
-    return environment().get_template("dynamic.html.j2").render(context).encode()
+    return environment().get_template("pages/dynamic.html.j2").render(context).encode()
 
 
 def _badge(made: ImuDelivery) -> tuple[bool, str, str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from triaxcal.codegen.render import environment
+from triaxcal.codegen.templates import environment
 from triaxcal.model.types import FloatArray
 from triaxcal.report.passport.curves import ticks
 
@@ -62,7 +62,7 @@ def line_plot(title: str, panels: Sequence[Panel]) -> bytes:
         "legend": _legend(panels),
         "panels": [_panel(p, TOP + k * (HEIGHT + FOOT)) for k, p in enumerate(panels)],
     }
-    return environment().get_template("lines.svg.j2").render(context).encode()
+    return environment().get_template("pictures/lines.svg.j2").render(context).encode()
 
 
 def _legend(panels: Sequence[Panel]) -> list[dict[str, Any]]:

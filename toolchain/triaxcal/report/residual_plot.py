@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from triaxcal.codegen.render import environment
+from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import BEFORE, MethodResult
 from triaxcal.deliver.unit import Delivery
 from triaxcal.report.temperatures import by_temperature, degrees, position_order, with_room
@@ -75,7 +75,7 @@ def residuals_svg(delivery: Delivery) -> bytes:
         "rows": rows,
         "legend": _legend(methods, delivery.unit.method),
     }
-    return environment().get_template("residuals.svg.j2").render(context).encode()
+    return environment().get_template("pictures/residuals.svg.j2").render(context).encode()
 
 
 def _row(

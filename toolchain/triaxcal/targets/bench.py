@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.base.shipped import shipped
-from triaxcal.codegen.render import assembly
+from triaxcal.codegen.forms import assembly
 from triaxcal.targets.bench_case import case_header, floating_macros, floating_tables
 from triaxcal.targets.build import TargetError, Toolset, build, run
 from triaxcal.targets.cores import CORES, Core, install_advice, missing_tools

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.codegen.render import int32_literal
+from triaxcal.codegen.templates import int32_literal
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
 from triaxcal.fixedpoint.plan import Plan
 

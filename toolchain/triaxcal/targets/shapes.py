@@ -8,14 +8,9 @@ from functools import cache
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import (
-    CONSTANTS_FILE,
-    Provenance,
-    gyro_text,
-    render_constants,
-    render_routine,
-)
+from triaxcal.codegen.render import render_routine
 from triaxcal.deliver.firmware import compensation_of
 from triaxcal.deliver.inputs import inputs_sha256
 from triaxcal.fit.core.calibration import Calibration
@@ -142,6 +137,5 @@ def _case(folder: Path, name: str, note: str, change: Change) -> Case:
         plan = make_gyro_plan(imu, replace(unit, output_q=18), unit.output_q)
     files = render_routine(plan)
     provenance = Provenance(unit.serial, inputs_sha256(folder), (f"shape {name}: {note}",))
-    constants = gyro_text(CONSTANTS_FILE) if plan.shape.gyro else CONSTANTS_FILE
-    files[constants] = render_constants(plan, unit.temperature_sensor, provenance)
+    files |= render_constants(plan, unit.temperature_sensor, provenance)
     return Case(name, note, plan, files, image_bytes(plan))

@@ -12,8 +12,8 @@ import numpy as np
 
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.codegen.forces import rate_edges
-from triaxcal.codegen.render import int32_literal
 from triaxcal.codegen.routines import Int32Array, UInt32Array
+from triaxcal.codegen.templates import int32_literal
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.targets.shapes import Case

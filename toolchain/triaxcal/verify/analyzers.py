@@ -93,7 +93,7 @@ def check_sanitizer(work: Workspace, sanitizer: Sanitizer) -> Outcome:
     batch = shipped("firmware_ref") / work.named("triax_batch.c")
     subject = Subject(
         work.folder,
-        work.render(f"verify_{sanitizer.key}.c", "verify_driver.c.j2", {}),
+        work.render(f"verify_{sanitizer.key}.c", "verify/driver.c.j2", {}),
         (work.named(ROUTINE), str(batch)),
         work.named(IMAGE),
         b"".join(rows_of(work.plan, v) for v in vectors),

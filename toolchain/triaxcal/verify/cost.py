@@ -6,7 +6,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 
-from triaxcal.codegen.render import assembly
+from triaxcal.codegen.forms import assembly
 from triaxcal.targets.bench import Cost, Subject, best_form, compiler_versions, cost_of
 from triaxcal.targets.build import TargetError
 from triaxcal.targets.cores import CORES, install_advice, missing_tools

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from triaxcal.codegen.render import int32_literal
+from triaxcal.codegen.templates import int32_literal
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.verify.outcome import Outcome, judged
@@ -70,7 +70,7 @@ def _check(work: Workspace, key: str, title: str, entry: str, form: tuple[str, .
     FRAMA_C.find()
     # Two analyses may run at once: each has its own driver and report.
     driver = work.render(
-        f"{key}_{DRIVER}", "verify_eva.c.j2", {"ranges": range_literals(work.plan)}
+        f"{key}_{DRIVER}", "verify/eva.c.j2", {"ranges": range_literals(work.plan)}
     )
     sources = (work.named(ROUTINE), driver.name)
     return analyse(work.folder, Analysis(key, title, entry, ENTRIES[entry], sources, form))

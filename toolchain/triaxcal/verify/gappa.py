@@ -87,7 +87,7 @@ def check(work: Workspace) -> Outcome:
 def _bound(work: Workspace, image: Image, axis: int, s: int) -> float:
     """Gappa's bound of |a - a*| in LSB, rounded up."""
     script = work.render(
-        f"verify_{axis}_{s}.g", "verify_gappa.g.j2", script_context(work, image, axis, s)
+        f"verify_{axis}_{s}.g", "verify/gappa.g.j2", script_context(work, image, axis, s)
     )
     return largest_magnitude(_run(work, script))
 
@@ -124,7 +124,7 @@ def _quadratic(work: Workspace, image: Image, linear_lsb: Sequence[float]) -> li
             "reach": [_dyadic(Fraction(math.ceil(r))) for r in reach],
             "error": [_dyadic(e) for e in error],
         }
-        script = work.render(f"verify_q{axis}.g", "verify_gappa_quadratic.g.j2", context)
+        script = work.render(f"verify_q{axis}.g", "verify/gappa_quadratic.g.j2", context)
         found = largest_magnitude(_run(work, script))
         bounds.append(math.nextafter(float(Fraction(found) / place), math.inf))
     return bounds

@@ -15,7 +15,7 @@ import numpy as np
 
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.imu import IMU_FILES, IMU_IMAGE_FILE, ImuBuild, imu_answers, imu_vectors
-from triaxcal.codegen.render import environment, gyro_text
+from triaxcal.codegen.templates import GYRO_NAMES, environment
 from triaxcal.verify import analyzers, cppcheck, eva
 from triaxcal.verify.campaign import delivery_outcomes, guarded, verify_files
 from triaxcal.verify.image_reader import image_length
@@ -23,7 +23,7 @@ from triaxcal.verify.outcome import Outcome
 from triaxcal.verify.workspace import CONSTANTS, IMAGE, LIMBS, PORTABLE, ROUTINE
 
 ACCELEROMETER, GYRO, BOTH = "accelerometer", "gyro", "both_triads"
-ROUTINES = ("triax_imu.c", ROUTINE, gyro_text(ROUTINE))
+ROUTINES = ("triax_imu.c", ROUTINE, GYRO_NAMES.file(ROUTINE))
 _DRIVER = "verify_eva_imu.c"
 
 
@@ -60,7 +60,7 @@ def verify_imu(folder: Path, build: ImuBuild) -> dict[str, tuple[Outcome, ...]]:
     image = build.files[IMU_IMAGE_FILE]
     length = image_length(image)
     accel = {**build.files, IMAGE: image[:length]}
-    gyro = {**build.files, gyro_text(IMAGE): image[length:]}
+    gyro = {**build.files, GYRO_NAMES.file(IMAGE): image[length:]}
     return {
         ACCELEROMETER: verify_files(folder / "accel", accel, build.accel, build.accel_bound),
         GYRO: verify_files(folder / "gyro", gyro, build.gyro, build.gyro_bound),
@@ -84,7 +84,7 @@ def _verify_both(folder: Path, build: ImuBuild) -> tuple[Outcome, ...]:
 
 
 def _eva(work: Both, key: str, title: str, entry: str, form: tuple[str, ...]) -> Outcome:
-    driver = work.render(f"{key}_{_DRIVER}", f"{_DRIVER}.j2", _ranges(work.build))
+    driver = work.render(f"{key}_{_DRIVER}", "verify/eva_imu.c.j2", _ranges(work.build))
     ends = {entry, "sample" if entry == "verify_imu_codes" else "accepted"}
     asked = eva.Analysis(key, title, entry, ends, (*ROUTINES, driver.name), form)
     return eva.analyse(work.folder, asked)
@@ -100,7 +100,7 @@ def _ranges(build: ImuBuild) -> dict[str, object]:
 
 def _cppcheck(work: Both) -> Outcome:
     """triax_imu.c and its header; the findings in the files of the triads are theirs."""
-    constants = (CONSTANTS, gyro_text(CONSTANTS))
+    constants = (CONSTANTS, GYRO_NAMES.file(CONSTANTS))
     found = cppcheck.find_in(work.folder, ROUTINES[0], constants)
     return cppcheck.judge([finding for finding in found if finding.file in IMU_FILES])
 
@@ -112,7 +112,7 @@ def _sanitizer(work: Both, sanitizer: analyzers.Sanitizer) -> Outcome:
     answers = np.column_stack([accel, rate, status.view(np.int32)]).astype(np.int32).tobytes()
     subject = analyzers.Subject(
         work.folder,
-        work.render(f"verify_{sanitizer.key}.c", "verify_driver_imu.c.j2", {}),
+        work.render(f"verify_{sanitizer.key}.c", "verify/driver_imu.c.j2", {}),
         (*ROUTINES, str(shipped("firmware_ref") / "triax_imu_batch.c")),
         IMU_IMAGE_FILE,
         np.column_stack([temp, raw_accel, raw_gyro]).astype(np.int32).tobytes(),

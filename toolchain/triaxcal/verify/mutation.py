@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.codegen.compiler import FLAGS as DELIVERY_FLAGS
-from triaxcal.codegen.render import gyro_text
+from triaxcal.codegen.templates import ACCEL_NAMES, Names, environment, names_of
 from triaxcal.verify.analyzers import GCC, SANITIZERS
 from triaxcal.verify.c_mutants import Mutant, mutants_of
 from triaxcal.verify.mutation_inputs import write_images, write_vectors
@@ -73,16 +73,12 @@ class Equivalent:
     shapes: tuple[str, ...] = ()
 
     def covers(self, mutant: Mutant, shape: str) -> bool:
-        """Whether the mutant of a shape is this one; entries have an accelerometer's names."""
-        function, before, *after = (
-            gyro_text(text) if shape == "gyro" else text
-            for text in (self.function, self.before, *self.after)
-        )
+        """Whether the mutant of a shape is this one."""
         return (
-            mutant.function == function
+            mutant.function == self.function
             and (not self.shapes or shape in self.shapes)
-            and _like(before, mutant.before)
-            and any(_like(text, mutant.after) for text in after)
+            and _like(self.before, mutant.before)
+            and any(_like(text, mutant.after) for text in self.after)
         )
 
 
@@ -90,9 +86,9 @@ def _like(pattern: str, text: str) -> bool:
     return re.fullmatch(".*".join(map(re.escape, pattern.split("*~"))), text) is not None
 
 
-def read_equivalents() -> tuple[Equivalent, ...]:
-    """The equivalent mutants on file."""
-    entries = tomllib.loads(EQUIVALENTS.read_text()).get("equivalent", [])
+def read_equivalents(names: Names = ACCEL_NAMES) -> tuple[Equivalent, ...]:
+    """The equivalent mutants on file, with the names in the C of a triad."""
+    text = environment().from_string(EQUIVALENTS.read_text()).render(names.context)
     return tuple(
         Equivalent(
             e["function"],
@@ -101,7 +97,7 @@ def read_equivalents() -> tuple[Equivalent, ...]:
             " ".join(e["reason"].split()),
             tuple(e.get("shapes", ())),
         )
-        for e in entries
+        for e in tomllib.loads(text)["equivalent"]
     )
 
 
@@ -114,7 +110,7 @@ class Bench:
         folder = work.folder / "bench"
         folder.mkdir()
         # Away from the unit's files, or it would include those rather than the mutant's.
-        self.harness = work.render("bench/verify_mutant.c", "verify_mutant.c.j2", {})
+        self.harness = work.render("bench/verify_mutant.c", "verify/mutant.c.j2", {})
         self.vectors, self.answers, self.images = (
             folder / f"verify_mutant.{name}" for name in ("vectors", "answers", "images")
         )
@@ -212,7 +208,7 @@ def image_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
 
 def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdict]:
     """What becomes of mutants of one file, in their order."""
-    equivalents = read_equivalents()
+    equivalents = read_equivalents(names_of(bench.work.plan.shape))
 
     def judge(item: tuple[int, Mutant]) -> Verdict:
         number, mutant = item

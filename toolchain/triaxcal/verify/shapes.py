@@ -9,14 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import (
-    CONSTANTS_FILE,
-    Provenance,
-    gyro_text,
-    render_constants,
-    render_routine,
-)
+from triaxcal.codegen.render import render_routine
+from triaxcal.codegen.templates import names_of
 from triaxcal.deliver.firmware import IMAGE_FILE, compensation_of
 from triaxcal.deliver.inputs import inputs_sha256
 from triaxcal.fit.tilter.calibrate import calibrate
@@ -94,10 +90,7 @@ def subject(name: str, units: Path) -> Subject:
         plan = make_gyro_plan(imu, replace(unit, output_q=18), unit.output_q)
     texts = render_routine(plan)
     provenance = Provenance(unit.serial, inputs_sha256(folder), (f"shape {name}",))
-    constants, image = CONSTANTS_FILE, IMAGE_FILE
-    if plan.shape.gyro:
-        constants, image = gyro_text(constants), gyro_text(image)
-    texts[constants] = render_constants(plan, unit.temperature_sensor, provenance)
+    texts |= render_constants(plan, unit.temperature_sensor, provenance)
     files = {file: text.encode() for file, text in texts.items()}
-    files[image] = image_bytes(plan)
+    files[names_of(plan.shape).file(IMAGE_FILE)] = image_bytes(plan)
     return Subject(name, plan, prove(plan), files)

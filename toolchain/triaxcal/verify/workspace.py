@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from triaxcal.codegen.render import environment, gyro_text
+from triaxcal.codegen.templates import environment, names_of
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
 
@@ -51,12 +51,13 @@ class Workspace:
         return (self.folder / self.named(IMAGE)).read_bytes()
 
     def named(self, name: str) -> str:
-        """A text or a file's name with the names of the triad that is verified."""
-        return gyro_text(name) if self.plan.shape.gyro else name
+        """Name of a file of the triad that is verified, from an accelerometer's."""
+        return names_of(self.plan.shape).file(name)
 
     def render(self, name: str, template: str, context: dict[str, Any]) -> Path:
-        """Write a template's text under `name` and return its path; C has the triad's names."""
+        """Write a template's text under `name` and return its path."""
         path = self.folder / name
-        text = environment().get_template(template).render(shape=self.plan.shape, **context)
-        path.write_text(self.named(text) if path.suffix == ".c" else text)
+        shape = self.plan.shape
+        known = {"shape": shape, **names_of(shape).context, **context}
+        path.write_text(environment().get_template(template).render(known))
         return path

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from triaxcal import __version__
-from triaxcal.codegen.render import environment
+from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.fit.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
@@ -56,7 +56,7 @@ def passport_html(p: Passport) -> bytes:
         "tools": tool_rows(p.tools),
         "files": file_rows(p.delivery.files),
     }
-    return environment().get_template("passport.html.j2").render(context).encode()
+    return environment().get_template("pages/passport.html.j2").render(context).encode()
 
 
 def _identity(p: Passport) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from triaxcal.batch.statistics import (
     quantities,
     runs,
 )
-from triaxcal.codegen.render import environment
+from triaxcal.codegen.templates import environment
 from triaxcal.report.passport.curves import ticks
 
 PAGE_FILE, JSON_FILE = "series.html", "series.json"
@@ -70,7 +70,7 @@ def series_files(series: Series) -> dict[str, bytes]:
         "more_runs": max(0, len(by_run) - 60),
         "drift": _drift(by_run),
     }
-    page = environment().get_template("series.html.j2").render(context)
+    page = environment().get_template("pages/series.html.j2").render(context)
     return {PAGE_FILE: page.encode(), JSON_FILE: _json(series, found, far, by_run)}
 
 
