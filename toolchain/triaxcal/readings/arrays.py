@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import did_you_mean, shown
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.readings.format import PIECE, Block, Source
+from triaxcal.readings.names import in_table
 from triaxcal.unit.recordingfile import FileLayout
 
 
 class ArraySource(Source):
     """Columns that stand ready as arrays of one length, or as what slices like one.
 
-    An array of two dimensions is as many columns, named `name[0]`, `name[1]`. The columns of the
-    array `layout.variable`, or of the only one of two dimensions, are also counted from 1.
+    An array of two dimensions is as many columns, named `name[0]`, `name[1]`; one of records is a
+    column for each field, `name.field`. The columns of the array `layout.variable`, or of the only
+    one of two dimensions, are also counted from 1.
 
     Parameters
     ----------
@@ -30,27 +33,32 @@ class ArraySource(Source):
 
     def __init__(self, path: str, arrays: Mapping[str, Any], layout: FileLayout) -> None:
         self._path = path
-        self._columns: list[tuple[str, Any, int | None]] = []
+        self._columns: list[tuple[str, Any, str, int | None]] = []
         matrices: dict[str, range] = {}
         for name, array in arrays.items():
-            if len(array.shape) == 1:
-                self._columns.append((name, array, None))
-                continue
             first = len(self._columns)
-            self._columns += [(f"{name}[{k}]", array, k) for k in range(array.shape[1])]
-            matrices[name] = range(first, len(self._columns))
-        if layout.variable is not None and layout.variable not in matrices:
+            for field in array.dtype.names or ("",):
+                kind = array.dtype[field] if field else np.dtype((array.dtype, array.shape[1:]))
+                full = ".".join(part for part in (name, field) if part)
+                if not kind.shape:
+                    self._columns.append((full, array, field, None))
+                elif len(kind.shape) == 1:
+                    width = range(kind.shape[0])
+                    self._columns += [(f"{full}[{k}]", array, field, k) for k in width]
+            if len(array.shape) == 2 or array.dtype.names:
+                matrices[name] = range(first, len(self._columns))
+        self.names = tuple(column[0] for column in self._columns)
+        if layout.variable in matrices:
+            self.numbered = matrices[layout.variable]
+        elif layout.variable is None and len(matrices) == 1:
+            self.numbered = next(iter(matrices.values()))
+        elif layout.variable is not None and not in_table(layout.variable, self.names):
             hint = did_you_mean(layout.variable, matrices)
             raise RefusedError(
                 path,
                 f"no matrix {shown(layout.variable)}{hint}",
                 expected="one of " + ", ".join(matrices) if matrices else "a matrix",
             )
-        if layout.variable is not None:
-            self.numbered = matrices[layout.variable]
-        elif len(matrices) == 1:
-            self.numbered = next(iter(matrices.values()))
-        self.names = tuple(name for name, _, _ in self._columns)
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
         """As `Source.blocks`."""
@@ -64,41 +72,101 @@ class ArraySource(Source):
                 remedy="name columns that belong together, or save them at one rate",
             )
         count = next(iter(lengths.values()))
+        pieces = Pieces(self._path, self.names, numbers, texts)
         for start in range(0, count, PIECE):
             part = slice(start, min(start + PIECE, count))
-            rows = np.arange(part.start + 1, part.stop + 1)
-            values = np.empty((len(rows), len(numbers)))
-            for place, k in enumerate(numbers):
-                values[:, place] = doubles(self._path, self.names[k], self._cut(k, part))
-            yield Block(values, tuple(texts_of(self._cut(k, part)) for k in texts), rows)
+            yield pieces.block(partial(self._cut, part))
 
-    def _cut(self, k: int, part: slice) -> Any:
-        _, array, inner = self._columns[k]
-        return np.asarray(array[part] if inner is None else array[part, inner])
+    def _cut(self, part: slice, k: int) -> Any:
+        _, array, field, inner = self._columns[k]
+        if not field:
+            return np.asarray(array[part] if inner is None else array[part, inner])
+        values = np.asarray(array[part])[field]
+        return values if inner is None else values[:, inner]
 
 
-def doubles(path: str, name: str, values: Any) -> FloatArray:
-    """Numbers of a column of any numeric type, shape (n,); NaN for None and infinities.
+class Pieces:
+    """Blocks of the columns of a file that is read piece after piece.
 
-    Raises
-    ------
-    RefusedError
-        For text and dates.
+    Parameters
+    ----------
+    path : str
+    names : sequence of str
+        Of all columns, for messages.
+    numbers, texts : indices into `names`
+        As of `Source.blocks`.
     """
-    array = np.asarray(values)
-    try:
-        if array.dtype.kind not in "biufO":
-            raise ValueError
-        found = array.astype(np.float64)
-    except (ValueError, TypeError) as error:
-        first = array.flat[0] if array.size else ""
-        raise RefusedError(
-            f"{path}, column {name}",
-            f"holds {array.dtype}, the first is {str(first)[:40]!r}",
-            expected="numbers",
-            remedy="write the column as numbers, or name another",
-        ) from error
-    return np.where(np.isfinite(found), found, np.nan)
+
+    def __init__(
+        self, path: str, names: Sequence[str], numbers: Sequence[int], texts: Sequence[int]
+    ) -> None:
+        self._path, self._names = path, names
+        self._numbers, self._texts = numbers, texts
+        self._count = 0
+        self._starts: dict[int, int] = {}
+
+    def block(self, values_of: Callable[[int], Any], rows: IntArray | None = None) -> Block:
+        """Block of the next piece.
+
+        Parameters
+        ----------
+        values_of : callable
+            Values of a column in this piece by its index, shape (n,), of any type.
+        rows : array, shape (n,), or None
+            None counts them.
+
+        Raises
+        ------
+        RefusedError
+            Where a column of numbers holds text or dates.
+        """
+        columns = {k: np.asarray(values_of(k)) for k in {*self._numbers, *self._texts}}
+        count = len(next(iter(columns.values())))
+        if rows is None:
+            rows = np.arange(self._count + 1, self._count + count + 1)
+        self._count += count
+        numbers = np.empty((count, len(self._numbers)))
+        for place, k in enumerate(self._numbers):
+            start = self._starts.setdefault(k, _start(columns[k]))
+            try:
+                numbers[:, place] = _doubles(columns[k], start)
+            except (ValueError, TypeError) as error:
+                row, cell = _no_number(columns[k])
+                raise RefusedError(
+                    f"{self._path}, row {rows[row]}, column {self._names[k]}",
+                    f"found {str(cell)[:40]!r}",
+                    expected="a number",
+                    remedy="write the column as numbers, or name another",
+                ) from error
+        return Block(numbers, tuple(texts_of(columns[k]) for k in self._texts), rows)
+
+
+def _start(values: Any) -> int:
+    """First of whole numbers that doubles cannot hold exactly; 0 of any other values."""
+    first = int(values[0]) if values.dtype.kind in "iu" and len(values) else 0
+    return first if abs(first) >= 2**53 else 0
+
+
+def _doubles(values: Any, start: int) -> FloatArray:
+    """Numbers less `start`; NaN stands for None and for infinities."""
+    if values.dtype.kind not in "biufO":
+        raise ValueError
+    if start:
+        # Two's complement: exact for unsigned values as well.
+        values = values.astype(np.int64) - np.array(start, values.dtype).astype(np.int64)
+    found: FloatArray = values.astype(np.float64)
+    found[~np.isfinite(found)] = np.nan
+    return found
+
+
+def _no_number(values: Any) -> tuple[int, object]:
+    """Index and value of the first that is no number."""
+    for index, value in enumerate(values.tolist() if values.dtype.kind == "O" else ()):
+        try:
+            float(value if value is not None else 0.0)
+        except (ValueError, TypeError):
+            return index, value
+    return 0, values[0]
 
 
 def texts_of(values: Any) -> list[str]:

@@ -22,9 +22,10 @@ finds a missing package, absent or ambiguous columns, and a file that changes wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from triaxcal.base.registry import Registry
 from triaxcal.model.types import FloatArray, IntArray
@@ -41,7 +42,8 @@ class Block:
     Attributes
     ----------
     numbers : array, shape (n, columns)
-        NaN where a number is missing.
+        NaN where a number is missing. A column of whole numbers that a double cannot hold, as
+        nanoseconds since 1970, has its first value taken off: only differences of times count.
     texts : tuple of lists of n str
         One list for each column that was asked for as text.
     rows : array, shape (n,)
@@ -59,7 +61,13 @@ class Source:
     Attributes
     ----------
     names : tuple of str
-        Of the columns; "" of a column that has only a number.
+        Of the columns; "" of a column that has only a number. In a file of several tables (sheets,
+        topics, groups) each is "table.column".
+    tables : tuple of str
+        Table of each column; empty where the file is one table. All columns of a recording must be
+        of one.
+    clocks : mapping of str to (int, str)
+        Column of the times that the format itself gives each table, and their unit.
     numbered : sequence of int
         Indices of the columns that are also counted: number 1 is the first of them.
     row_word : str
@@ -69,6 +77,8 @@ class Source:
     """
 
     names: tuple[str, ...] = ()
+    tables: tuple[str, ...] = ()
+    clocks: Mapping[str, tuple[int, str]] = MappingProxyType({})
     numbered: Sequence[int] = ()
     row_word: str = "row"
     findings: tuple[str, ...] = ()

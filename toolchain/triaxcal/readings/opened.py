@@ -9,11 +9,13 @@ from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import did_you_mean, shown
-from triaxcal.readings.format import FORMATS, Block, Format
+from triaxcal.readings.format import FORMATS, Block, Format, Source
+from triaxcal.readings.names import meant
 from triaxcal.unit.recordingfile import Column, FileLayout
 
 _HEAD = 4096
 """Bytes at the start of a file by which its format is found."""
+_FOLDERS_FILE = "metadata.yaml"
 _NAMES_SHOWN = 20
 _BINARY = (
     (b"PK\x03\x04", "a ZIP archive"),
@@ -45,14 +47,9 @@ class RecordingFile:
         self._stamp = _stamp(path, layout)
         self._format = _format_of(path, layout)
         if self._format.package and importlib.util.find_spec(self._format.package) is None:
-            raise RefusedError(
-                str(path),
-                f"the package {self._format.package} is missing",
-                expected=f"it, to read {self._format.label}",
-                remedy=f"install it: pip install 'triaxcal[{self._format.extra}]'",
-            )
+            raise self._missing(self._format.package)
         with self._one_line():
-            self.source = self._format.open(path, layout)
+            self.source: Source = self._format.open(path, layout)
 
     def index(self, column: Column, key: str) -> int:
         """Index of a column by its name or number; `key` is the key that names it.
@@ -83,16 +80,16 @@ class RecordingFile:
                 if self.source.row_word == "line"
                 else "columns are counted from 1",
             )
-        lowered = [name.lower() for name in names]
-        for among, wanted in ((list(names), column), (lowered, column.lower())):
-            if among.count(wanted) == 1:
-                return among.index(wanted)
-        if column in names:
+        found = meant(column, names, self.layout.variable)
+        if len(found) == 1:
+            return found[0]
+        if found:
+            full = sorted({names[k] for k in found})
             raise RefusedError(
                 str(self.path),
-                f"{names.count(column)} columns {shown(column)} ({key})",
-                expected="one of that name",
-                remedy="give its number from 1",
+                f"{len(found)} columns {shown(column)} ({key})",
+                expected="one of that name" if len(full) == 1 else "one of " + _some(full),
+                remedy="give its number from 1" if len(full) == 1 else "",
             )
         if not any(names):
             raise RefusedError(
@@ -116,6 +113,15 @@ class RecordingFile:
         RefusedError
             When the file holds what is no number there, is damaged, or changes while it is read.
         """
+        tables = {self.source.tables[k]: self.source.names[k] for k in (*numbers, *texts)
+                  if self.source.tables}  # fmt: skip
+        if len(tables) > 1:
+            raise RefusedError(
+                str(self.path),
+                "columns of several tables: " + ", ".join(tables.values()),
+                expected="columns of one table, which has one clock",
+                remedy="name columns of one, or export them at common times",
+            )
         with self._one_line():
             yield from self.source.blocks(numbers, texts)
         if _stamp(self.path, self.layout) != self._stamp:
@@ -133,6 +139,8 @@ class RecordingFile:
             yield
         except RefusedError:
             raise
+        except ImportError as error:
+            raise self._missing(error.name or str(error)) from error
         except Exception as error:
             if not self._format.package:
                 raise
@@ -141,19 +149,27 @@ class RecordingFile:
                 str(self.path), f"damaged, or not {self._format.label}: {text[:200]}"
             ) from error
 
+    def _missing(self, package: str) -> RefusedError:
+        return RefusedError(
+            str(self.path),
+            f"the package {package} is missing",
+            expected=f"it, to read {self._format.label}",
+            remedy=f"install it: pip install 'triaxcal[{self._format.extra}]'",
+        )
+
 
 def _some(names: Sequence[str]) -> str:
     more = ", ..." if len(names) > _NAMES_SHOWN else ""
     return ", ".join(name for name in names[:_NAMES_SHOWN] if name) + more
 
 
-def _stamp(path: Path, layout: FileLayout) -> tuple[int, int, int]:
-    """What changes with a file's content."""
+def _stamp(path: Path, layout: FileLayout) -> list[tuple[int, int, int]]:
+    """What changes with the content of a file, or of the files of a folder."""
     try:
-        found = path.stat()
+        stats = [file.stat() for file in (path, *(path.iterdir() if path.is_dir() else ()))]
     except OSError as error:
         raise _unreadable(path, layout, error) from error
-    return found.st_size, found.st_mtime_ns, found.st_ino
+    return [(found.st_size, found.st_mtime_ns, found.st_ino) for found in stats]
 
 
 def _unreadable(path: Path, layout: FileLayout, error: OSError) -> RefusedError:
@@ -169,7 +185,8 @@ def _format_of(path: Path, layout: FileLayout) -> Format:
     if layout.format is not None:
         return FORMATS[layout.format]
     try:
-        with path.open("rb") as file:
+        # Of a folder, as ROS 2 writes bags, the file that describes it is asked.
+        with (path / _FOLDERS_FILE if path.is_dir() else path).open("rb") as file:
             head = file.read(_HEAD)
     except OSError as error:
         raise _unreadable(path, layout, error) from error
