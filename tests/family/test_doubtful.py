@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from itertools import pairwise
 from pathlib import Path
@@ -9,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from family_cases import COLUMNS, U0, K, directions, log, write_unit
+from scipy.special import fdtrc
 from test_recordings import WITH_GYRO, calibrated, left_handed
 from test_tables import AIR, HEADER, rows_of, table
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.outliers import worst_outlier
+from triaxcal.fit.core.outliers import fisher_tail, worst_outlier
 from triaxcal.model.types import FloatArray
 from triaxcal.report.temperatures import with_room
 
@@ -23,6 +25,22 @@ def findings(folder: Path) -> str:
 
 
 # ---- one wrong pose ----
+
+
+@pytest.mark.parametrize("components", [1, 2, 3])
+def test_the_tail_of_f_is_scipys(components: int) -> None:
+    """Of one to a million degrees of freedom, from where the fraction is used."""
+    for dof in (1, 2, 3, 5, 10, 37, 100, 999, 10_000, 1_000_000):
+        for ratio in (1.0, 1.5, 5.0, 10.0, 100.0, 1e4):
+            expected = float(fdtrc(components, dof, ratio))
+            a, b = dof / 2, components / 2
+            # The exponent is a sum of these magnitudes; each is wrong by a few roundings of its
+            # own size, here and in SciPy, and so the relative error of its exponential.
+            sizes = [math.lgamma(a), math.lgamma(b), math.lgamma(a + b), 1.0]
+            sizes += [a * math.log1p(b * ratio / a), b * math.log1p(a / (b * ratio))]
+            rel = 8 * np.finfo(float).eps * sum(map(abs, sizes))
+            found = fisher_tail(components, dof, ratio)
+            assert found == pytest.approx(expected, rel=rel, abs=5e-324)
 
 
 def test_the_f_of_a_pose_left_out_is_fishers() -> None:
