@@ -104,6 +104,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 	@python3 -m venv $(VENV) || { rm -rf $(VENV); \
 	    echo "make: python3 cannot make an environment; sudo apt-get install python3-venv" >&2; exit 1; }
 	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e .
+	@$(BIN)/python -m compileall -q toolchain
 	@touch $@
 
 $(DEVELOPER): $(INSTALLED)

@@ -11,7 +11,8 @@ import pytest
 from builds import UNITS, Built, write_generated
 from plans import COVERING, GOLDEN, random_plan
 from recordings import ABSENT, FOLDER
-from triaxcal.codegen.routines import Generated, Reference, start_generated, start_reference
+from triaxcal.codegen.compiler import start_reference
+from triaxcal.codegen.routines import Generated, Reference, start_generated
 from triaxcal.deliver.unit import Delivery, deliver
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.image_cases import ROW_LIMIT, check_images, image_cases, sum_of_floors
-from triaxcal.codegen.routines import Generated, Reference, start_generated, start_reference
+from triaxcal.codegen.routines import Generated, Reference, start_generated
 from triaxcal.verify.shapes import SHAPES, Subject
 from triaxcal.verify.workspace import IMAGE, Workspace
 from verify.conftest import Planter

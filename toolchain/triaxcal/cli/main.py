@@ -6,12 +6,16 @@ import importlib
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.options import unit_and_build
+
+if TYPE_CHECKING:
+    from triaxcal.codegen.compiler import Compilation
 
 
 class _Commands(click.Group):
@@ -46,21 +50,28 @@ def calib(unit: Path, build: Path) -> None:
 
     A unit whose unit.toml has [dynamic] is an IMU: the same as `triaxcal dynamic`.
     """
-    from triaxcal.base.tomltable import has_table  # noqa: PLC0415
-    from triaxcal.unit.description import find_unit  # noqa: PLC0415
+    from triaxcal.codegen.compiler import reference_under_way  # noqa: PLC0415
 
-    if has_table(find_unit(unit), "dynamic"):
-        from triaxcal.cli.dynamic import calibrate_imu  # noqa: PLC0415
+    with reference_under_way() as reference:  # gcc works while numpy is imported
+        from triaxcal.base.tomltable import has_table  # noqa: PLC0415
+        from triaxcal.unit.description import find_unit  # noqa: PLC0415
 
-        calibrate_imu(unit, build)
-        return
+        if not has_table(find_unit(unit), "dynamic"):
+            _calibrate_accelerometer(unit, build, reference)
+            return
+    from triaxcal.cli.dynamic import calibrate_imu  # noqa: PLC0415
+
+    calibrate_imu(unit, build)
+
+
+def _calibrate_accelerometer(unit: Path, build: Path, reference: Compilation) -> None:
     from triaxcal.base.publish import publish  # noqa: PLC0415
     from triaxcal.deliver.unit import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415
 
-    delivery = deliver(unit)
+    delivery = deliver(unit, reference)
     warning = ""
     if (unit / "history").is_dir():
         from triaxcal.cli.history import warning_of_contradiction  # noqa: PLC0415

@@ -7,11 +7,14 @@ import os
 import shutil
 import signal
 import subprocess
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.shipped import shipped
 
 FLAGS = (
     "-std=c99", "-O2", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion",
@@ -106,3 +109,22 @@ def compile_library(
             remedy="install gcc: sudo apt-get install gcc libc6-dev",
         ) from error
     return Compilation(process, library)
+
+
+def start_reference(folder: Path) -> Compilation:
+    """Start compiling the handwritten reference; it does not depend on the unit."""
+    source = shipped("firmware_ref")
+    return compile_library(
+        [source / "triax_ref.c", source / "triax_ref_image.c"], folder / "triax_ref.so"
+    )
+
+
+@contextmanager
+def reference_under_way() -> Iterator[Compilation]:
+    """Compile the reference in the background; it is stopped when the caller fails."""
+    with tempfile.TemporaryDirectory(prefix="triaxcal-") as folder:
+        compilation = start_reference(Path(folder))
+        try:
+            yield compilation
+        finally:
+            compilation.cancel()

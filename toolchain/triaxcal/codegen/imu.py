@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.crosscheck import RANDOM_VECTORS, CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
@@ -24,7 +25,6 @@ from triaxcal.codegen.routines import (
     UInt32Array,
     routines_of,
     start_generated_imu,
-    start_reference,
 )
 from triaxcal.codegen.templates import render
 from triaxcal.fixedpoint.gyro import make_gyro_plan

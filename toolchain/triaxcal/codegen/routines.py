@@ -26,14 +26,6 @@ Routine = Callable[[Int32Array, Int32Array], Answers]
 """Answers of temperature codes (n,) and raw codes (n, 3)."""
 
 
-def start_reference(folder: Path) -> Compilation:
-    """Start compiling the handwritten reference; it does not depend on the unit."""
-    source = shipped("firmware_ref")
-    return compile_library(
-        [source / "triax_ref.c", source / "triax_ref_image.c"], folder / "triax_ref.so"
-    )
-
-
 def start_generated(folder: Path, target: Path) -> Compilation:
     """Start compiling the generated files in `folder` with the batch entry."""
     source = shipped("firmware_ref")

@@ -6,15 +6,15 @@ Nothing is written here but in a temporary folder; `triaxcal.base.publish` puts 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.codegen.compiler import Compilation
+from triaxcal.codegen.compiler import Compilation, reference_under_way
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images
@@ -25,7 +25,6 @@ from triaxcal.codegen.routines import (
     Routine,
     routines_of,
     start_generated,
-    start_reference,
 )
 from triaxcal.codegen.tryout import MethodResult, run_on_dwells
 from triaxcal.deliver.firmware import IMAGE_FILE, Firmware, compensation_of, make_firmware
@@ -81,22 +80,22 @@ class Delivery(Fitted):
         return self.firmware.files
 
 
-def deliver(folder: Path, reference: Reference | None = None) -> Delivery:
+def deliver(folder: Path, reference: Reference | Compilation | None = None) -> Delivery:
     """Calibrate the unit in `folder`, generate its C and check it.
 
-    `reference` is the handwritten C, which does not depend on the unit, where it has been compiled
-    already.
+    `reference` is the handwritten C, which does not depend on the unit, where its compilation has
+    been started already.
 
     Raises
     ------
     RefusedError
         When the data or the result is refused, or a tool is missing.
     """
-    with tempfile.TemporaryDirectory(prefix="triaxcal-") as name, _compilations() as started:
-        work = Path(name)
+    with ExitStack() as stack:
+        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="triaxcal-")))
         unit = read_unit(folder)
         if reference is None:
-            started.append(start_reference(work))
+            reference = stack.enter_context(reference_under_way())
         fitted = fit_folder(unit, folder)
         refuse_beyond_limits(fitted)
         unit, calibration = fitted.unit, fitted.calibration
@@ -104,11 +103,13 @@ def deliver(folder: Path, reference: Reference | None = None) -> Delivery:
         plan = firmware.plan
         for file, content in firmware.files.items():
             (work / file).write_bytes(content)
-        started.append(start_generated(work, work))
+        compilation = start_generated(work, work)
+        stack.callback(compilation.cancel)
         bound = prove(plan)
         sets = vector_sets(plan)
-        reference = reference or Reference(started[0].load())
-        generated = Generated(started[-1].load())
+        if isinstance(reference, Compilation):
+            reference = Reference(reference.load())
+        generated = Generated(compilation.load())
         image = firmware.files[IMAGE_FILE]
         tried = routines_of(plan.rate, generated.library, reference.library)
         check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
@@ -125,17 +126,6 @@ def deliver(folder: Path, reference: Reference | None = None) -> Delivery:
     delivery = Delivery(*parts, firmware, bound, check, methods, compiler)
     _refuse_beyond_limits(delivery)
     return delivery
-
-
-@contextmanager
-def _compilations() -> Iterator[list[Compilation]]:
-    """Compilations that are stopped when anything else fails."""
-    started: list[Compilation] = []
-    try:
-        yield started
-    finally:
-        for compilation in started:
-            compilation.cancel()
 
 
 def _rate_codes(unit: UnitDescription, dwells: Sequence[Dwell]) -> Int32Array:

@@ -185,7 +185,8 @@ def _temperatures(unit: UnitDescription, calibration: Calibration) -> FloatArray
     t0 = [unit.t0_degc] if low <= unit.t0_degc <= high else []
     # A group near T0 is shown at T0 itself.
     inside = [t for t in inside if abs(t - unit.t0_degc) > 0.5]
-    return np.unique(np.concatenate([np.linspace(low, high, TEMPERATURES), inside, t0]))
+    temps = np.concatenate([np.linspace(low, high, TEMPERATURES), inside, t0])
+    return np.array(sorted(set(temps.tolist())))  # np.unique imports numpy.ma
 
 
 def _warnings(unit: UnitDescription, s: Scatter) -> Iterator[str]:
@@ -211,8 +212,9 @@ def _expanded(each: FloatArray, dofs: list[float]) -> FloatArray:
     # Scaled so that no fourth power underflows.
     loss = np.tensordot(1.0 / np.array(dofs), (each / scale) ** 4, axes=1)
     dof = (variance / scale**2) ** 2 / np.maximum(loss, 1e-300)
-    different, index = np.unique(np.floor(np.minimum(dof, 1e9)), return_inverse=True)
-    k = np.array([coverage_factor(d) for d in different.tolist()])[index.reshape(dof.shape)]
+    whole: list[float] = np.floor(np.minimum(dof, 1e9)).ravel().tolist()
+    factors = {d: coverage_factor(d) for d in set(whole)}
+    k = np.array([factors[d] for d in whole]).reshape(dof.shape)
     result: FloatArray = k * np.sqrt(variance)
     return result
 

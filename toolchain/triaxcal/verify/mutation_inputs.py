@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
 from triaxcal.codegen.forces import forces_of, rates_of
 from triaxcal.codegen.image_cases import case_vectors, image_cases
@@ -17,7 +18,6 @@ from triaxcal.codegen.routines import (
     RateReference,
     Reference,
     Routine,
-    start_reference,
 )
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.verify.workspace import Workspace

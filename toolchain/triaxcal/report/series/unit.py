@@ -14,7 +14,8 @@ from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Order, Outcome, refused
 from triaxcal.batch.toolchain import toolchain
-from triaxcal.codegen.routines import Reference, start_reference
+from triaxcal.codegen.compiler import start_reference
+from triaxcal.codegen.routines import Reference
 from triaxcal.deliver.unit import Delivery, deliver
 from triaxcal.model.thermal import ThermalModel
 from triaxcal.model.types import FloatArray
