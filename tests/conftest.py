@@ -13,7 +13,7 @@ from plans import COVERING, GOLDEN, random_plan
 from recordings import ABSENT, FOLDER
 from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.routines import Generated, Reference, start_generated
-from triaxcal.deliver.unit import Delivery, deliver
+from triaxcal.delivery.unit import Delivery, deliver
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

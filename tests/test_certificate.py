@@ -14,7 +14,7 @@ import pytest
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.constants import function_format
-from triaxcal.deliver.unit import Delivery
+from triaxcal.delivery.unit import Delivery
 from triaxcal.report.a2l import calib_a2l, calib_words
 from triaxcal.report.dcc import DCC, SI, certificate_xml
 from triaxcal.report.files import CERTIFICATE, all_files

@@ -17,11 +17,11 @@ from triaxcal.codegen.crosscheck import vector_sets
 from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.routines import Generated, start_generated
 from triaxcal.codegen.tryout import BEFORE
-from triaxcal.deliver import unit as delivery_module
-from triaxcal.deliver.firmware import compensation_of
-from triaxcal.deliver.unit import Delivery, deliver
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.delivery import unit as delivery_module
+from triaxcal.delivery.firmware import compensation_of
+from triaxcal.delivery.unit import Delivery, deliver
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g

@@ -17,8 +17,8 @@ import pytest
 
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.tryout import model_error_g
-from triaxcal.deliver.firmware import IMAGE_FILE
-from triaxcal.deliver.unit import Delivery
+from triaxcal.delivery.firmware import IMAGE_FILE
+from triaxcal.delivery.unit import Delivery
 from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g
 from triaxcal.report.files import all_files
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from builds import UNITS
-from triaxcal.deliver import fitted
-from triaxcal.deliver.unit import Delivery, deliver
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.delivery import fitted
+from triaxcal.delivery.unit import Delivery, deliver
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, Terms
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.report.a2l import calib_words

@@ -26,7 +26,7 @@ from triaxcal.design.search import (
     usual,
 )
 from triaxcal.design.words import comparison, rig_plan
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.rig.plan import read_plan

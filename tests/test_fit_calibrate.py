@@ -23,9 +23,9 @@ from fit_cases import (
     with_checks,
 )
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.core.thermal import relative_coefficients
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.thermal import relative_coefficients
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.description import ThermalChoice
 
@@ -278,8 +278,7 @@ def test_exchanged_positions_are_told_before_the_condition_number():
 
 
 def test_scipy_is_not_loaded():
-    code = (
-        "import sys, triaxcal.fit.tilter.calibrate; print([m for m in sys.modules if 'scipy' in m])"
-    )
+    code = "import sys, triaxcal.fitting.tilter.calibrate\n"
+        "print([m for m in sys.modules if 'scipy' in m])"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from fit_cases import SEVEN, TABLE_TEMPS, TABLES, cubic_truth, readings, tables_truth
-from triaxcal.fit.core.calibration import curve_covariance
-from triaxcal.fit.core.grouping import GroupedReadings, group_dwells, grouped_readings
-from triaxcal.fit.core.thermal import piecewise_linear_shape, polynomial_shape
-from triaxcal.fit.tilter.curves import (
+from triaxcal.fitting.core.calibration import curve_covariance
+from triaxcal.fitting.core.grouping import GroupedReadings, group_dwells, grouped_readings
+from triaxcal.fitting.core.thermal import piecewise_linear_shape, polynomial_shape
+from triaxcal.fitting.tilter.curves import (
     TilterData,
     fit_curves,
     parameter_covariance,
     shifted_voltage,
 )
-from triaxcal.fit.tilter.estimators import constants_of, estimator_operators
+from triaxcal.fitting.tilter.estimators import constants_of, estimator_operators
 from triaxcal.unit.description import ESTIMATORS
 
 EPS = np.finfo(float).eps

@@ -10,7 +10,7 @@ import pytest
 
 from fit_cases import SEVEN, TABLE_TEMPS, cubic_truth, readings, with_checks
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.grouping import (
+from triaxcal.fitting.core.grouping import (
     GROUP_GAP_DEGC,
     check_position_dwells,
     group_dwells,

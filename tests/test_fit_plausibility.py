@@ -22,8 +22,8 @@ from fit_cases import (
     with_checks,
 )
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.grouping import group_dwells
-from triaxcal.fit.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
+from triaxcal.fitting.core.grouping import group_dwells
+from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
 from triaxcal.readings.measurements import MeasurementSet
 
 POSITIONS = ("TP1", "TP2", "TP3", "TP4", "TP5", "TP6")

@@ -18,9 +18,9 @@ from fit_cases import (
     unit,
     with_checks,
 )
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.tilter.calibrate import calibrate
-from triaxcal.fit.tilter.selection import PREFERENCE, candidate_shapes
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.tilter.calibrate import calibrate
+from triaxcal.fitting.tilter.selection import PREFERENCE, candidate_shapes
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.readings.measurements import MeasurementSet

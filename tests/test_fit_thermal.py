@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from fit_cases import SEVEN, TABLE_TEMPS, TABLES, TABLES_PRINTED, cubic_truth
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.thermal import (
+from triaxcal.fitting.core.thermal import (
     ThermalShape,
     dense_knots,
     piecewise_linear_shape,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fit_cases import TABLES, random_constants
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.tilter.estimators import (
+from triaxcal.fitting.tilter.estimators import (
     constants_covariance,
     constants_of,
     design_matrix,

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.history import history as command
 from triaxcal.cli.main import main
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.truth import Imperfections, Truth, read_truth
 from triaxcal.simulation.unit import write_simulated_unit

@@ -17,32 +17,35 @@ MAY_IMPORT = {
     "unit": {"base", "model"},
     "readings": {"base", "model", "unit"},
     "poses": {"base", "model", "unit", "readings"},
-    "fit": {"base", "model", "unit", "readings", "poses"},
+    "fitting": {"base", "model", "unit", "readings", "poses"},
     "dynamic": {"base", "model", "unit", "readings", "poses"},
     "fixedpoint": {"base", "model", "unit"},
     "codegen": {"base", "model", "unit", "readings", "fixedpoint"},
-    "uncertainty": {"base", "model", "unit", "readings", "poses", "fit", "fixedpoint"},
+    "uncertainty": {"base", "model", "unit", "readings", "poses", "fitting", "fixedpoint"},
     "simulation": {"base", "model", "unit", "readings", "dynamic"},
     "design": {"base", "model", "unit", "dynamic", "simulation"},
     "rig": {"base", "model", "unit", "readings", "simulation"},
-    "deliver": {
-        "base", "model", "unit", "readings", "poses", "fit", "dynamic", "fixedpoint", "codegen",
+    "delivery": {
+        "base", "model", "unit", "readings", "poses", "fitting", "dynamic", "fixedpoint", "codegen",
     },
-    "targets": {"base", "model", "unit", "readings", "fit", "fixedpoint", "codegen", "deliver"},
+    "targets": {
+        "base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery",
+    },
     "verify": {
-        "base", "model", "unit", "readings", "fit", "fixedpoint", "codegen", "deliver", "targets",
+        "base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery",
+        "targets",
     },
-    "batch": {"base", "model", "unit", "readings", "fit", "fixedpoint", "codegen", "deliver"},
+    "batch": {"base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery"},
     "report": {
-        "base", "model", "unit", "readings", "poses", "fit", "dynamic", "fixedpoint", "codegen",
-        "uncertainty", "deliver", "batch",
+        "base", "model", "unit", "readings", "poses", "fitting", "dynamic", "fixedpoint", "codegen",
+        "uncertainty", "delivery", "batch",
     },
 }  # fmt: skip
 """What each room may import: what lies below it. None imports report, which reads all, nor cli,
 which calls all."""
 
 ONLY_IN = {
-    "scipy": {"fit", "dynamic", "readings"},  # readings: MAT-files
+    "scipy": {"fitting", "dynamic", "readings"},  # readings: MAT-files
     "can": {"rig"},
     "cantools": {"rig"},
     "asammdf": {"rig"},
@@ -195,15 +198,19 @@ def test_third_party_packages_are_declared() -> None:
 @pytest.mark.parametrize(
     ("module", "source", "found"),
     [
-        ("model.thermal", "from triaxcal.fit.tilter.curves import x", "model imports fit"),
+        ("model.thermal", "from triaxcal.fitting.tilter.curves import x", "model imports fitting"),
         ("fixedpoint.plan", "import triaxcal.codegen.render", "fixedpoint imports codegen"),
         ("codegen.render", "from triaxcal.report.files import all_files", "codegen imports report"),
-        ("fit.curves", "from triaxcal import deliver", "fit imports deliver"),
-        ("readings.text", "def f():\n    from triaxcal.fit import curves", "readings imports fit"),
-        ("fit.curves", "from triaxcal.cli.main import main", "fit imports cli"),
+        ("fitting.curves", "from triaxcal import delivery", "fitting imports delivery"),
+        (
+            "readings.text",
+            "def f():\n    from triaxcal.fitting import curves",
+            "readings imports fitting",
+        ),
+        ("fitting.curves", "from triaxcal.cli.main import main", "fitting imports cli"),
         ("fixedpoint.plan", "from scipy.linalg import solve", "scipy belongs to"),
-        ("fit.curves", "import jinja2", "jinja2 belongs to"),
-        ("fit.curves", "import can", "can belongs to"),
+        ("fitting.curves", "import jinja2", "jinja2 belongs to"),
+        ("fitting.curves", "import can", "can belongs to"),
         ("report.summary", "import click", "click belongs to"),
     ],
 )
@@ -216,5 +223,5 @@ def test_a_wrong_door_is_seen(module: str, source: str, found: str) -> None:
     "source", ["print(1)", "import sys\nsys.exit(1)", "x = sys.argv[1:]", "raise SystemExit(2)"]
 )
 def test_a_print_or_exit_is_seen(source: str) -> None:
-    assert len(wrong_uses("fit.curves", ast.parse(source))) == 1
+    assert len(wrong_uses("fitting.curves", ast.parse(source))) == 1
     assert wrong_uses("cli.main", ast.parse(source)) == []

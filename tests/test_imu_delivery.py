@@ -16,8 +16,8 @@ from click.testing import CliRunner
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
 from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
-from triaxcal.deliver import imu as imudelivery
-from triaxcal.deliver.imu import ImuC, ImuDelivery, deliver_imu
+from triaxcal.delivery import imu as imudelivery
+from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.imumodel import imu_model
 from triaxcal.model.imu import ImuModel, compensate_imu

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.deliver.unit import Delivery, deliver
+from triaxcal.delivery.unit import Delivery, deliver
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.files import all_files
 from triaxcal.report.passport.content import Passport, passport

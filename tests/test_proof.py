@@ -29,7 +29,7 @@ from plans import (
     with_quadratic,
 )
 from triaxcal.base.errors import RefusedError
-from triaxcal.deliver.unit import Delivery
+from triaxcal.delivery.unit import Delivery
 from triaxcal.fixedpoint import integer_model
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import check_ranges, prove

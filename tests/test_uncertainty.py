@@ -12,8 +12,8 @@ import pytest
 from scipy import stats
 
 import fit_cases
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.readings.measurements import Dwell, MeasurementSet, read_measurements
 from triaxcal.simulation.dwells import simulate

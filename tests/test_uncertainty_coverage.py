@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.rig import Rig

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.pair.cross_coupling import (
+from triaxcal.fitting.pair.cross_coupling import (
     condition_number,
     converged_at,
     design,

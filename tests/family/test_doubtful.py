@@ -15,7 +15,7 @@ from test_recordings import WITH_GYRO, calibrated, left_handed
 from test_tables import AIR, HEADER, rows_of, table
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.outliers import fisher_tail, worst_outlier
+from triaxcal.fitting.core.outliers import fisher_tail, worst_outlier
 from triaxcal.model.types import FloatArray
 from triaxcal.report.temperatures import with_room
 

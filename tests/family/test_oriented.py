@@ -6,8 +6,8 @@ import normal_equations
 import numpy as np
 import pytest
 
-from triaxcal.fit.table.harmonics import full_turn, plane_tilt
-from triaxcal.fit.table.oriented import (
+from triaxcal.fitting.table.harmonics import full_turn, plane_tilt
+from triaxcal.fitting.table.oriented import (
     TRACELESS,
     SerialGrid,
     inverse_linear,

@@ -11,8 +11,8 @@ from scipy.optimize import least_squares
 from test_recordings import calibrated, symmetric_part
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.deliver.unit import deliver
-from triaxcal.fit.recorded.temperatures import temperature_groups
+from triaxcal.delivery.unit import deliver
+from triaxcal.fitting.recorded.temperatures import temperature_groups
 from triaxcal.model.types import FloatArray
 
 WITH_T = COLUMNS + '\ntemperature = "T"'

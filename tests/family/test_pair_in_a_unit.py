@@ -12,8 +12,8 @@ from test_tables import AIR, HEADER, wide
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.batch.plan import _order
-from triaxcal.deliver.unit import deliver
-from triaxcal.fit.pair.cross_coupling import terms_of_pair
+from triaxcal.delivery.unit import deliver
+from triaxcal.fitting.pair.cross_coupling import terms_of_pair
 from triaxcal.model.orientation import AIRCRAFT, gravity_direction
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray

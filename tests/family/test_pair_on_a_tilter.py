@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from triaxcal.deliver.unit import Delivery, deliver
-from triaxcal.fit.pair.cross_coupling import fit_pair, pair_terms, stated_pair, terms_of_pair
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.delivery.unit import Delivery, deliver
+from triaxcal.fitting.pair.cross_coupling import fit_pair, pair_terms, stated_pair, terms_of_pair
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import MEASUREMENTS_FILE, read_measurements, write_measurements

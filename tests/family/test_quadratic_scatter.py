@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from family_cases import U0, K, directions, write_unit
 
-from triaxcal.fit.recorded.magnitude import VISIBLE
-from triaxcal.fit.route import calibrate_recording
+from triaxcal.fitting.recorded.magnitude import VISIBLE
+from triaxcal.fitting.route import calibrate_recording
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import products
 from triaxcal.uncertainty.evaluate import uncertainty

@@ -11,9 +11,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from recordings import recording
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.core.drift import Drift, study
-from triaxcal.fit.route import calibrate_recording
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.drift import Drift, study
+from triaxcal.fitting.route import calibrate_recording
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.samples import read_samples
 from triaxcal.unit.description import read_unit

@@ -11,10 +11,10 @@ from family_cases import COLUMNS, U0, K, csv_text, directions, log, write_unit
 from scipy.io import savemat
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.deliver.fitted import fit_folder, refuse_beyond_limits
-from triaxcal.deliver.unit import deliver
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.route import calibrate_recording
+from triaxcal.delivery.fitted import fit_folder, refuse_beyond_limits
+from triaxcal.delivery.unit import deliver
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.route import calibrate_recording
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import read_unit
 

@@ -11,9 +11,9 @@ from family_cases import U0, K, write_unit
 from test_recordings import calibrated
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.deliver.unit import deliver
-from triaxcal.fit.route import calibrate_recording
-from triaxcal.fit.table.calibrate import _angle_residuals
+from triaxcal.delivery.unit import deliver
+from triaxcal.fitting.route import calibrate_recording
+from triaxcal.fitting.table.calibrate import _angle_residuals
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.orientation import AIRCRAFT, INCLINOMETER, gravity_direction
 from triaxcal.model.terms import products

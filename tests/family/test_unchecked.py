@@ -13,7 +13,7 @@ from test_recordings import found
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
-from triaxcal.deliver.unit import deliver
+from triaxcal.delivery.unit import deliver
 from triaxcal.model.types import FloatArray
 from triaxcal.report.dcc import certificate_xml
 from triaxcal.report.passport.content import passport

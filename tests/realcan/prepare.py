@@ -9,7 +9,7 @@ import numpy as np
 
 from triaxcal.cli.rig_fil import build_node
 from triaxcal.codegen.crosscheck import python_routine
-from triaxcal.deliver.unit import deliver
+from triaxcal.delivery.unit import deliver
 from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import BATCH, vectors

@@ -13,7 +13,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.cli.rig_fil import build_node, firmware_in_the_loop, node_on
 from triaxcal.codegen.compiler import compile_library
 from triaxcal.codegen.crosscheck import python_routine
-from triaxcal.deliver.unit import deliver
+from triaxcal.delivery.unit import deliver
 from triaxcal.rig.dbc import REQUIRED
 from triaxcal.rig.e2e import frame_crc
 from triaxcal.rig.engine import Setup

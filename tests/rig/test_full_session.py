@@ -7,7 +7,7 @@ import pytest
 from rig_cases import BENCH, REPO, bench_unit, dbc, play
 from scipy.stats import chi2
 
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import read_measurements
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.plan import read_plan

@@ -20,7 +20,7 @@ import click
 def crosscoupling(file: Path, gravity: float, picture: Path | None) -> None:
     """Coefficients from FILE, a CSV with columns theta_deg, a_g, b_g, one row a position."""
     from triaxcal.cli.recorded import write_picture  # noqa: PLC0415
-    from triaxcal.fit.pair.cross_coupling import fit_pair, recursive_pair  # noqa: PLC0415
+    from triaxcal.fitting.pair.cross_coupling import fit_pair, recursive_pair  # noqa: PLC0415
     from triaxcal.readings.pair import read_pair  # noqa: PLC0415
     from triaxcal.report.studies import pair_picture, pair_text  # noqa: PLC0415
 

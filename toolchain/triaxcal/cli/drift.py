@@ -13,7 +13,7 @@ import click
 def drift(unit: Path, picture: Path | None) -> None:
     """Show what the outputs of UNIT do over a thermal cycle at rest in one orientation."""
     from triaxcal.cli.recorded import recorded, write_picture  # noqa: PLC0415
-    from triaxcal.fit.core.drift import study  # noqa: PLC0415
+    from triaxcal.fitting.core.drift import study  # noqa: PLC0415
     from triaxcal.report.studies import drift_picture, drift_text  # noqa: PLC0415
 
     layout, samples = recorded(unit)

@@ -14,7 +14,7 @@ from click.termui import progressbar
 from triaxcal.cli.options import unit_and_build
 
 if TYPE_CHECKING:
-    from triaxcal.deliver.imu import ImuDelivery
+    from triaxcal.delivery.imu import ImuDelivery
 
 
 @click.command()
@@ -57,7 +57,7 @@ def calibrate_imu(unit: Path, build: Path) -> None:
 
 def delivered_imu(unit: Path) -> ImuDelivery:
     """Calibrate the IMU and make its C, with a bar of progress."""
-    from triaxcal.deliver.imu import deliver_imu  # noqa: PLC0415
+    from triaxcal.delivery.imu import deliver_imu  # noqa: PLC0415
 
     with _bar() as progress:
         return deliver_imu(unit, progress)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.deliver.unit import Delivery
+from triaxcal.delivery.unit import Delivery
 from triaxcal.report.history import contradiction, history_text
 from triaxcal.uncertainty.history import (
     Calibrated,

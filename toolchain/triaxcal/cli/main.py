@@ -66,7 +66,7 @@ def calib(unit: Path, build: Path) -> None:
 
 def _calibrate_accelerometer(unit: Path, build: Path, reference: Compilation) -> None:
     from triaxcal.base.publish import publish  # noqa: PLC0415
-    from triaxcal.deliver.unit import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
+    from triaxcal.delivery.unit import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415

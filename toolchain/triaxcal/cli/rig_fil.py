@@ -13,7 +13,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS, find_compiler
 from triaxcal.codegen.crosscheck import python_routine
-from triaxcal.deliver.unit import deliver
+from triaxcal.delivery.unit import deliver
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import CODE_BITS, NODE_SOURCES, Agreement, exchange, packing_source, vectors
 from triaxcal.rig.socketcan import can_socket, open_refusal

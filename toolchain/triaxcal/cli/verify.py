@@ -30,7 +30,7 @@ def verify(unit: Path, build: Path) -> None:
 
 def _verify_accelerometer(unit: Path, build: Path) -> tuple[Path, int]:
     from triaxcal.base.publish import publish, renew  # noqa: PLC0415
-    from triaxcal.deliver.unit import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
+    from triaxcal.delivery.unit import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.report.files import SOMETIMES, all_files, passport_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.verify.campaign import (  # noqa: PLC0415

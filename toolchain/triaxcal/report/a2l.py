@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from triaxcal import __version__
 from triaxcal.codegen.constants import function_format
 from triaxcal.codegen.templates import environment
-from triaxcal.deliver.unit import Delivery
+from triaxcal.delivery.unit import Delivery
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2

@@ -11,7 +11,7 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.base.jsontext import json_bytes
-from triaxcal.deliver.imu import ImuDelivery
+from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Observability
 from triaxcal.dynamic.unit import DynamicUnit

@@ -10,7 +10,7 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.codegen.templates import environment
-from triaxcal.deliver.imu import ImuDelivery
+from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Weak
 from triaxcal.report.firmware import file_rows, tool_rows

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from triaxcal.deliver.unit import Delivery
+from triaxcal.delivery.unit import Delivery
 from triaxcal.report.a2l import calib_a2l
 from triaxcal.report.dcc import certificate_xml
 from triaxcal.report.passport.content import Passport, passport

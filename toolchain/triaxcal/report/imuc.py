@@ -10,7 +10,7 @@ from triaxcal.base.jsontext import json_bytes
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import CrossCheck
 from triaxcal.codegen.render import shape_id
-from triaxcal.deliver.imu import METHOD, ImuC, ImuDelivery
+from triaxcal.delivery.imu import METHOD, ImuC, ImuDelivery
 from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.device import REQUIRED
 from triaxcal.fixedpoint.plan import Plan

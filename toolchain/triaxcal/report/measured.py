@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from triaxcal.deliver.unit import Delivery
+from triaxcal.delivery.unit import Delivery
 from triaxcal.report.temperatures import degrees
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import BEFORE, MethodResult
-from triaxcal.deliver.unit import Delivery
+from triaxcal.delivery.unit import Delivery
 from triaxcal.report.temperatures import by_temperature, degrees, position_order, with_room
 from triaxcal.unit.description import Limits
 

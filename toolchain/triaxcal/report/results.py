@@ -11,9 +11,9 @@ from triaxcal.base.jsontext import json_bytes
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.render import shape_id
 from triaxcal.codegen.tryout import BEFORE
-from triaxcal.deliver.unit import Delivery
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.core.thermal import relative_coefficients
+from triaxcal.delivery.unit import Delivery
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.thermal import relative_coefficients
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.terms import PRODUCT_NAMES
 from triaxcal.model.types import FloatArray

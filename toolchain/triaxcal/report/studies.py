@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.fit.core.drift import Drift
-from triaxcal.fit.pair.cross_coupling import NAMES, UNITS, PairFit, Recursion, converged_at
+from triaxcal.fitting.core.drift import Drift
+from triaxcal.fitting.pair.cross_coupling import NAMES, UNITS, PairFit, Recursion, converged_at
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from triaxcal.deliver.unit import Delivery
-from triaxcal.fit.core.calibration import Calibration, Candidate
-from triaxcal.fit.core.recorded import RecordingFit
+from triaxcal.delivery.unit import Delivery
+from triaxcal.fitting.core.calibration import Calibration, Candidate
+from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.report.measured import measured_words

@@ -11,10 +11,10 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import render_routine
-from triaxcal.deliver.firmware import compensation_of
-from triaxcal.deliver.inputs import inputs_sha256
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.delivery.firmware import compensation_of
+from triaxcal.delivery.inputs import inputs_sha256
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.model.imu import EXAMPLE_SENSITIVITY, ImuCompensation

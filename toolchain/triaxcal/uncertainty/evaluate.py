@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import MeasurementSet

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.fit.core.thermal import EDGE_DEGC, without_temperature
-from triaxcal.fit.tilter.curves import fit_curves, parameter_operator
+from triaxcal.fitting.core.thermal import EDGE_DEGC, without_temperature
+from triaxcal.fitting.tilter.curves import fit_curves, parameter_operator
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
 from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.propagation import Propagation

@@ -21,10 +21,10 @@ from statistics import NormalDist
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.core.recorded import PairTerms
-from triaxcal.fit.pair.cross_coupling import stated_pair
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.recorded import PairTerms
+from triaxcal.fitting.pair.cross_coupling import stated_pair
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import MEASUREMENTS_FILE, MeasurementSet, read_measurements

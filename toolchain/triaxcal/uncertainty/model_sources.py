@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from triaxcal.fit.core.thermal import (
+from triaxcal.fitting.core.thermal import (
     POLYNOMIAL,
     ThermalShape,
     dense_knots,
     piecewise_linear_shape,
     polynomial_shape,
 )
-from triaxcal.fit.tilter.curves import fit_curves
+from triaxcal.fitting.tilter.curves import fit_curves
 from triaxcal.uncertainty.heldout import thermal_error
 from triaxcal.uncertainty.propagation import Propagation, rows_of
 from triaxcal.uncertainty.scatter import Scatter

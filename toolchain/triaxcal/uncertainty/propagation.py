@@ -17,10 +17,10 @@ from functools import cached_property
 
 import numpy as np
 
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.core.grouping import group_dwells, grouped_readings
-from triaxcal.fit.tilter.curves import TilterData, parameter_operator, shifted_voltage
-from triaxcal.fit.tilter.estimators import estimator_operators
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.grouping import group_dwells, grouped_readings
+from triaxcal.fitting.tilter.curves import TilterData, parameter_operator, shifted_voltage
+from triaxcal.fitting.tilter.estimators import estimator_operators
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.model.types import FloatArray

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from triaxcal.fit.core.recorded import RecordingFit
+from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.uncertainty.propagation import ROWS, Curves, mapped
 from triaxcal.uncertainty.rig_sources import gravity_by, thermometer, thermometer_drift
 from triaxcal.uncertainty.source import STUDENT, Source, direct

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from triaxcal.fit.core.recorded import RecordingFit
+from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.propagation import ROWS, Curves
 from triaxcal.uncertainty.source import STUDENT, Source, direct

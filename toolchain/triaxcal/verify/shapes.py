@@ -13,9 +13,9 @@ from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.templates import names_of
-from triaxcal.deliver.firmware import IMAGE_FILE, compensation_of
-from triaxcal.deliver.inputs import inputs_sha256
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.delivery.firmware import IMAGE_FILE, compensation_of
+from triaxcal.delivery.inputs import inputs_sha256
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal.codegen.tryout import MethodResult, Residual
-from triaxcal.deliver.unit import Delivery
+from triaxcal.delivery.unit import Delivery
 from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.device_sources import Device

@@ -7,7 +7,7 @@ from typing import Any
 from triaxcal import __version__
 from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import BEFORE
-from triaxcal.fit.core.calibration import Calibration
+from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.firmware import checked_words, file_rows, proven_words, tool_rows
 from triaxcal.report.measured import measured_words

@@ -16,7 +16,7 @@ from triaxcal.batch.order import Order, Outcome, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.routines import Reference
-from triaxcal.deliver.unit import Delivery, deliver
+from triaxcal.delivery.unit import Delivery, deliver
 from triaxcal.model.thermal import ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.report.files import all_files

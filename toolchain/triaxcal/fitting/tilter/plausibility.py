@@ -27,8 +27,8 @@ from itertools import combinations
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.grouping import TemperatureGroup
-from triaxcal.fit.tilter.estimators import DEAD_OUTPUT
+from triaxcal.fitting.core.grouping import TemperatureGroup
+from triaxcal.fitting.tilter.estimators import DEAD_OUTPUT
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet

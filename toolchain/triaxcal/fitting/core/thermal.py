@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.grouping import GROUP_GAP_DEGC
+from triaxcal.fitting.core.grouping import GROUP_GAP_DEGC
 from triaxcal.model.metrological import BIASES
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray

@@ -16,7 +16,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.compiler import find_compiler
 from triaxcal.codegen.constants import Provenance
 from triaxcal.codegen.imu import ImuBuild, build_imu
-from triaxcal.deliver.inputs import files_sha256
+from triaxcal.delivery.inputs import files_sha256
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.device import Device
 from triaxcal.dynamic.imumodel import imu_model, left_out

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.fit.core.grouping import TemperatureGroup
-from triaxcal.fit.core.outliers import worst_outlier
-from triaxcal.fit.tilter.estimators import design_matrix
+from triaxcal.fitting.core.grouping import TemperatureGroup
+from triaxcal.fitting.core.outliers import worst_outlier
+from triaxcal.fitting.tilter.estimators import design_matrix
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.unit.description import UnitDescription
 

@@ -25,9 +25,9 @@ from functools import cached_property
 
 import numpy as np
 
-from triaxcal.fit.core.grouping import GroupedReadings
-from triaxcal.fit.core.thermal import ThermalShape
-from triaxcal.fit.tilter.estimators import design_matrix, pack_rows
+from triaxcal.fitting.core.grouping import GroupedReadings
+from triaxcal.fitting.core.thermal import ThermalShape
+from triaxcal.fitting.tilter.estimators import design_matrix, pack_rows
 from triaxcal.model.types import FloatArray
 
 

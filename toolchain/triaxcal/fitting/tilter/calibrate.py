@@ -8,29 +8,29 @@ from dataclasses import replace
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.calibration import Calibration, CalibrationPoint, CheckResult, Selection
-from triaxcal.fit.core.grouping import (
+from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint, CheckResult, Selection
+from triaxcal.fitting.core.grouping import (
     GroupedReadings,
     TemperatureGroup,
     check_position_dwells,
     group_dwells,
     grouped_readings,
 )
-from triaxcal.fit.core.recorded import PairTerms
-from triaxcal.fit.core.thermal import (
+from triaxcal.fitting.core.recorded import PairTerms
+from triaxcal.fitting.core.thermal import (
     EDGE_DEGC,
     PIECEWISE_LINEAR,
     ThermalShape,
     refuse_undetermined,
 )
-from triaxcal.fit.tilter.contradiction import contradiction
-from triaxcal.fit.tilter.curves import (
+from triaxcal.fitting.tilter.contradiction import contradiction
+from triaxcal.fitting.tilter.curves import (
     TilterData,
     fit_curves,
     parameter_covariance,
     shifted_voltage,
 )
-from triaxcal.fit.tilter.estimators import (
+from triaxcal.fitting.tilter.estimators import (
     constants_covariance,
     constants_of,
     design_matrix,
@@ -38,8 +38,8 @@ from triaxcal.fit.tilter.estimators import (
     pooled_variance,
     refuse_ill_conditioned,
 )
-from triaxcal.fit.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
-from triaxcal.fit.tilter.selection import (
+from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
+from triaxcal.fitting.tilter.selection import (
     PREFERENCE,
     candidate_shapes,
     check_errors,

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.grouping import GROUP_GAP_DEGC
-from triaxcal.fit.core.thermal import EDGE_DEGC, POLYNOMIAL
+from triaxcal.fitting.core.grouping import GROUP_GAP_DEGC
+from triaxcal.fitting.core.thermal import EDGE_DEGC, POLYNOMIAL
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
 from triaxcal.unit.description import UnitDescription

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.recorded import PairTerms
-from triaxcal.fit.pair.checks import doubtful_position, refuse_other_readings
+from triaxcal.fitting.core.recorded import PairTerms
+from triaxcal.fitting.pair.checks import doubtful_position, refuse_other_readings
 from triaxcal.model.terms import PRODUCT_NAMES, Terms
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.pair import read_pair

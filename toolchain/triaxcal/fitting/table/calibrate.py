@@ -8,22 +8,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.calibration import Calibration, CalibrationPoint
-from triaxcal.fit.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
-from triaxcal.fit.core.thermal import polynomial_shape
-from triaxcal.fit.recorded.calibrate import (
+from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint
+from triaxcal.fitting.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
+from triaxcal.fitting.core.thermal import polynomial_shape
+from triaxcal.fitting.recorded.calibrate import (
     BEYOND_1_G,
     covariance_blocks,
     pose_dwells,
 )
-from triaxcal.fit.recorded.checks import CONDITION_MAX, refuse_wrong_unit
-from triaxcal.fit.recorded.temperatures import (
+from triaxcal.fitting.recorded.checks import CONDITION_MAX, refuse_wrong_unit
+from triaxcal.fitting.recorded.temperatures import (
     recording_range,
     temperature_findings,
     thermal_orders,
 )
-from triaxcal.fit.recorded.trials import beats
-from triaxcal.fit.table.candidates import (
+from triaxcal.fitting.recorded.trials import beats
+from triaxcal.fitting.table.candidates import (
     LEFT_OUT_MAX,
     TablePoses,
     TableRow,
@@ -34,7 +34,7 @@ from triaxcal.fit.table.candidates import (
     thermal_trials,
     turns,
 )
-from triaxcal.fit.table.checks import (
+from triaxcal.fitting.table.checks import (
     known_force,
     outlier_findings,
     pose_temperatures,
@@ -42,8 +42,8 @@ from triaxcal.fit.table.checks import (
     refuse_few_poses,
     refuse_open,
 )
-from triaxcal.fit.table.harmonics import table_findings
-from triaxcal.fit.table.oriented import TRACELESS, table_error_g
+from triaxcal.fitting.table.harmonics import table_findings
+from triaxcal.fitting.table.oriented import TRACELESS, table_error_g
 from triaxcal.model.orientation import angle_slopes, angles_from_force, gravity_direction
 from triaxcal.model.terms import NO_TERMS, Terms, products
 from triaxcal.model.types import FloatArray

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.fit.core.drift import half_cycles
+from triaxcal.fitting.core.drift import half_cycles
 from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.poses.poses import PoseSet
 from triaxcal.readings.samples import Samples

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.core.grouping import TemperatureGroup, group_dwells
-from triaxcal.fit.tilter.estimators import CONDITION_MAX
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.grouping import TemperatureGroup, group_dwells
+from triaxcal.fitting.tilter.estimators import CONDITION_MAX
 from triaxcal.model.metrological import (
     force_from_voltage,
     unpack_constants,

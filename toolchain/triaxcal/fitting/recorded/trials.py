@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.fit.core.calibration import Candidate
-from triaxcal.fit.core.thermal import ThermalShape
-from triaxcal.fit.recorded.checks import CONDITION_MAX
-from triaxcal.fit.recorded.magnitude import ScalarData, ScalarFit, ScalarModel, fit_scalar
+from triaxcal.fitting.core.calibration import Candidate
+from triaxcal.fitting.core.thermal import ThermalShape
+from triaxcal.fitting.recorded.checks import CONDITION_MAX
+from triaxcal.fitting.recorded.magnitude import ScalarData, ScalarFit, ScalarModel, fit_scalar
 from triaxcal.model.types import BoolArray, FloatArray
 
 Turn = tuple[BoolArray, BoolArray]

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from triaxcal.fit.core.calibration import Calibration, CalibrationPoint
-from triaxcal.fit.core.outliers import left_out_residuals, worst_outlier
-from triaxcal.fit.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
-from triaxcal.fit.core.thermal import polynomial_shape
-from triaxcal.fit.recorded.checks import (
+from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint
+from triaxcal.fitting.core.outliers import left_out_residuals, worst_outlier
+from triaxcal.fitting.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
+from triaxcal.fitting.core.thermal import polynomial_shape
+from triaxcal.fitting.recorded.checks import (
     crowd_finding,
     refuse_few,
     refuse_left_handed,
@@ -19,8 +19,8 @@ from triaxcal.fit.recorded.checks import (
     refuse_unseen,
     refuse_wrong_unit,
 )
-from triaxcal.fit.recorded.frame import CASE, case_rotation, turned_constants, turned_quadratic
-from triaxcal.fit.recorded.magnitude import (
+from triaxcal.fitting.recorded.frame import CASE, case_rotation, turned_constants, turned_quadratic
+from triaxcal.fitting.recorded.magnitude import (
     MODELS,
     NINE,
     ScalarData,
@@ -28,14 +28,14 @@ from triaxcal.fit.recorded.magnitude import (
     fit_scalar,
     scalar_data,
 )
-from triaxcal.fit.recorded.rate import half_cycle_turns, pose_rates
-from triaxcal.fit.recorded.temperatures import (
+from triaxcal.fitting.recorded.rate import half_cycle_turns, pose_rates
+from triaxcal.fitting.recorded.temperatures import (
     recording_range,
     temperature_findings,
     temperature_groups,
     thermal_orders,
 )
-from triaxcal.fit.recorded.trials import (
+from triaxcal.fitting.recorded.trials import (
     TURNS_MAX,
     Judged,
     PoseClimate,

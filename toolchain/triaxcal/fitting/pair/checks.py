@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.outliers import left_out_residuals, worst_outlier
+from triaxcal.fitting.core.outliers import left_out_residuals, worst_outlier
 from triaxcal.model.types import FloatArray
 
 SIZE_MAX = 1.5

@@ -9,8 +9,8 @@ from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.tryout import model_error_g
-from triaxcal.deliver.fitted import Fitted
-from triaxcal.fit.core.calibration import Calibration
+from triaxcal.delivery.fitted import Fitted
+from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.metrological import unpack_constants

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.outliers import worst_outlier
-from triaxcal.fit.recorded.checks import CONDITION_MAX, turned_columns
-from triaxcal.fit.recorded.temperatures import temperature_groups
-from triaxcal.fit.table.candidates import TableRow
-from triaxcal.fit.table.oriented import design_condition, inverse_linear
+from triaxcal.fitting.core.outliers import worst_outlier
+from triaxcal.fitting.recorded.checks import CONDITION_MAX, turned_columns
+from triaxcal.fitting.recorded.temperatures import temperature_groups
+from triaxcal.fitting.table.candidates import TableRow
+from triaxcal.fitting.table.oriented import design_condition, inverse_linear
 from triaxcal.model.orientation import angles_from_force, gravity_direction
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.fit.core.calibration import Candidate
-from triaxcal.fit.core.thermal import ThermalShape
-from triaxcal.fit.recorded.checks import CONDITION_MAX
-from triaxcal.fit.recorded.frame import rotation_to, turned_constants
-from triaxcal.fit.recorded.magnitude import NINE, fit_scalar, scalar_data
-from triaxcal.fit.table.oriented import (
+from triaxcal.fitting.core.calibration import Candidate
+from triaxcal.fitting.core.thermal import ThermalShape
+from triaxcal.fitting.recorded.checks import CONDITION_MAX
+from triaxcal.fitting.recorded.frame import rotation_to, turned_constants
+from triaxcal.fitting.recorded.magnitude import NINE, fit_scalar, scalar_data
+from triaxcal.fitting.table.oriented import (
     OrientedFit,
     SerialGrid,
     inverse_linear,

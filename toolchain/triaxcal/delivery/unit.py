@@ -27,10 +27,10 @@ from triaxcal.codegen.routines import (
     start_generated,
 )
 from triaxcal.codegen.tryout import MethodResult, run_on_dwells
-from triaxcal.deliver.firmware import IMAGE_FILE, Firmware, compensation_of, make_firmware
-from triaxcal.deliver.fitted import Fitted, fit_folder, refuse_beyond_limits
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.tilter.acceptance import dwells_in_range
+from triaxcal.delivery.firmware import IMAGE_FILE, Firmware, compensation_of, make_firmware
+from triaxcal.delivery.fitted import Fitted, fit_folder, refuse_beyond_limits
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.tilter.acceptance import dwells_in_range
 from triaxcal.fixedpoint.arithmetic import INT32_MAX
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove

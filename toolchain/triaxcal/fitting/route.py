@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.pair.cross_coupling import stated_pair
-from triaxcal.fit.recorded.calibrate import calibrate_poses
-from triaxcal.fit.recorded.faces import face_measurements
-from triaxcal.fit.recorded.temperatures import temperature_findings
-from triaxcal.fit.table.calibrate import calibrate_table
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.pair.cross_coupling import stated_pair
+from triaxcal.fitting.recorded.calibrate import calibrate_poses
+from triaxcal.fitting.recorded.faces import face_measurements
+from triaxcal.fitting.recorded.temperatures import temperature_findings
+from triaxcal.fitting.table.calibrate import calibrate_table
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.readings.samples import Samples, read_samples
 from triaxcal.unit.description import Adc, UnitDescription

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.fit.core.calibration import Candidate, Selection
-from triaxcal.fit.core.grouping import GroupedReadings
-from triaxcal.fit.core.thermal import (
+from triaxcal.fitting.core.calibration import Candidate, Selection
+from triaxcal.fitting.core.grouping import GroupedReadings
+from triaxcal.fitting.core.thermal import (
     EDGE_DEGC,
     PIECEWISE_LINEAR,
     POLYNOMIAL,
@@ -32,7 +32,7 @@ from triaxcal.fit.core.thermal import (
     polynomial_shape,
     without_temperature,
 )
-from triaxcal.fit.tilter.curves import TilterData, fit_curves
+from triaxcal.fitting.tilter.curves import TilterData, fit_curves
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.types import FloatArray

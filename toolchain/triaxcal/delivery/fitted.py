@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.deliver.inputs import inputs_sha256
-from triaxcal.fit.core.calibration import Calibration
-from triaxcal.fit.pair.cross_coupling import stated_pair
-from triaxcal.fit.tilter.acceptance import refuse_unacceptable
-from triaxcal.fit.tilter.calibrate import calibrate
+from triaxcal.delivery.inputs import inputs_sha256
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.pair.cross_coupling import stated_pair
+from triaxcal.fitting.tilter.acceptance import refuse_unacceptable
+from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import (
     MEASUREMENTS_FILE,
     MeasurementSet,
@@ -51,7 +51,7 @@ def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
     inputs = inputs_sha256(folder, unit)
     if unit.recording is not None:
         # SciPy's optimizers take as long to import as a whole tilter's calibration does.
-        from triaxcal.fit.route import calibrate_recording  # noqa: PLC0415
+        from triaxcal.fitting.route import calibrate_recording  # noqa: PLC0415
 
         unit, measurements, calibration = calibrate_recording(unit, unit.recording, folder)
     else:
@@ -73,6 +73,6 @@ def refuse_beyond_limits(fitted: Fitted) -> None:
     if fitted.calibration.recording is None:
         refuse_unacceptable(fitted.unit, fitted.calibration, fitted.measurements)
         return
-    from triaxcal.fit.route import refuse_poses_beyond_limits  # noqa: PLC0415
+    from triaxcal.fitting.route import refuse_poses_beyond_limits  # noqa: PLC0415
 
     refuse_poses_beyond_limits(fitted.unit, fitted.calibration)

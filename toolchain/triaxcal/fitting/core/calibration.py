@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.fit.core.recorded import PairTerms, RecordingFit
-from triaxcal.fit.core.thermal import ThermalShape
+from triaxcal.fitting.core.recorded import PairTerms, RecordingFit
+from triaxcal.fitting.core.thermal import ThermalShape
 from triaxcal.model.metrological import pack_blocks
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.thermal import ThermalModel
