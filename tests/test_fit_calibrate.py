@@ -278,7 +278,7 @@ def test_exchanged_positions_are_told_before_the_condition_number():
 
 
 def test_scipy_is_not_loaded():
-    code = "import sys, triaxcal.fitting.tilter.calibrate\n"
-        "print([m for m in sys.modules if 'scipy' in m])"
+    modules = "[m for m in sys.modules if 'scipy' in m]"
+    code = f"import sys, triaxcal.fitting.tilter.calibrate; print({modules})"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
