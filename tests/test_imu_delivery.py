@@ -237,7 +237,7 @@ def test_digits(value: float, sd: float, text: str) -> None:
         (
             "accel_bits = 21\n",
             "",
-            "[device] accel_bits: missing; expected it, where [device] is given",
+            "missing: [device] accel_bits (or leave [device] out)",
         ),
         (
             "accel_bits = 21",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.description import _LAYOUT, read_dynamic
+from triaxcal.dynamic.description import imu_file, read_dynamic
 from triaxcal.dynamic.reading import read_recording
 from triaxcal.dynamic.registry import extensions
 from triaxcal.simulation.imu import simulate_imu
@@ -116,7 +116,7 @@ def test_the_docs_name_every_key_of_an_imu_with_its_table() -> None:
         if len(cells) > 2 and cells[2].startswith("`"):
             table = cells[1].strip("`[]") or table
             documented.add((table, cells[2].strip("`")))
-    assert documented == {(name, key) for name, keys in _LAYOUT.items() for key in keys}
+    assert documented == {(t.name, k.name) for t in imu_file().tables for k in t.keys}
 
 
 def test_the_docs_name_every_extension() -> None:

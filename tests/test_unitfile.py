@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from strategies import unit_names
 from triaxcal.base.errors import RefusedError
 from triaxcal.unit.description import (
-    _LAYOUT,
     METHODS,
     Adc,
     Limits,
@@ -23,6 +22,8 @@ from triaxcal.unit.description import (
     find_unit,
     list_units,
     read_unit,
+    recording_file,
+    tilter_file,
 )
 
 REPO = Path(__file__).parent.parent
@@ -214,11 +215,20 @@ REFUSED_VALUES = [
             '"additive-simplified", "additive-first-order"'
         ),
     ),
-    ("serial = 17", "found 17; expected text in quotes"),
+    (
+        "serial = 17",
+        (
+            "found 17; expected text in quotes, 1 to 64 of A-Z a-z 0-9 - _, "
+            "the first a letter or digit"
+        ),
+    ),
     ("description = 1", "found 1; expected text in quotes"),
     (
         'serial = "SN 1"',
-        "found 'SN 1'; expected 1 to 64 of A-Z a-z 0-9 - _, the first a letter or digit",
+        (
+            "found 'SN 1'; expected text in quotes, 1 to 64 of A-Z a-z 0-9 - _, "
+            "the first a letter or digit"
+        ),
     ),
     (
         "[thermal] order = 2",
@@ -481,7 +491,8 @@ def test_the_docs_name_every_key_with_its_table() -> None:
         if len(cells) > 2 and cells[2].startswith("`"):
             table = cells[1].strip("`[]") or table
             documented.add((table, cells[2].strip("`")))
-    assert documented == {(name, key) for name, keys in _LAYOUT.items() for key in keys}
+    tables = (*tilter_file().tables, *recording_file().tables)
+    assert documented == {(table.name, key.name) for table in tables for key in table.keys}
     assert all(f'`"{method}"`' in section for method in METHODS)
 
 

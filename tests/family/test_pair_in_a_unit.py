@@ -93,8 +93,14 @@ def test_poses_with_angles_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        ('[quadratic]\naxes = ["x", "y"]\n', "cross_coupling: missing; expected cross_coupling ="),
-        ('[quadratic]\ncross_coupling = "pair.csv"\n', "[quadratic] axes: missing"),
+        (
+            '[quadratic]\naxes = ["x", "y"]\n',
+            "missing: [quadratic] cross_coupling (or leave [quadratic] out)",
+        ),
+        (
+            '[quadratic]\ncross_coupling = "pair.csv"\n',
+            "missing: [quadratic] axes (or leave [quadratic] out)",
+        ),
         (MORE.replace('"z"', '"x"'), 'expected the axes that A and B are, as ["x", "y"]'),
         (MORE.replace("pair.csv", "../pair.csv"), "expected a file in the unit's folder"),
         (MORE, "pair.csv: cannot be read: no such file or directory"),

@@ -1,202 +1,34 @@
 """Keys of TOML files, each declared once: what reads it also documents it and makes its schema.
 
 A `Key` has a name, a kind (type and range), a documentation, a unit and a default. A `TableKeys`
-is the keys of one table, a `FileKeys` the tables of one file. `FileKeys.read` checks a file whole
-and gives a `Values` a table; `values[KEY]` is the checked value, or the default. The reference, the
-JSON Schema and the commented files of `triaxcal init` are made from the same declarations.
+is the keys of one table, a `FileKeys` the tables of one file. `FileKeys.read` checks the keys of a
+whole file and gives a `Values` a table; `values[KEY]` is the checked value, or the default. Where a
+table is nothing but its values, a frozen dataclass declares it: its fields are made by `key`, and
+`values.record(cls)` makes one. The reference, the JSON Schemas and the commented files of
+`triaxcal init` come from the same declarations.
 """
 
 from __future__ import annotations
 
-import datetime
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
-from triaxcal.base.tomltable import Table, read_tables
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.kinds import Kind, WrongItemError, whole
+from triaxcal.base.tomltable import did_you_mean, key_name, read_toml, shown
 
 T = TypeVar("T")
-
-
-class Kind(Generic[T]):
-    """Type and range of a value: reads it, words it for the reference, and makes its schema."""
-
-    def read(self, table: Table, key: str) -> T:
-        """Value of a key that is there.
-
-        Raises
-        ------
-        RefusedError
-            For a wrong type, or a value out of range; names both.
-        """
-        raise NotImplementedError
-
-    @property
-    def words(self) -> str:
-        """Type and range for the reference, as "whole, 0 to 9"."""
-        raise NotImplementedError
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        """JSON Schema of the value."""
-        raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class Text(Kind[str]):
-    """Text in quotes; `line` asks for one printable line of at most `longest` characters."""
-
-    line: bool = False
-    longest: int = 1000
-
-    def read(self, table: Table, key: str) -> str:
-        """Text, its white space folded where it is a line."""
-        text = table.text(key)
-        if not self.line:
-            return text
-        if not text.strip() or not text.isprintable() or len(text) > self.longest:
-            raise table.refuse(key, f"one line of 1 to {self.longest} printable characters")
-        return " ".join(text.split())
-
-    @property
-    def words(self) -> str:
-        return "one line of text" if self.line else "text"
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "string"} | ({"minLength": 1} if self.line else {})
-
-
-@dataclass(frozen=True)
-class Word(Kind[str]):
-    """One of a few words."""
-
-    choices: tuple[str, ...]
-
-    def read(self, table: Table, key: str) -> str:
-        return table.choice(key, self.choices)
-
-    @property
-    def words(self) -> str:
-        return ", ".join(f'`"{choice}"`' for choice in self.choices)
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"enum": list(self.choices)}
-
-
-@dataclass(frozen=True)
-class Whole(Kind[int]):
-    """A whole number from `low` to `high`."""
-
-    low: int
-    high: int
-
-    def read(self, table: Table, key: str) -> int:
-        return table.integer(key, self.low, self.high)
-
-    @property
-    def words(self) -> str:
-        return f"whole, {self.low} to {self.high}"
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "integer", "minimum": self.low, "maximum": self.high}
-
-
-@dataclass(frozen=True)
-class Number(Kind[float]):
-    """A finite number from `low` to `high`."""
-
-    low: float
-    high: float
-
-    def read(self, table: Table, key: str) -> float:
-        return table.number(key, self.low, self.high)
-
-    @property
-    def words(self) -> str:
-        return f"{self.low:g} to {self.high:g}"
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "number", "minimum": self.low, "maximum": self.high}
-
-
-@dataclass(frozen=True)
-class Rising(Kind[tuple[float, ...]]):
-    """A list of rising numbers from `low` to `high`, `shortest` to `longest` of them."""
-
-    low: float
-    high: float
-    shortest: int
-    longest: int
-
-    def read(self, table: Table, key: str) -> tuple[float, ...]:
-        return table.rising(key, self.low, self.high, range(self.shortest, self.longest + 1))
-
-    @property
-    def words(self) -> str:
-        size = f"{self.shortest}"
-        if self.longest != self.shortest:
-            size += f" to {self.longest}"
-        return f"{size} rising numbers, {self.low:g} to {self.high:g}"
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {
-            "type": "array",
-            "items": {"type": "number", "minimum": self.low, "maximum": self.high},
-            "minItems": self.shortest,
-            "maxItems": self.longest,
-        }
-
-
-@dataclass(frozen=True)
-class Flag(Kind[bool]):
-    """True or false."""
-
-    def read(self, table: Table, key: str) -> bool:
-        value = table.values[key]
-        if not isinstance(value, bool):
-            raise table.refuse(key, "true or false")
-        return value
-
-    @property
-    def words(self) -> str:
-        return "true or false"
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "boolean"}
-
-
-@dataclass(frozen=True)
-class Date(Kind[datetime.date]):
-    """A day without quotes, as 2026-03-30."""
-
-    def read(self, table: Table, key: str) -> datetime.date:
-        value = table.values[key]
-        if isinstance(value, datetime.datetime) or not isinstance(value, datetime.date):
-            raise table.refuse(key, "a day without quotes, as 2026-03-30")
-        return value
-
-    @property
-    def words(self) -> str:
-        return "date, as 2026-03-30"
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "string", "format": "date"}
-
+T_co = TypeVar("T_co", covariant=True)
 
 REQUIRED: Any = object()
 """Default of a key that must be there."""
 
 
 @dataclass(frozen=True)
-class Key(Generic[T]):
+class Key(Generic[T_co]):
     """One key of a table.
 
     Attributes
@@ -217,35 +49,122 @@ class Key(Generic[T]):
     """
 
     name: str
-    kind: Kind[T]
+    kind: Kind[T_co]
     doc: str
-    default: T = REQUIRED
+    default: T_co = REQUIRED
     unit: str = ""
     default_words: str = ""
     example: str = ""
 
     @property
     def required(self) -> bool:
-        """Whether a file must have it."""
+        """Whether a table must have it."""
         return self.default is REQUIRED
+
+
+FORMAT = Key("format", whole(1, 1), "Version of this format.", example="1")
+"""Every file has it."""
+
+
+def key(
+    kind: Kind[T],
+    doc: str,
+    default: T = REQUIRED,
+    unit: str = "",
+    *,
+    default_words: str = "",
+    example: str = "",
+) -> T:
+    """A key as a field of a frozen dataclass; its name is the field's. Arguments as of `Key`."""
+    made: dict[str, Any] = {"key": Key("", kind, doc, default, unit, default_words, example)}
+    if default is REQUIRED:
+        return cast("T", field(metadata=made))
+    if default.__class__.__hash__ is None:
+        return field(default_factory=lambda: default, metadata=made)
+    return field(default=default, metadata=made)
+
+
+def keys_of(record: type[Any]) -> tuple[Key[Any], ...]:
+    """Keys that the fields of a dataclass declare, in their order."""
+    return tuple(
+        dataclasses.replace(f.metadata["key"], name=f.name)
+        for f in dataclasses.fields(record)
+        if "key" in f.metadata
+    )
 
 
 @dataclass(frozen=True)
 class Values:
-    """The values of one table, checked when they are asked for."""
+    """The values of one table; each is checked when it is asked for.
 
-    table: Table
+    Attributes
+    ----------
+    file, name : str
+        Of the file and the table, for messages.
+    given : mapping
+        What the file says.
+    keys : mapping
+        Declarations of this file by name; they take precedence over the keys asked for.
+    """
 
-    def __contains__(self, key: Key[Any]) -> bool:
-        return key.name in self.table
+    file: str
+    name: str
+    given: Mapping[str, object]
+    keys: Mapping[str, Key[Any]] = field(default_factory=dict)
+
+    def __contains__(self, key: Key[Any] | str) -> bool:
+        return _name(key) in self.given
 
     def __bool__(self) -> bool:
-        return bool(self.table.values)
+        return bool(self.given)
 
     def __getitem__(self, key: Key[T]) -> T:
-        if key.name in self.table:
-            return key.kind.read(self.table, key.name)
-        return key.default
+        """Value of a key, or its default.
+
+        Raises
+        ------
+        RefusedError
+            For a wrong type, or a value out of range; names both.
+        """
+        declared: Key[T] = self.keys.get(key.name, key)
+        kind = declared.kind
+        if key.name not in self.given:
+            if declared.required:
+                raise RefusedError(self.where(key), "missing", expected=kind.expected)
+            return declared.default
+        found = self.given[key.name]
+        try:
+            return kind.parse(found)
+        except WrongItemError as wrong:
+            found, kind = wrong.item, wrong.kind
+        except ValueError:
+            pass
+        hint = did_you_mean(found, kind.choices) if isinstance(found, str) else ""
+        raise RefusedError(
+            self.where(key),
+            f"found {shown(found)}{hint}",
+            expected=declared.kind.expected,
+            remedy=declared.kind.remedy,
+        )
+
+    def optional(self, key: Key[T]) -> T | None:
+        """Value of a key, None where it is absent."""
+        if key not in self:
+            return None
+        return self[key]
+
+    def record(self, cls: type[T], **others: object) -> T:
+        """Dataclass of keys with these values; `others` are its fields that are no keys."""
+        return cls(**{key.name: self[key] for key in keys_of(cls)}, **others)
+
+    def where(self, key: Key[Any] | str) -> str:
+        """Place of a key as messages name it."""
+        return f"{self.file}, {key_name(self.name, _name(key))}"
+
+    def refuse(self, key: Key[Any] | str, expected: str, remedy: str = "") -> RefusedError:
+        """Error that names the value of `key` and what should be there."""
+        found = f"found {shown(self.given[_name(key)])}"
+        return RefusedError(self.where(key), found, expected=expected, remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -254,14 +173,24 @@ class TableKeys:
 
     Attributes
     ----------
-    required_when : str
-        For the reference, where the table is wanted in some files only.
+    optional : bool
+        The table may be absent; its required keys are required only where it is given.
     """
 
     name: str
     doc: str
     keys: tuple[Key[Any], ...]
-    required_when: str = ""
+    optional: bool = False
+
+    def but(self, *others: Key[Any], **changes: Mapping[str, Any]) -> TableKeys:
+        """Same table with more keys, or with attributes of its keys changed, by name of the key."""
+        keys = tuple(dataclasses.replace(k, **changes.get(k.name, {})) for k in self.keys)
+        return dataclasses.replace(self, keys=(*keys, *others))
+
+    def relaxed(self) -> TableKeys:
+        """Same table without required keys."""
+        keys = (dataclasses.replace(k, default=None) if k.required else k for k in self.keys)
+        return dataclasses.replace(self, keys=tuple(keys))
 
 
 @dataclass(frozen=True)
@@ -274,13 +203,12 @@ class FileKeys:
         Of the file, as "unit.toml".
     title : str
         What it describes, in a few words.
-    format : int
-        Version that its key `format` states.
+    tables : tuple of TableKeys
+        The first is the top of the file.
     """
 
     name: str
     title: str
-    format: int
     tables: tuple[TableKeys, ...]
 
     def read(self, path: Path) -> Mapping[str, Values]:
@@ -289,21 +217,72 @@ class FileKeys:
         Raises
         ------
         RefusedError
-            When the file is no TOML, states another format, or misses or has more keys than these.
+            When the file is no TOML or states another format; naming every missing and every
+            unexpected key at once; for a key that should be a table.
         """
-        layout = {t.name: {k.name: k.required for k in t.keys} for t in self.tables}
-        tables = read_tables(path, layout, self.format)
-        return {name: Values(table) for name, table in tables.items()}
+        document = read_toml(path)
+        found = document.get("format", 1)  # when absent, it is among the missing
+        if type(found) is not int or found != 1:
+            raise RefusedError(
+                f"{path}, format",
+                f"found {shown(found)}",
+                expected="1",
+                remedy="another format needs a triaxcal that knows it",
+            )
+        names = {table.name for table in self.tables}
+        given: dict[str, Mapping[str, object]] = {}
+        for table in self.tables:
+            values = document.get(table.name, {}) if table.name else _top(document, names)
+            if not isinstance(values, dict):
+                raise RefusedError(
+                    f"{path}, {table.name}",
+                    f"found {shown(values)}",
+                    expected=f"a table [{table.name}]",
+                )
+            given[table.name] = values
+        self._refuse_wrong_keys(path, given, document)
+        return {
+            table.name: Values(
+                str(path), table.name, given[table.name], {k.name: k for k in table.keys}
+            )
+            for table in self.tables
+        }
+
+    def _refuse_wrong_keys(
+        self, path: Path, given: Mapping[str, Mapping[str, object]], document: Mapping[str, object]
+    ) -> None:
+        missing, unexpected = [], []
+        for table in self.tables:
+            lacking = [k.name for k in table.keys if k.required and k.name not in given[table.name]]
+            if table.optional and table.name not in document:
+                lacking = []
+            without = f" (or leave [{table.name}] out)" if table.optional and lacking else ""
+            missing += [key_name(table.name, name) for name in lacking]
+            missing[-1:] = [last + without for last in missing[-1:]]
+            known = {k.name for k in table.keys}
+            unexpected += [
+                key_name(table.name, name) + self._near(table, name)
+                for name in given[table.name]
+                if name not in known
+            ]
+        parts = ["missing: " + ", ".join(missing)] if missing else []
+        parts += ["unknown: " + ", ".join(unexpected)] if unexpected else []
+        if parts:
+            raise RefusedError(str(path), "; ".join(parts))
+
+    def _near(self, table: TableKeys, name: str) -> str:
+        """Hint for an unknown key: the table where it belongs, or a near miss in its own."""
+        for other in self.tables:
+            if other.name != table.name and any(k.name == name for k in other.keys):
+                place = f"[{other.name}]" if other.name else "the top of the file"
+                return f" (it belongs to {place})"
+        tables = [] if table.name else [t.name for t in self.tables if t.name]
+        return did_you_mean(name, [k.name for k in table.keys] + tables)
 
 
-def optional(key: Key[T]) -> Key[T | None]:
-    """Same key with None as its default."""
-    return Key(
-        key.name,
-        cast("Kind[T | None]", key.kind),
-        key.doc,
-        None,
-        key.unit,
-        key.default_words,
-        key.example,
-    )
+def _name(key: Key[Any] | str) -> str:
+    return key if isinstance(key, str) else key.name
+
+
+def _top(document: Mapping[str, object], names: set[str]) -> dict[str, object]:
+    return {name: value for name, value in document.items() if name not in names}

@@ -108,7 +108,7 @@ class Table:
 
     def where(self, key: str) -> str:
         """Place of a key as messages name it."""
-        return f"{self.file}, {_key_name(self.name, key)}"
+        return f"{self.file}, {key_name(self.name, key)}"
 
     def refuse(self, key: str, expected: str, remedy: str = "") -> RefusedError:
         """Error that names the value of `key` and what should be there."""
@@ -203,13 +203,13 @@ def _checked_tables(file: str, document: Mapping[str, object], layout: Layout) -
                 )
             tables[name] = table
     missing = [
-        _key_name(name, key)
+        key_name(name, key)
         for name, keys in layout.items()
         for key, required in keys.items()
         if required and key not in tables[name]
     ]
     unexpected = [
-        _key_name(name, key) + _near_key(name, key, layout)
+        key_name(name, key) + _near_key(name, key, layout)
         for name, table in tables.items()
         for key in table
         if key not in layout[name]
@@ -230,7 +230,8 @@ def _near_key(table: str, key: str, layout: Layout) -> str:
     return did_you_mean(key, known)
 
 
-def _key_name(table: str, key: str) -> str:
+def key_name(table: str, key: str) -> str:
+    """A key as messages name it, as "[adc] bits"."""
     shown_key = key if key.isprintable() and len(key) <= 40 else ascii(key)[:40]
     return f"[{table}] {shown_key}" if table else shown_key
 

@@ -9,47 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.tomltable import Layout, Table, has_table, read_tables
+from triaxcal.base.keys import FileKeys, Key, TableKeys, Values, key, keys_of
+from triaxcal.base.kinds import TEXT, Kind, listed, meaning, number, word
+from triaxcal.base.tomltable import has_table
 from triaxcal.dynamic.block import StateBlock
-from triaxcal.dynamic.device import DEVICE_KEYS, Device, device_of
+from triaxcal.dynamic.device import DEVICE, Device, device_of
 from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT, Turntable
 from triaxcal.dynamic.registry import extensions
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import FORMAT, PLAUSIBLE_DEGC, check_unit_name, find_unit
+from triaxcal.unit.description import GRAVITY, PLAUSIBLE_DEGC, SERIAL, TOP, UNIT_FILE, find_unit
 
-_LAYOUT: Layout = {
-    "": {"format": True, "serial": True, "description": False},
-    "site": {"latitude_deg": True, "local_gravity_m_per_s2": True},
-    "dynamic": {
-        "recording": True,
-        "time_column": False,
-        "time_unit": False,
-        "rate_hz": False,
-        "rate_columns": True,
-        "rate_unit": True,
-        "rate_samples": True,
-        "rate_max": False,
-        "force_columns": True,
-        "force_unit": True,
-        "force_samples": True,
-        "force2_columns": False,
-        "temp_column": False,
-        "table_angle_column": False,
-        "reference_degc": False,
-        "blocks": False,
-    },
-    "noise": {
-        "gyro_arw_deg_per_sqrt_h": True,
-        "accel_vrw_ug_per_sqrt_hz": True,
-        "second_vrw_ug_per_sqrt_hz": False,
-        "accel_lsb": False,
-        "table_sd_arcsec": False,
-        "axis_wobble_arcsec": False,
-    },
-    "table": {"azimuth_deg": False, "elevation_deg": False, "mountings": False},
-    "device": dict.fromkeys(DEVICE_KEYS, False),
-}
 _RATE_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180, "deg/h": math.pi / 648000}
 _ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "arcsec": math.pi / 648000}
 _FORCE_UNITS = {"m/s^2": 1.0, "g": 1e6 * MICRO_G, "mg": 1e3 * MICRO_G}
@@ -123,6 +93,158 @@ class DynamicDescription:
         return tuple(b for name in self.blocks for b in extensions()[name].blocks)
 
 
+def _three(value: object) -> tuple[str, ...]:
+    names = value if isinstance(value, list) else []
+    if len(names) != 3 or not all(isinstance(v, str) and v for v in names) or len(set(names)) != 3:
+        raise ValueError
+    return tuple(names)
+
+
+_THREE = Kind(
+    "three different names of columns, of axes x, y, z",
+    _three,
+    {"type": "array", "items": {"type": "string"}, "minItems": 3, "maxItems": 3},
+)
+
+
+def _mounting(text: object) -> FloatArray:
+    """Matrix of "+x +z": instrument axes along the table's axis, and up at angle zero."""
+    words = text.split() if isinstance(text, str) else []
+    axes = [_AXES.get(word if word[0] in "+-" else f"+{word}") for word in words]
+    if len(axes) != 2 or axes[0] is None or axes[1] is None or axes[0] @ axes[1] != 0:
+        raise ValueError
+    along, up = axes[0], axes[1]
+    return np.column_stack([along, np.cross(up, along), up])
+
+
+_AXES = {
+    sign + axis: value * np.eye(3)[i]
+    for sign, value in (("+", 1.0), ("-", -1.0))
+    for i, axis in enumerate("xyz")
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DynamicTable:
+    """[dynamic], as it stands in the file."""
+
+    recording: str = key(
+        TEXT,
+        "The readings: a file .csv, .parquet, .h5 or .hdf5 (a column is a data set in HDF5).",
+        example='"recording.csv"',
+    )
+    time_column: str | None = key(TEXT, "Time of each sample; or `rate_hz`.", None)
+    time_unit: float = key(meaning(TIME_UNITS), "Unit of the times.", 1.0, default_words='`"s"`')
+    rate_hz: float | None = key(
+        number(1.0, 1e5), "Rate of even samples, in place of `time_column`.", None, "Hz"
+    )
+    rate_columns: tuple[str, ...] = key(_THREE, "Gyros x, y, z.", example='["gx", "gy", "gz"]')
+    rate_unit: str = key(
+        word((*_RATE_UNITS, *_ANGLE_UNITS)),
+        "Unit of the gyros: of instants the first three, of increments the others.",
+        example='"deg/s"',
+    )
+    rate_samples: str = key(
+        word(CONVENTIONS),
+        "What a reading is: of the instant of its stamp, or over the interval that ends there.",
+        example='"instant"',
+    )
+    rate_max: float | None = key(
+        number(1e-3, 1e5),
+        "Full scale of the gyros: a reading beyond 0.999 of it is refused.",
+        None,
+        "deg/s",
+    )
+    force_columns: tuple[str, ...] = key(
+        _THREE,
+        "Accelerometers x, y, z, on the axes of the gyros.",
+        example='["ax", "ay", "az"]',
+    )
+    force_unit: str = key(
+        word((*_FORCE_UNITS, *_VELOCITY_UNITS)),
+        "Unit of the accelerometers (g of 9.80665 m/s^2): of instants the first three, of "
+        "increments the others.",
+        example='"m/s^2"',
+    )
+    force_samples: str = key(word(CONVENTIONS), "As `rate_samples`.", example='"instant"')
+    force2_columns: tuple[str, ...] | None = key(
+        _THREE, "A second accelerometer triad, in the same unit.", None
+    )
+    temp_column: str | None = key(
+        TEXT, "Temperature; required by the blocks of temperature.", None, "degC"
+    )
+    table_angle_column: str | None = key(
+        TEXT, "Angle of the table; required by the blocks of the table's angle.", None, "deg"
+    )
+    reference_degc: float = key(
+        number(*PLAUSIBLE_DEGC),
+        "Temperature at which the constants are given, and from which it is counted.",
+        20.0,
+        "degC",
+    )
+    blocks: tuple[str, ...] = key(
+        listed(TEXT, range(100), "a list of names in quotes"),
+        "Extensions that are switched on.",
+        (),
+        default_words="none",
+    )
+
+
+LATITUDE = Key(
+    "latitude_deg",
+    number(-90.0, 90.0),
+    "Of the place, north positive.",
+    unit="deg",
+    example="50.45",
+)
+SITE = TableKeys("site", "Where the unit is turned.", (LATITUDE, GRAVITY))
+AZIMUTH = Key(
+    "azimuth_deg",
+    number(-360.0, 360.0),
+    "Of the table's axis, from north to the east.",
+    unit="deg",
+    example="0",
+)
+ELEVATION = Key("elevation_deg", number(-90.0, 90.0), "Of the axis above the horizon.", 0.0, "deg")
+MOUNTINGS = Key(
+    "mountings",
+    listed(
+        Kind("two axes", _mounting, {"type": "string"}),
+        range(1000),
+        'two instrument axes such as "x z" or "-y x" a mounting: along the table\'s axis, and up',
+    ),
+    "Per mounting: the instrument axes along the table's axis, and up at angle zero.",
+    example='["x z", "y x", "z y"]',
+)
+
+
+def imu_file() -> FileKeys:
+    """Keys of the unit.toml of an IMU."""
+    names = tuple(extensions())
+    blocks = listed(
+        word(names), range(100), f"names out of {', '.join(names)}, each once", different=True
+    )
+    return FileKeys(
+        UNIT_FILE,
+        "A whole IMU on a turntable",
+        (
+            TOP,
+            SITE,
+            TableKeys("dynamic", "The recording.", keys_of(DynamicTable)).but(
+                blocks={"kind": blocks}
+            ),
+            TableKeys("noise", "White noise, as data sheets state it.", keys_of(DataSheet)),
+            TableKeys(
+                "table",
+                "What the papers of the turntable say; for its angle readings.",
+                (AZIMUTH, ELEVATION, MOUNTINGS),
+                optional=True,
+            ),
+            DEVICE,
+        ),
+    )
+
+
 def read_dynamic(folder: Path) -> DynamicDescription:
     """Description of the unit in `folder`.
 
@@ -139,154 +261,81 @@ def read_dynamic(folder: Path) -> DynamicDescription:
             expected="a whole IMU on a turntable",
             remedy=f"`triaxcal calib {folder}` calibrates this unit; see docs/dynamic.md",
         )
-    tables = read_tables(path, _LAYOUT, FORMAT)
-    top, site, dynamic = tables[""], tables["site"], tables["dynamic"]
-    check_unit_name(top.text("serial"), top.where("serial"))
-    rate_convention = dynamic.choice("rate_samples", CONVENTIONS)
-    force_convention = dynamic.choice("force_samples", CONVENTIONS)
-    columns = _columns(dynamic, rate_convention, force_convention)
-    blocks = _blocks(dynamic, columns)
+    tables = imu_file().read(path)
+    dynamic, site = tables["dynamic"], tables["site"]
+    found = dynamic.record(DynamicTable)
+    if (found.rate_hz is None) == (found.time_column is None):
+        raise RefusedError(
+            f"{dynamic.where('time_column')} and rate_hz",
+            "neither given" if found.rate_hz is None else "both given",
+            expected="one of them: a column of times, or the rate of even sampling",
+        )
     return DynamicDescription(
         name=folder.absolute().name,
-        serial=top.text("serial"),
+        serial=tables[""][SERIAL],
         path=path,
-        recording=folder / dynamic.text("recording"),
-        latitude_deg=site.number("latitude_deg", -90.0, 90.0),
-        gravity_m_per_s2=site.number("local_gravity_m_per_s2", 9.7, 9.9),
-        columns=columns,
-        rate_hz=_rate_hz(dynamic),
-        rate_max=math.radians(dynamic.number("rate_max", 1e-3, 1e5))
-        if "rate_max" in dynamic
-        else None,
-        rate_convention=rate_convention,
-        force_convention=force_convention,
-        reference_degc=dynamic.number("reference_degc", *PLAUSIBLE_DEGC)
-        if "reference_degc" in dynamic
-        else 20.0,
-        blocks=blocks,
-        noise=_noise(tables["noise"]),
+        recording=folder / found.recording,
+        latitude_deg=site[LATITUDE],
+        gravity_m_per_s2=site[GRAVITY],
+        columns=_columns(dynamic, found),
+        rate_hz=found.rate_hz,
+        rate_max=None if found.rate_max is None else math.radians(found.rate_max),
+        rate_convention=found.rate_samples,
+        force_convention=found.force_samples,
+        reference_degc=found.reference_degc,
+        blocks=_blocks(dynamic, found),
+        noise=tables["noise"].record(DataSheet),
         table=_table(tables["table"]),
         device=device_of(tables["device"]),
     )
 
 
-def _columns(table: Table, rate_convention: str, force_convention: str) -> Columns:
-    rate_units = _ANGLE_UNITS if rate_convention == INCREMENT else _RATE_UNITS
-    force_units = _VELOCITY_UNITS if force_convention == INCREMENT else _FORCE_UNITS
-    time_unit = table.choice("time_unit", tuple(TIME_UNITS)) if "time_unit" in table else "s"
+def _columns(values: Values, found: DynamicTable) -> Columns:
+    rate_units = _ANGLE_UNITS if found.rate_samples == INCREMENT else _RATE_UNITS
+    force_units = _VELOCITY_UNITS if found.force_samples == INCREMENT else _FORCE_UNITS
+    for name, units in (("rate_unit", rate_units), ("force_unit", force_units)):
+        if values.given[name] not in units:
+            raise values.refuse(name, word(tuple(units)).expected)
     return Columns(
-        time=_text(table, "time_column"),
-        time_scale=TIME_UNITS[time_unit],
-        rate=_three(table, "rate_columns"),
-        rate_scale=rate_units[table.choice("rate_unit", tuple(rate_units))],
-        force=_three(table, "force_columns"),
-        force_scale=force_units[table.choice("force_unit", tuple(force_units))],
-        force2=_three(table, "force2_columns") if "force2_columns" in table else None,
-        temp=_text(table, "temp_column"),
-        table_angle=_text(table, "table_angle_column"),
+        time=found.time_column,
+        time_scale=found.time_unit,
+        rate=found.rate_columns,
+        rate_scale=rate_units[found.rate_unit],
+        force=found.force_columns,
+        force_scale=force_units[found.force_unit],
+        force2=found.force2_columns,
+        temp=found.temp_column,
+        table_angle=found.table_angle_column,
     )
 
 
-def _text(table: Table, key: str) -> str | None:
-    return table.text(key) if key in table else None
-
-
-def _names(table: Table, key: str) -> tuple[str, ...]:
-    value = table.values[key]
-    if not isinstance(value, list) or not all(isinstance(v, str) and v for v in value):
-        raise table.refuse(key, "a list of names in quotes")
-    return tuple(value)
-
-
-def _three(table: Table, key: str) -> tuple[str, ...]:
-    names = _names(table, key)
-    if len(set(names)) != 3 or len(names) != 3:
-        raise table.refuse(key, "three different names of columns, of axes x, y, z")
-    return names
-
-
-def _rate_hz(table: Table) -> float | None:
-    if ("rate_hz" in table) == ("time_column" in table):
-        found = "both given" if "rate_hz" in table else "neither given"
-        raise RefusedError(
-            f"{table.where('time_column')} and rate_hz",
-            found,
-            expected="one of them: a column of times, or the rate of even sampling",
-        )
-    return table.number("rate_hz", 1.0, 1e5) if "rate_hz" in table else None
-
-
 _COLUMN_OF = {
-    "temp_degc": ("temp_column", "temp"),
-    "force2": ("force2_columns", "force2"),
-    "table_angle_rad": ("table_angle_column", "table_angle"),
+    "temp_degc": "temp_column",
+    "force2": "force2_columns",
+    "table_angle_rad": "table_angle_column",
 }
 
 
-def _blocks(table: Table, columns: Columns) -> tuple[str, ...]:
-    names = _names(table, "blocks") if "blocks" in table else ()
-    known = extensions()
-    for name in names:
-        if name not in known or names.count(name) > 1:
-            raise RefusedError(
-                table.where("blocks"),
-                f"found {name!r}" + (" twice" if name in known else ""),
-                expected="names out of " + ", ".join(known) + ", each once",
-            )
-        for block in known[name].blocks:
-            key, attribute = _COLUMN_OF.get(block.needs, ("", ""))
-            if key and getattr(columns, attribute) is None:
+def _blocks(values: Values, found: DynamicTable) -> tuple[str, ...]:
+    for name in found.blocks:
+        for block in extensions()[name].blocks:
+            key = _COLUMN_OF.get(block.needs, "")
+            if key and key not in values:
                 raise RefusedError(
-                    table.where("blocks"),
+                    values.where("blocks"),
                     f'"{name}" is switched on and no {key} is given',
                     expected=f"{key} in [dynamic]",
                     remedy="name the column, or switch the block off",
                 )
-    return names
+    return found.blocks
 
 
-def _noise(table: Table) -> DataSheet:
-    limits = {
-        "gyro_arw_deg_per_sqrt_h": (1e-6, 100.0),
-        "accel_vrw_ug_per_sqrt_hz": (1e-3, 1e5),
-        "second_vrw_ug_per_sqrt_hz": (1e-3, 1e5),
-        "accel_lsb": (0.0, 1e6),
-        "table_sd_arcsec": (1e-3, 1e5),
-        "axis_wobble_arcsec": (1e-3, 1e5),
-    }
-    return DataSheet(**{k: table.number(k, *limits[k]) for k in limits if k in table})
-
-
-def _table(table: Table) -> Turntable | None:
+def _table(values: Values) -> Turntable | None:
     """[table], or None where there is none."""
-    if not table.values:
+    if not values:
         return None
-    for key in ("azimuth_deg", "mountings"):
-        if key not in table:
-            raise RefusedError(table.where(key), "missing", expected="it, where [table] is given")
-    elevation = table.number("elevation_deg", -90.0, 90.0) if "elevation_deg" in table else 0.0
     return Turntable(
-        math.radians(table.number("azimuth_deg", -360.0, 360.0)),
-        math.radians(elevation),
-        tuple((math.nan, _mounting(table, text)) for text in _names(table, "mountings")),
+        math.radians(values[AZIMUTH]),
+        math.radians(values[ELEVATION]),
+        tuple((math.nan, mounting) for mounting in values[MOUNTINGS]),
     )
-
-
-def _mounting(table: Table, text: str) -> FloatArray:
-    """Matrix of "+x +z": instrument axes along the table's axis, and up at angle zero."""
-    axes = [_AXES.get(word if word[0] in "+-" else f"+{word}") for word in text.split()]
-    if len(axes) != 2 or axes[0] is None or axes[1] is None or axes[0] @ axes[1] != 0:
-        raise RefusedError(
-            table.where("mountings"),
-            f"found {text!r}",
-            expected='two instrument axes such as "x z" or "-y x": along the table\'s axis, and up',
-        )
-    along, up = axes[0], axes[1]
-    return np.column_stack([along, np.cross(up, along), up])
-
-
-_AXES = {
-    sign + axis: value * np.eye(3)[i]
-    for sign, value in (("+", 1.0), ("-", -1.0))
-    for i, axis in enumerate("xyz")
-}

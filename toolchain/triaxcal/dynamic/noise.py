@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from triaxcal.base.keys import key
+from triaxcal.base.kinds import number
 from triaxcal.dynamic.recording import INCREMENT
 
 ARCSEC = math.pi / 180 / 3600
@@ -15,31 +17,43 @@ MICRO_G = 9.80665e-6
 
 @dataclass(frozen=True)
 class DataSheet:
-    """White noise of both triads: a mean over t seconds has the standard deviation N / sqrt(t).
+    """[noise]: white noise of both triads; a mean over t seconds scatters by N / sqrt(t).
 
-    Attributes
-    ----------
-    gyro_arw_deg_per_sqrt_h : float
-        Angle random walk N of the gyros.
-    accel_vrw_ug_per_sqrt_hz : float
-        Velocity random walk N of the accelerometers, micro-g sqrt(s), which data sheets write
-        micro-g/sqrt(Hz). (A one-sided spectral density is sqrt(2) times N.)
-    second_vrw_ug_per_sqrt_hz : float or None
-        Of the second accelerometer triad; as the first where None.
-    accel_lsb : float
-        One count of the accelerometers: micro-g for instants, mm/s for increments.
-    table_sd_arcsec : float or None
-        One reading of the plate's attitude, about each axis, at rest.
-    axis_wobble_arcsec : float or None
-        How far the table's axis leans while it turns.
+    Data sheets write the velocity random walk N, micro-g sqrt(s), in micro-g/sqrt(Hz). (A
+    one-sided spectral density is sqrt(2) times N.)
     """
 
-    gyro_arw_deg_per_sqrt_h: float
-    accel_vrw_ug_per_sqrt_hz: float
-    second_vrw_ug_per_sqrt_hz: float | None = None
-    accel_lsb: float = 0.0
-    table_sd_arcsec: float | None = None
-    axis_wobble_arcsec: float | None = None
+    gyro_arw_deg_per_sqrt_h: float = key(
+        number(1e-6, 100.0),
+        "Angle random walk N of the gyros: a mean over t scatters by N/sqrt(t).",
+        unit="deg/sqrt(h)",
+        example="0.3",
+    )
+    accel_vrw_ug_per_sqrt_hz: float = key(
+        number(1e-3, 1e5),
+        "Velocity random walk N of the accelerometers.",
+        unit="micro-g/sqrt(Hz)",
+        example="100",
+    )
+    second_vrw_ug_per_sqrt_hz: float | None = key(
+        number(1e-3, 1e5),
+        "Velocity random walk of the second accelerometer triad.",
+        None,
+        "micro-g/sqrt(Hz)",
+        default_words="as the first",
+    )
+    accel_lsb: float = key(
+        number(0.0, 1e6),
+        "One count of the accelerometers: micro-g for instants, mm/s for increments.",
+        0.0,
+        "micro-g or mm/s",
+    )
+    table_sd_arcsec: float | None = key(
+        number(1e-3, 1e5), "One reading of the table's angle, at rest.", None, "arcsec"
+    )
+    axis_wobble_arcsec: float | None = key(
+        number(1e-3, 1e5), "How far the table's axis leans while it turns.", None, "arcsec"
+    )
 
     @property
     def rate_density(self) -> float:

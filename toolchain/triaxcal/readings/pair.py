@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from triaxcal.base.tomltable import Table
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.text import read_text
-from triaxcal.unit.recording import recording_layout
+from triaxcal.unit.recording import POSES, RecordingLayout, SignedColumn
 
 COLUMNS = ("theta_deg", "a_g", "b_g")
 
@@ -22,14 +21,12 @@ def read_pair(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
     RefusedError
         When the file cannot be read, lacks a column, or holds something else than numbers.
     """
-    values = {
-        "file": path.name,
-        "rows": "poses",
-        "acceleration": list(COLUMNS),
-        "acceleration_unit": "g",
-    }
-    layout = recording_layout(Table(str(path), "", values))
-    assert layout is not None
+    layout = RecordingLayout(
+        file=path.name,
+        rows=POSES,
+        acceleration=tuple(SignedColumn(name, 1) for name in COLUMNS),
+        acceleration_unit="g",
+    )
     text = read_text(path, layout)
     theta, a, b = (text.numbers(text.index(name, name), missing=False) for name in COLUMNS)
     return np.radians(theta), a, b

@@ -3,87 +3,50 @@
 from __future__ import annotations
 
 import datetime
-import re
 from dataclasses import dataclass
 
-from triaxcal.base.errors import RefusedError
-from triaxcal.base.tomltable import Table
-
-CERTIFICATE_KEYS = (
-    "identifier",
-    "laboratory",
-    "city",
-    "country",
-    "customer",
-    "signer",
-    "manufacturer",
-    "begin",
-    "end",
-)
+from triaxcal.base.keys import TableKeys, Values, key, keys_of
+from triaxcal.base.kinds import DATE, line, pattern
 
 
 @dataclass(frozen=True)
 class CertificateDetails:
-    """Administrative data of a certificate.
+    """Administrative data of a certificate."""
 
-    Attributes
-    ----------
-    identifier : str
-        The certificate's own number.
-    laboratory, city, customer, signer, manufacturer : str
-    country : str
-        Two capitals of ISO 3166-1.
-    begin, end : date
-        First and last day of the measurements.
-    """
-
-    identifier: str
-    laboratory: str
-    city: str
-    country: str
-    customer: str
-    signer: str
-    manufacturer: str
-    begin: datetime.date
-    end: datetime.date
+    identifier: str = key(line(), "The certificate's own number.", example='"CAL-2026-001"')
+    laboratory: str = key(line(), "Who calibrated.", example='"Inertial laboratory"')
+    city: str = key(line(), "City of the laboratory.", example='"Kyiv"')
+    country: str = key(
+        pattern("[A-Z]{2}", 'two capitals of ISO 3166-1, as "UA"'),
+        "Country of the laboratory.",
+        example='"UA"',
+    )
+    customer: str = key(line(), "For whom.", example='"Customer"')
+    signer: str = key(line(), "Who is responsible for the certificate.", example='"A. Person"')
+    manufacturer: str = key(line(), "Who made the unit.", example='"Manufacturer"')
+    begin: datetime.date = key(DATE, "First day of the measurements.", example="2026-03-30")
+    end: datetime.date = key(DATE, "Last day of the measurements.", example="2026-03-31")
 
 
-def certificate_details(table: Table) -> CertificateDetails | None:
-    """Details in a table [certificate]; None when it is empty.
+CERTIFICATE = TableKeys(
+    "certificate",
+    "What only people know, for the Digital Calibration Certificate.",
+    keys_of(CertificateDetails),
+    optional=True,
+)
+
+
+def certificate_details(values: Values) -> CertificateDetails | None:
+    """Details in a table [certificate]; None when there is none.
 
     Raises
     ------
     RefusedError
-        When some keys are there and others not, or a value is no text, country or date.
+        When a value is no text, country or date, or the last day is before the first.
     """
-    if not table.values:
+    if not values:
         return None
-    missing = [key for key in CERTIFICATE_KEYS if key not in table]
-    if missing:
-        raise RefusedError(
-            table.where(missing[0]),
-            "missing",
-            expected=f"all of [certificate]: {', '.join(CERTIFICATE_KEYS)}",
-            remedy="complete the table, or remove it: the certificate is then left out",
-        )
-    if not re.fullmatch("[A-Z]{2}", table.text("country")):
-        raise table.refuse("country", 'two capitals of ISO 3166-1, as "UA"')
-    begin, end = _date(table, "begin"), _date(table, "end")
-    if end < begin:
-        raise table.refuse("end", f"{begin} (begin) or later")
-    texts = {key: _line(table, key) for key in CERTIFICATE_KEYS[:7]}
-    return CertificateDetails(**texts, begin=begin, end=end)
-
-
-def _line(table: Table, key: str) -> str:
-    text = table.text(key)
-    if not text.strip() or not text.isprintable():
-        raise table.refuse(key, "one line of text")
-    return " ".join(text.split())
-
-
-def _date(table: Table, key: str) -> datetime.date:
-    value = table.values[key]
-    if isinstance(value, datetime.datetime) or not isinstance(value, datetime.date):
-        raise table.refuse(key, "a date, as 2026-03-31")
-    return value
+    details = values.record(CertificateDetails)
+    if details.end < details.begin:
+        raise values.refuse("end", f"{details.begin} (begin) or later")
+    return details

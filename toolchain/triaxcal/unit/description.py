@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.tomltable import Layout, Table, has_table, read_tables, read_toml, shown
+from triaxcal.base.keys import FORMAT as FORMAT_KEY
+from triaxcal.base.keys import FileKeys, Key, TableKeys, Values, key, keys_of
+from triaxcal.base.kinds import (
+    TEXT,
+    Kind,
+    checked,
+    interval,
+    listed,
+    number,
+    pattern,
+    rising,
+    whole,
+    word,
+)
+from triaxcal.base.tomltable import has_table, read_toml, shown
 from triaxcal.model.positions import AXES
-from triaxcal.unit.certificate import CERTIFICATE_KEYS, CertificateDetails, certificate_details
-from triaxcal.unit.measured import MEASURED_KEYS, Measured, measured_details
+from triaxcal.unit.certificate import CERTIFICATE, CertificateDetails, certificate_details
+from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.recording import (
     DEFAULT_LSB,
-    KEYS,
+    FILE,
+    RECORDING,
     RecordingLayout,
-    is_in_folder,
     recording_layout,
 )
 
@@ -33,52 +48,28 @@ STANDARD_GRAVITY_M_PER_S2 = 9.80665
 PLAUSIBLE_DEGC = (-200.0, 400.0)
 """Temperatures outside these are mistakes: no electronic accelerometer works there."""
 
-UNCERTAINTY_MAX = {
-    "squareness_arcsec": 36000.0,
-    "repeatability_arcsec": 36000.0,
-    "level_arcsec": 36000.0,
-    "gravity_m_per_s2": 0.1,
-    "thermometer_degc": 10.0,
-    "thermometer_drift_degc": 10.0,
-}
-"""Keys of [uncertainty], each a standard uncertainty, and the largest value of each."""
-
-_LAYOUT: Layout = {
-    "": {"format": True, "serial": True, "description": False},
-    "adc": {"bits": True, "full_scale_v": True, "code_min": False, "code_max": False},
-    "temperature_sensor": {"degc_per_code": True, "degc_at_zero": False},
-    "site": {"local_gravity_m_per_s2": True},
-    "thermal": {
-        "t0_degc": True,
-        "range_degc": False,
-        "model": False,
-        "order": False,
-        "knots_degc": False,
-    },
-    "fit": {"estimator": False, "terms": False, "loss": False},
-    "sensor": {"polarity": False},
-    "compensation": {"method": False, "output_q": False, "model_error_max_micro_g": False},
-    "limits": {"at_t0_g": False, "over_range_g": False},
-    "uncertainty": dict.fromkeys(UNCERTAINTY_MAX, False),
-    "certificate": dict.fromkeys(CERTIFICATE_KEYS, False),
-    "recording": dict.fromkeys(KEYS, False),
-    "measured": dict.fromkeys(MEASURED_KEYS, False),
-    "quadratic": {"cross_coupling": False, "axes": False},
-}
-_OF_RECORDING: Layout = {
-    **_LAYOUT,
-    "adc": {**dict.fromkeys(_LAYOUT["adc"], False), "lsb": False},
-    "temperature_sensor": dict.fromkeys(_LAYOUT["temperature_sensor"], False),
-    "thermal": dict.fromkeys(_LAYOUT["thermal"], False),
-}
-"""Of a unit with [recording]: what a tilter's must say has a default there."""
 TERMS = ("auto", "linear", "quadratic")
 LOSSES = ("linear", "huber", "cauchy")
 RECORDING_LIMIT_G = 0.02
 """Limit of P1 (13) by itself for a recording: P1's own are a navigation accelerometer's."""
-RECORDING_DEGC_PER_CODE = 2.0**-7
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
 _NAME_RULE = "1 to 64 of A-Z a-z 0-9 - _, the first a letter or digit"
+
+SERIAL = Key(
+    "serial",
+    pattern(_NAME.pattern, f"text in quotes, {_NAME_RULE}"),
+    "Serial number; no two units in one folder may share it.",
+    example='"SN-0001"',
+)
+DESCRIPTION = Key("description", TEXT, "For people; nothing is made of it.", "")
+TOP = TableKeys("", "The unit.", (FORMAT_KEY, SERIAL, DESCRIPTION))
+GRAVITY = Key(
+    "local_gravity_m_per_s2",
+    number(9.7, 9.9),
+    "Gravity at the place of the measurements; g is this / 9.80665.",
+    unit="m/s^2",
+    example="9.8111",
+)
 
 
 @dataclass(frozen=True)
@@ -96,12 +87,47 @@ class Adc:
         return float(self.full_scale_v / 2 ** (self.bits - 1))
 
 
+_CODE = whole(-(2**31), 2**31 - 1)
+BITS = Key("bits", whole(8, 32), "Width of the signed raw code.", unit="bit", example="24")
+FULL_SCALE = Key(
+    "full_scale_v",
+    number(1e-3, 100.0),
+    "Voltage of the code 2^(bits - 1): U = code * full_scale_v / 2^(bits - 1).",
+    unit="V",
+    example="2.5",
+)
+CODE_MIN = Key(
+    "code_min",
+    _CODE,
+    "Lowest raw code that the firmware treats as good.",
+    None,
+    "code",
+    "-2^(bits - 1)",
+)
+CODE_MAX = Key("code_max", _CODE, "Highest good raw code.", None, "code", "2^(bits - 1) - 1")
+LSB = Key(
+    "lsb",
+    number(1e-12, 1e6),
+    "Reading of one raw code, in the unit of the recording; in place of full_scale_v.",
+    None,
+    default_words="1 count; 2^-16 m/s^2, 2^-20 g, 2^-10 mg, 2^-22 V, 2^-12 mV",
+    example="1",
+)
+ADC = TableKeys("adc", "What the raw codes are.", (BITS, FULL_SCALE, CODE_MIN, CODE_MAX))
+
+
 @dataclass(frozen=True)
 class TemperatureSensor:
     """How a temperature code stands for a temperature: T = code * degc_per_code + degc_at_zero."""
 
-    degc_per_code: float
-    degc_at_zero: float
+    degc_per_code: float = key(
+        number(1e-6, 10.0),
+        "T = code * degc_per_code + degc_at_zero; at most 131 072 codes in the working range, "
+        "each of which is proved and tested.",
+        unit="degC",
+        example="0.0078125",
+    )
+    degc_at_zero: float = key(number(-1e4, 1e4), "Temperature of the code 0.", 0.0, "degC")
 
     def degc(self, code: float) -> float:
         """Temperature of a code."""
@@ -112,6 +138,12 @@ class TemperatureSensor:
         return round((temp_degc - self.degc_at_zero) / self.degc_per_code)
 
 
+TEMPERATURE_SENSOR = TableKeys(
+    "temperature_sensor", "What the codes of the thermometer are.", keys_of(TemperatureSensor)
+)
+SITE = TableKeys("site", "Where the unit is measured.", (GRAVITY,))
+
+
 @dataclass(frozen=True)
 class ThermalChoice:
     """Which thermal functions to fit; `model` "auto" tries them all on held-out data.
@@ -119,9 +151,41 @@ class ThermalChoice:
     `order` belongs to "polynomial", `knots_degc` to "piecewise-linear"; None is the default.
     """
 
-    model: str
-    order: int | None
-    knots_degc: tuple[float, ...] | None
+    model: str = key(
+        word(("auto", *THERMAL_MODELS)),
+        "Thermal functions, P1 (3), or (4) made continuous. auto takes the one that is best on "
+        "held-out data.",
+        "auto",
+    )
+    order: int | None = key(
+        whole(0, 9),
+        'Order of the polynomial; with model = "polynomial" only.',
+        None,
+        default_words="chosen as by auto",
+    )
+    knots_degc: tuple[float, ...] | None = key(
+        rising(*PLAUSIBLE_DEGC, 1, 64),
+        "Where segments meet; the ends of the calibrated range are added; with "
+        'model = "piecewise-linear" only.',
+        None,
+        "degC",
+        default_words="T0: the two segments of P1 (12)",
+    )
+
+
+T0 = Key(
+    "t0_degc", number(*PLAUSIBLE_DEGC), "T0, the reference temperature.", unit="degC", example="20"
+)
+RANGE_DEGC = Key(
+    "range_degc",
+    interval(*PLAUSIBLE_DEGC),
+    "Working temperature range; outside it the firmware clamps and flags.",
+    None,
+    "degC",
+    "the fitted dwells' range, outward in steps of 0.1, at most 0.5 beyond the outer temperatures",
+    example="[-40, 85]",
+)
+THERMAL = TableKeys("thermal", "Temperature.", (T0, RANGE_DEGC, *keys_of(ThermalChoice)))
 
 
 def near_t0(temp_degc: float, t0_degc: float) -> bool:
@@ -133,8 +197,10 @@ def near_t0(temp_degc: float, t0_degc: float) -> bool:
 class Limits:
     """Largest | |a| - g | accepted after compensation, P1 (13), in g."""
 
-    at_t0_g: float
-    over_range_g: float
+    at_t0_g: float = key(
+        number(1e-9, 1.0), "Largest | |a| - g | that is accepted at T0, P1 (13).", 3e-4, "g"
+    )
+    over_range_g: float = key(number(1e-9, 1.0), "The same over the working range.", 10e-4, "g")
 
     def at(self, temp_degc: float, t0_degc: float) -> tuple[float, str]:
         """Limit at a temperature, g, and its key."""
@@ -145,32 +211,171 @@ class Limits:
 
 @dataclass(frozen=True)
 class StatedUncertainty:
-    """Standard uncertainties that the user knows; None where the file does not say.
+    """[uncertainty]: standard uncertainties that the user knows; None where none is stated."""
 
-    Attributes
-    ----------
-    squareness_arcsec : of each test position about each axis, the same at all temperatures
-    repeatability_arcsec : of each dwell about each axis
-    level_arcsec : of the tilter as a whole against the unit's axes, about each axis
-    gravity_m_per_s2 : of local gravity
-    thermometer_degc : of the unit's thermometer, the same at calibration and in use
-    thermometer_drift_degc : of its change between calibration and use
-    """
+    squareness_arcsec: float | None = key(
+        number(0.0, 36000.0),
+        "Of each test position's tilt about each axis, the same at all temperatures.",
+        None,
+        "arcsec",
+        default_words="from the residuals",
+    )
+    repeatability_arcsec: float | None = key(
+        number(0.0, 36000.0),
+        "Of the tilt of each single dwell about each axis.",
+        None,
+        "arcsec",
+        default_words="from the residuals",
+    )
+    level_arcsec: float | None = key(
+        number(0.0, 36000.0),
+        "Of the tilter as a whole against the unit's axes, about each axis.",
+        None,
+        "arcsec",
+        default_words="20, assumed",
+    )
+    gravity_m_per_s2: float | None = key(
+        number(0.0, 0.1), "Of local gravity.", None, "m/s^2", default_words="5e-5, assumed"
+    )
+    thermometer_degc: float | None = key(
+        number(0.0, 10.0),
+        "Of the unit's thermometer, the same at calibration and in use.",
+        None,
+        "degC",
+        default_words="0.1, assumed",
+    )
+    thermometer_drift_degc: float | None = key(
+        number(0.0, 10.0),
+        "Of the thermometer's change between calibration and use.",
+        None,
+        "degC",
+        default_words="0.02, assumed",
+    )
 
-    squareness_arcsec: float | None = None
-    repeatability_arcsec: float | None = None
-    level_arcsec: float | None = None
-    gravity_m_per_s2: float | None = None
-    thermometer_degc: float | None = None
-    thermometer_drift_degc: float | None = None
+
+def _axis_pair(value: object) -> tuple[int, int]:
+    names = value if isinstance(value, list) else []
+    a, b = (AXES.index(name) for name in names)
+    if a == b:
+        raise ValueError
+    return a, b
 
 
 @dataclass(frozen=True)
 class PairSource:
-    """File of a pair's readings on a dividing head, and the unit's axes that A and B are."""
+    """[quadratic]: readings of a pair on a dividing head, and the unit's axes that A and B are."""
 
     file: str
-    axes: tuple[int, int]
+    axes: tuple[int, int] = key(
+        Kind(
+            'the axes that A and B are, as ["x", "y"]',
+            _axis_pair,
+            {"type": "array", "items": {"enum": list(AXES)}, "minItems": 2, "maxItems": 2},
+        ),
+        "The unit's axes that A and B are.",
+        example='["x", "y"]',
+    )
+
+
+CROSS_COUPLING = Key(
+    "cross_coupling",
+    FILE,
+    "A pair's readings on a dividing head, in the unit's folder; its cross-coupling is removed.",
+    example='"pair.csv"',
+)
+
+
+LIMITS = TableKeys("limits", "What is accepted.", keys_of(Limits))
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """[fit]."""
+
+    estimator: str = key(
+        word(("auto", *ESTIMATORS)),
+        "How K and U0 come from six positions: P1 (10); least squares; (10) with the bias from an "
+        "axis' own two positions.",
+        "auto",
+    )
+    terms: str = key(word(TERMS), "Of a recording: which candidates are tried.", "auto")
+    loss: str = key(
+        word(LOSSES), "Of a recording: how far a pose that stands out may pull.", "linear"
+    )
+
+
+@dataclass(frozen=True)
+class _Compensation:
+    """[compensation]."""
+
+    method: str = key(word(METHODS), "What the firmware evaluates.", "matrix")
+    output_q: int = key(whole(*OUTPUT_Q_RANGE), "The LSB of the result is 2^-output_q g.", 24)
+    model_error_max_micro_g: float = key(
+        number(1e-3, 1e6),
+        "How far the firmware's functions may be from the fitted model.",
+        1.0,
+        "micro-g",
+    )
+
+
+POLARITY = Key(
+    "polarity",
+    listed(
+        checked(lambda v: type(v) is int and abs(v) == 1, "a sign", {"enum": [1, -1]}),
+        range(3, 4),
+        "a list of three signs, each 1 or -1",
+    ),
+    "Signs of Kxx, Kyy, Kzz, where they differ.",
+    None,
+    default_words="all alike",
+    example="[1, 1, 1]",
+)
+_COMMON = (
+    TableKeys("fit", "How the constants are fitted.", keys_of(_Fit)),
+    TableKeys("sensor", "The sensor itself.", (POLARITY,)),
+    TableKeys("compensation", "What the firmware computes.", keys_of(_Compensation)),
+    TableKeys(
+        "uncertainty",
+        "Standard uncertainties that you know.",
+        keys_of(StatedUncertainty),
+    ),
+    CERTIFICATE,
+    MEASURED,
+    TableKeys(
+        "quadratic",
+        "Cross-coupling that a dividing head has shown.",
+        (CROSS_COUPLING, *keys_of(PairSource)),
+        optional=True,
+    ),
+)
+
+
+def tilter_file() -> FileKeys:
+    """Keys of the unit.toml of a unit on a tilter."""
+    return FileKeys(
+        UNIT_FILE,
+        "A unit on a tilter",
+        (TOP, ADC, TEMPERATURE_SENSOR, SITE, THERMAL, LIMITS, *_COMMON),
+    )
+
+
+def recording_file() -> FileKeys:
+    """Keys of the unit.toml of a unit with a recording."""
+    limit = {"default": RECORDING_LIMIT_G}
+    return FileKeys(
+        UNIT_FILE,
+        "A unit with a recording",
+        (
+            TOP,
+            RECORDING,
+            SITE,
+            ADC.relaxed().but(LSB, bits={"default_words": "16 of counts, else 24"}),
+            TEMPERATURE_SENSOR.but(degc_per_code={"default": 2.0**-7}),
+            THERMAL.but(t0_degc={"default": 20.0}),
+            LIMITS.but(at_t0_g=limit, over_range_g=limit),
+            *_COMMON,
+        ),
+    )
 
 
 @dataclass(frozen=True)
@@ -231,9 +436,8 @@ def read_unit(folder: Path) -> UnitDescription:
         unit beside it has the same serial number.
     """
     path = find_unit(folder)
-    recorded = has_table(path, "recording")
-    tables = read_tables(path, _OF_RECORDING if recorded else _LAYOUT, FORMAT)
-    unit = _unit_from_tables(folder.absolute().name, tables)
+    file = recording_file() if has_table(path, "recording") else tilter_file()
+    unit = _unit_of(folder.absolute().name, file.read(path))
     _refuse_duplicate_serial(folder, unit.serial)
     return unit
 
@@ -291,162 +495,85 @@ def _is_unit(folder: Path) -> bool:
         return False
 
 
-def _unit_from_tables(name: str, tables: dict[str, Table]) -> UnitDescription:
-    top, thermal, site = tables[""], tables["thermal"], tables["site"]
-    compensation, limits = tables["compensation"], tables["limits"]
-    if "description" in top:
-        top.text("description")  # for people; nothing is made of it
-    check_unit_name(top.text("serial"), top.where("serial"))
-    range_degc = (
-        thermal.rising("range_degc", *PLAUSIBLE_DEGC, range(2, 3))
-        if "range_degc" in thermal
-        else None
-    )
-    gravity_m_per_s2 = site.number("local_gravity_m_per_s2", 9.7, 9.9)
-    recording = recording_layout(tables["recording"])
-    limits_g = (3e-4, 10e-4) if recording is None else (RECORDING_LIMIT_G, RECORDING_LIMIT_G)
+def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
+    thermal, fit = tables["thermal"], tables["fit"].record(_Fit)
+    compensation = tables["compensation"].record(_Compensation)
+    recording = recording_layout(tables["recording"]) if "recording" in tables else None
+    polarity = tables["sensor"][POLARITY]
+    _ = tables[""][DESCRIPTION]  # for people; checked all the same
     return UnitDescription(
         name=name,
-        serial=top.text("serial"),
+        serial=tables[""][SERIAL],
         adc=_adc(tables["adc"]) if recording is None else _adc_of(recording, tables["adc"]),
-        temperature_sensor=_temperature_sensor(tables["temperature_sensor"]),
-        gravity_g=gravity_m_per_s2 / STANDARD_GRAVITY_M_PER_S2,
-        t0_degc=_number(thermal, "t0_degc", *PLAUSIBLE_DEGC, default=20.0),
-        range_degc=(range_degc[0], range_degc[1]) if range_degc else None,
-        polarity=_polarity(tables["sensor"]),
-        estimator=_choice(tables["fit"], "estimator", ("auto", *ESTIMATORS)),
+        temperature_sensor=tables["temperature_sensor"].record(TemperatureSensor),
+        gravity_g=tables["site"][GRAVITY] / STANDARD_GRAVITY_M_PER_S2,
+        t0_degc=thermal[T0],
+        range_degc=thermal[RANGE_DEGC],
+        polarity=None if polarity is None else (polarity[0], polarity[1], polarity[2]),
+        estimator=fit.estimator,
         thermal=_thermal_choice(thermal),
-        method=_choice(compensation, "method", METHODS),
-        output_q=compensation.integer("output_q", *OUTPUT_Q_RANGE)
-        if "output_q" in compensation
-        else 24,
-        model_error_max_micro_g=_number(
-            compensation, "model_error_max_micro_g", 1e-3, 1e6, default=1.0
-        ),
-        limits=Limits(
-            at_t0_g=_number(limits, "at_t0_g", 1e-9, 1.0, default=limits_g[0]),
-            over_range_g=_number(limits, "over_range_g", 1e-9, 1.0, default=limits_g[1]),
-        ),
-        stated=_stated(tables["uncertainty"]),
+        method=compensation.method,
+        output_q=compensation.output_q,
+        model_error_max_micro_g=compensation.model_error_max_micro_g,
+        limits=tables["limits"].record(Limits),
+        stated=tables["uncertainty"].record(StatedUncertainty),
         certificate=certificate_details(tables["certificate"]),
         recording=recording,
-        terms=_choice(tables["fit"], "terms", TERMS),
-        loss=_choice(tables["fit"], "loss", LOSSES),
-        adc_open=recording is not None and not tables["adc"].values,
+        terms=fit.terms,
+        loss=fit.loss,
+        adc_open=recording is not None and not tables["adc"],
         pair=_pair(tables["quadratic"]),
-        measured=measured_details(tables["measured"]),
+        measured=tables["measured"].record(Measured),
     )
 
 
-def _pair(table: Table) -> PairSource | None:
-    if not table.values:
-        return None
-    for key in ("cross_coupling", "axes"):
-        if key not in table:
-            raise RefusedError(
-                table.where(key),
-                "missing",
-                expected='cross_coupling = "pair.csv" and axes = ["x", "y"], those of A and B',
-            )
-    name = table.text("cross_coupling")
-    if not is_in_folder(name):
-        raise table.refuse("cross_coupling", "a file in the unit's folder", "copy it there")
-    axes = table.values["axes"]
-    if (
-        not isinstance(axes, list)
-        or len(axes) != 2
-        or not all(isinstance(a, str) and a in AXES for a in axes)
-        or axes[0] == axes[1]
-    ):
-        raise table.refuse("axes", 'the axes that A and B are, as ["x", "y"]')
-    return PairSource(name, (AXES.index(axes[0]), AXES.index(axes[1])))
+def _pair(values: Values) -> PairSource | None:
+    return values.record(PairSource, file=values[CROSS_COUPLING]) if values else None
 
 
-def _choice(table: Table, key: str, choices: tuple[str, ...]) -> str:
-    """One of `choices`, the first by default."""
-    return table.choice(key, choices) if key in table else choices[0]
-
-
-def _number(table: Table, key: str, low: float, high: float, *, default: float) -> float:
-    return table.number(key, low, high) if key in table else default
-
-
-def _adc(table: Table) -> Adc:
-    bits = table.integer("bits", 8, 32)
+def _adc(values: Values, bits: int | None = None, full_scale_v: float | None = None) -> Adc:
+    bits = bits or values[BITS]
     half = 2 ** (bits - 1)
-    low = table.integer("code_min", -half, half - 1) if "code_min" in table else -half
-    high = table.integer("code_max", -half, half - 1) if "code_max" in table else half - 1
+    low, high = _code(values, CODE_MIN, half, -half), _code(values, CODE_MAX, half, half - 1)
     if low >= high:
-        key = "code_min" if "code_min" in table else "code_max"
-        raise table.refuse(key, f"code_min below code_max, which are {low} and {high}")
-    return Adc(bits, table.number("full_scale_v", 1e-3, 100.0), low, high)
+        end = CODE_MIN if CODE_MIN in values else CODE_MAX
+        raise values.refuse(end, f"code_min below code_max, which are {low} and {high}")
+    return Adc(bits, values[FULL_SCALE] if full_scale_v is None else full_scale_v, low, high)
 
 
-def _adc_of(recording: RecordingLayout, table: Table) -> Adc:
+def _code(values: Values, end: Key[int | None], half: int, default: int) -> int:
+    """An end of the good codes, which has to be one of the ADC."""
+    found = replace(values, keys={})[replace(end, kind=whole(-half, half - 1))]
+    return default if found is None else found
+
+
+def _adc_of(recording: RecordingLayout, values: Values) -> Adc:
     """How a raw code stands for a reading of a recording: "V" is the reading's unit."""
     unit = recording.acceleration_unit
-    if "full_scale_v" in table:
-        if unit != "V" or "lsb" in table or "bits" not in table:
+    if FULL_SCALE in values:
+        if unit != "V" or LSB in values or BITS not in values:
             raise RefusedError(
-                table.where("full_scale_v"),
+                values.where(FULL_SCALE),
                 f'given for a recording in "{unit}"',
                 expected=f"lsb, the reading in {unit} of one raw code, and bits",
             )
-        return _adc(table)
-    lsb = _number(table, "lsb", 1e-12, 1e6, default=DEFAULT_LSB[unit])
-    bits = table.integer("bits", 8, 32) if "bits" in table else _bits_of(unit)
-    values = {"bits": bits, "full_scale_v": 1} | {
-        key: table.values[key] for key in ("code_min", "code_max") if key in table
-    }
-    adc = _adc(Table(table.file, table.name, values))
-    return Adc(bits, lsb * 2.0 ** (bits - 1), adc.code_min, adc.code_max)
+        return _adc(values)
+    lsb = values.optional(LSB) or DEFAULT_LSB[unit]
+    bits = values.optional(BITS) or (16 if unit == "count" else 24)
+    return _adc(values, bits, lsb * 2.0 ** (bits - 1))
 
 
-def _bits_of(unit: str) -> int:
-    return 16 if unit == "count" else 24
-
-
-def _temperature_sensor(table: Table) -> TemperatureSensor:
-    return TemperatureSensor(
-        degc_per_code=_number(table, "degc_per_code", 1e-6, 10.0, default=RECORDING_DEGC_PER_CODE),
-        degc_at_zero=_number(table, "degc_at_zero", -1e4, 1e4, default=0.0),
-    )
-
-
-def _thermal_choice(table: Table) -> ThermalChoice:
-    model = _choice(table, "model", ("auto", *THERMAL_MODELS))
-    for key, owner in (("order", "polynomial"), ("knots_degc", "piecewise-linear")):
-        if key in table and model != owner:
+def _thermal_choice(values: Values) -> ThermalChoice:
+    choice = values.record(ThermalChoice)
+    for name, owner in (("order", "polynomial"), ("knots_degc", "piecewise-linear")):
+        if name in values and choice.model != owner:
             raise RefusedError(
-                table.where(key),
-                f'given with model = "{model}"',
+                values.where(name),
+                f'given with model = "{choice.model}"',
                 expected=f'it with model = "{owner}" only',
                 remedy="remove it, or choose that model",
             )
-    return ThermalChoice(
-        model=model,
-        order=table.integer("order", 0, 9) if "order" in table else None,
-        knots_degc=(
-            table.rising("knots_degc", *PLAUSIBLE_DEGC, range(1, 65))
-            if "knots_degc" in table
-            else None
-        ),
-    )
-
-
-def _stated(table: Table) -> StatedUncertainty:
-    found = {k: table.number(k, 0.0, high) for k, high in UNCERTAINTY_MAX.items() if k in table}
-    return StatedUncertainty(**found)
-
-
-def _polarity(table: Table) -> tuple[int, int, int] | None:
-    if "polarity" not in table:
-        return None
-    signs = table.values["polarity"]
-    legal = isinstance(signs, list) and all(type(s) is int and abs(s) == 1 for s in signs)
-    if not isinstance(signs, list) or not legal or len(signs) != 3:
-        raise table.refuse("polarity", "a list of three signs, each 1 or -1")
-    return (signs[0], signs[1], signs[2])
+    return choice
 
 
 def _refuse_duplicate_serial(folder: Path, serial: str) -> None:

@@ -5,18 +5,20 @@ from __future__ import annotations
 import datetime
 from dataclasses import dataclass
 
-from triaxcal.base.tomltable import Table
-
-MEASURED_KEYS = ("rig", "date")
-_LONGEST = 64
+from triaxcal.base.keys import TableKeys, key, keys_of
+from triaxcal.base.kinds import DATE, line
 
 
 @dataclass(frozen=True)
 class Measured:
     """Rig and day of the measurements; None where the file does not say."""
 
-    rig: str | None = None
-    date: datetime.date | None = None
+    rig: str | None = key(
+        line(64), "Name of the rig; a series compares its runs.", None, example='"tilter 3"'
+    )
+    date: datetime.date | None = key(
+        DATE, "Day of the measurements, without quotes.", None, example="2026-03-30"
+    )
 
     @property
     def run(self) -> str | None:
@@ -24,22 +26,4 @@ class Measured:
         return " ".join(str(part) for part in (self.rig, self.date) if part) or None
 
 
-def measured_details(table: Table) -> Measured:
-    """Rig and day in a table [measured].
-
-    Raises
-    ------
-    RefusedError
-        When the rig is no short line of text, or the day is no date.
-    """
-    rig, day = None, None
-    if "rig" in table:
-        rig = table.text("rig")
-        if not rig.strip() or not rig.isprintable() or len(rig) > _LONGEST:
-            raise table.refuse("rig", f"a name of 1 to {_LONGEST} printable characters")
-    if "date" in table:
-        value = table.values["date"]
-        if not isinstance(value, datetime.date) or isinstance(value, datetime.datetime):
-            raise table.refuse("date", "a day without quotes, as 2026-03-30")
-        day = value
-    return Measured(rig, day)
+MEASURED = TableKeys("measured", "When and on which rig the unit was measured.", keys_of(Measured))

@@ -8,12 +8,13 @@ of published recordings; keys of the table override them.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.tomltable import Table, shown
+from triaxcal.base.keys import TableKeys, Values, key, keys_of
+from triaxcal.base.kinds import FLAG, TEXT, Kind, checked, listed, meaning, number, whole, word
 
 SAMPLES, POSES, SECTIONS = "samples", "poses", "sections"
 ACCELERATION_UNITS: Mapping[str, float | None] = MappingProxyType(
@@ -39,13 +40,6 @@ ANGLE_NAMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 STILL_S = 2.0
 """Shortest pose by itself: 200 samples at 100 Hz, 0.07 of their noise."""
-
-KEYS = (
-    "file", "preset", "rows", "delimiter", "header", "skip_rows", "comment", "decimal", "variable",
-    "acceleration", "acceleration_unit", "time", "time_unit", "sample_rate_hz", "gyro",
-    "temperature", "temperature_unit", "section", "faces", "angle_unit", "still_s", "frame",
-    *(name for names in ANGLE_NAMES.values() for name in names),
-)  # fmt: skip
 
 PRESETS: Mapping[str, Mapping[str, object]] = MappingProxyType(
     {
@@ -115,236 +109,255 @@ class Angles:
     unit: str
 
 
+def is_in_folder(name: object) -> bool:
+    """Whether the name of a file stays in the unit's folder."""
+    return (
+        isinstance(name, str)
+        and bool(name)
+        and not name.startswith("/")
+        and ".." not in name.replace("\\", "/").split("/")
+    )
+
+
+def _column(value: object) -> Column:
+    named = isinstance(value, str) and value != ""
+    numbered = isinstance(value, int) and not isinstance(value, bool) and value >= 1
+    if not (named or numbered):
+        raise ValueError
+    return value  # type: ignore[return-value]  # what `named` and `numbered` say
+
+
+def _signed_column(value: object) -> SignedColumn:
+    """Column; a minus before its name or number turns the sign of its readings."""
+    negative = value < 0 if isinstance(value, int) else str(value).startswith("-")
+    bare = -value if negative and isinstance(value, int) else value
+    bare = bare.removeprefix("-") if isinstance(bare, str) else bare
+    return SignedColumn(_column(bare), -1 if negative else 1)
+
+
+def _three_signed(value: object) -> tuple[SignedColumn, ...]:
+    found = tuple(map(_signed_column, value)) if isinstance(value, list) else ()
+    if len(found) != 3 or len({c.column for c in found}) != 3:
+        raise ValueError
+    return found
+
+
+def _faces(value: object) -> Mapping[str, str]:
+    if not isinstance(value, dict) or not all(face in FACES for face in value.values()):
+        raise ValueError
+    return {str(label): str(face) for label, face in value.items()}
+
+
+FILE: Kind[str] = checked(
+    is_in_folder, "a file in the unit's folder", {"type": "string"}, "copy it there"
+)
+_SCHEMA = {"anyOf": [{"type": "string", "minLength": 1}, {"type": "integer"}]}
+COLUMN = Kind("the name of a column, or its number from 1", _column, _SCHEMA)
+COLUMNS = listed(
+    COLUMN, range(3, 4), "a list of 3 different columns, by name or number", different=True
+)
+SIGNED_COLUMNS = Kind(
+    'three different columns, by name or number, as ["ax", "-ay", "az"]',
+    _three_signed,
+    {"type": "array", "items": _SCHEMA, "minItems": 3, "maxItems": 3},
+)
+LABELLED_FACES = Kind(
+    'a label and the axis that points up each, as {top = "+z", bottom = "-z"}',
+    _faces,
+    {"type": "object", "additionalProperties": {"enum": list(FACES)}},
+)
+
+
 @dataclass(frozen=True)
 class RecordingLayout:
-    """What a recording's file is, validated; absent optional columns are None.
+    """[recording]: what a recording's file is; absent optional columns are None."""
 
-    Attributes
-    ----------
-    file : str
-        Name of the file, in the unit's folder or below it.
-    rows : str
-        "samples", "poses" or "sections".
-    delimiter : str or None
-        None finds it.
-    header : bool or None
-        None finds out.
-    acceleration : tuple of three SignedColumn
-    faces : mapping
-        Label of the section column to the axis that points up, as "+x".
-    frame : str
-        "sensor" or "case": `fit.family.frame`.
-    """
-
-    file: str
-    rows: str
-    delimiter: str | None
-    header: bool | None
-    skip_rows: int
-    comment: str
-    decimal: str
-    variable: str | None
-    acceleration: tuple[SignedColumn, SignedColumn, SignedColumn]
-    acceleration_unit: str
-    time: Column | None
-    time_unit: str
-    sample_rate_hz: float | None
-    gyro: tuple[Column, ...] | None
-    temperature: Column | None
-    temperature_unit: str
-    section: Column | None
-    faces: Mapping[str, str]
-    angles: Angles | None
-    still_s: float
-    frame: str
+    file: str = key(FILE, "File of the recording, in the unit's folder or below it.")
+    preset: str | None = key(
+        word(tuple(PRESETS)), "Layout of a published recording; other keys override it.", None
+    )
+    rows: str = key(
+        word((SAMPLES, POSES, SECTIONS)),
+        'What a row is. "sections": a sample, and each stretch with one label is a pose.',
+        SAMPLES,
+    )
+    delimiter: str | None = key(
+        meaning(DELIMITERS),
+        'What separates the cells; "space" is any white space.',
+        None,
+        default_words="found",
+    )
+    header: bool | None = key(
+        FLAG, "Whether the first line names the columns.", None, default_words="found"
+    )
+    skip_rows: int = key(
+        whole(0, 10**6),
+        "Lines above the header or the first row. What a logger writes there is found without it.",
+        0,
+        "lines",
+    )
+    comment: str = key(TEXT, "Lines that begin with it are ignored.", "#")
+    decimal: str = key(word((".", ",")), "Decimal sign.", ".")
+    variable: str | None = key(
+        TEXT,
+        "Matrix of a MAT-file, for columns by number.",
+        None,
+        default_words="the only matrix",
+    )
+    acceleration: tuple[SignedColumn, ...] = key(
+        SIGNED_COLUMNS,
+        'Readings of x, y, z, by name or number from 1; "-ay" or -2 turns the sign.',
+        (),
+        default_words="of the preset; required without one",
+        example='["ax", "ay", "az"]',
+    )
+    acceleration_unit: str = key(
+        word(tuple(ACCELERATION_UNITS)),
+        "Unit of the readings.",
+        "",
+        default_words="of the preset; required without one",
+        example='"m/s^2"',
+    )
+    time: Column | None = key(COLUMN, "Time of each sample.", None, example='"time"')
+    time_unit: str = key(
+        word(tuple(TIME_UNITS)),
+        'Unit of `time`; "iso" is 2026-03-30T12:00:00.25 or 12:00:00.25.',
+        "s",
+    )
+    sample_rate_hz: float | None = key(
+        number(1e-3, 1e6), "Rate of even samples, in place of `time`.", None, "Hz", example="100"
+    )
+    gyro: tuple[Column, ...] | None = key(
+        COLUMNS,
+        "Rates of x, y, z in any unit: they show stillness and left-handed axes.",
+        None,
+        example='["gx", "gy", "gz"]',
+    )
+    temperature: Column | None = key(
+        COLUMN, "Temperature of each row.", None, example='"temperature"'
+    )
+    temperature_unit: str = key(
+        word(TEMPERATURE_UNITS),
+        "Unit of `temperature`; codes are those of `[temperature_sensor]`.",
+        "degC",
+    )
+    section: Column | None = key(
+        COLUMN,
+        'Label of each row; required with `rows = "sections"`.',
+        None,
+        example='"section"',
+    )
+    faces: Mapping[str, str] = key(
+        LABELLED_FACES,
+        "Labels in the column `section`, and the axis that points up in each.",
+        {},
+        default_words="none",
+        example='{top = "+z", bottom = "-z"}',
+    )
+    angle_unit: str | None = key(
+        word(("deg", "rad")),
+        "Unit of the angles.",
+        None,
+        default_words="required with angles",
+        example='"deg"',
+    )
+    still_s: float = key(number(1e-3, 1e5), "Shortest pose.", STILL_S, "s")
+    frame: str = key(
+        word(("sensor", "case")), "Axes of the result where orientations are unknown.", "sensor"
+    )
+    pitch: Column | None = key(
+        COLUMN, 'Aircraft angle of each pose, with `rows = "poses"` or "sections".', None
+    )
+    roll: Column | None = key(COLUMN, "The second aircraft angle.", None)
+    yaw: Column | None = key(
+        COLUMN, "Does not change gravity; shows a table that is not level.", None
+    )
+    zenith: Column | None = key(COLUMN, "Inclinometer angle of each pose.", None)
+    tool_face: Column | None = key(COLUMN, "The second inclinometer angle.", None)
+    azimuth: Column | None = key(COLUMN, "As `yaw`.", None)
 
     @property
     def reading_of_1_g(self) -> float | None:
         """Reading that 1 g should give, where the unit says it."""
         return ACCELERATION_UNITS[self.acceleration_unit]
 
+    @property
+    def angles(self) -> Angles | None:
+        """Angles of the rows, None without them."""
+        for kind_of_angles, names in ANGLE_NAMES.items():
+            columns = tuple(c for c in (getattr(self, name) for name in names) if c is not None)
+            if columns:
+                return Angles(kind_of_angles, columns, self.angle_unit or "")
+        return None
 
-def recording_layout(table: Table) -> RecordingLayout | None:
+
+RECORDING = TableKeys(
+    "recording",
+    "A recording of samples or poses. A unit with it has no measurements.csv.",
+    keys_of(RecordingLayout),
+    optional=True,
+)
+
+
+def recording_layout(values: Values) -> RecordingLayout | None:
     """Layout in a table [recording]; None when there is none.
 
     Raises
     ------
     RefusedError
-        For a value that is none of those in docs/recordings.md, and for keys that contradict each
-        other.
+        For a wrong value, and for keys that contradict each other.
     """
-    if not table.values:
+    if not values:
         return None
-    if "file" not in table:
+    name = values[values.keys["preset"]]
+    values = replace(values, given={**(PRESETS[name] if name else {}), **values.given})
+    layout = values.record(RecordingLayout)
+    for required in ("acceleration", "acceleration_unit"):
+        if required not in values:
+            raise RefusedError(
+                values.where(required),
+                "missing",
+                expected=values.keys[required].kind.expected,
+                remedy="or name a preset: " + ", ".join(PRESETS),
+            )
+    clock = layout.time is not None or layout.sample_rate_hz is not None
+    if layout.rows == SAMPLES and not layout.faces and not clock:
         raise RefusedError(
-            table.where("file"), "missing", expected="the name of the recording's file"
+            values.where("time"), "missing", expected="a time column, or sample_rate_hz"
         )
-    name = table.choice("preset", tuple(PRESETS)) if "preset" in table else None
-    preset = PRESETS[name] if name else {}
-    merged = Table(table.file, table.name, {**preset, **table.values})
-    if "acceleration" not in merged or "acceleration_unit" not in merged:
-        key = "acceleration" if "acceleration" not in merged else "acceleration_unit"
+    if layout.section is None and layout.rows == SECTIONS:
         raise RefusedError(
-            table.where(key),
+            values.where("section"),
             "missing",
-            expected='the three columns, as ["ax", "ay", "az"]'
-            if key == "acceleration"
-            else "one of " + ", ".join(f'"{u}"' for u in ACCELERATION_UNITS),
-            remedy="or name a preset: " + ", ".join(PRESETS),
+            expected="the column that numbers or names the poses",
         )
-    return _layout(merged)
+    if layout.section is None and "faces" in values:
+        raise RefusedError(values.where("faces"), "given without section", expected="its column")
+    _check_angles(values, layout)
+    # A time column says more than a rate; a preset's rate yields to it.
+    return layout if layout.time is None else replace(layout, sample_rate_hz=None)
 
 
-def _layout(table: Table) -> RecordingLayout:
-    rows = _word(table, "rows", (SAMPLES, POSES, SECTIONS))
-    angles = _angles(table)
-    time = _column(table, "time") if "time" in table else None
-    rate = table.number("sample_rate_hz", 1e-3, 1e6) if "sample_rate_hz" in table else None
-    if rows == SAMPLES and "faces" not in table and time is None and rate is None:
-        raise RefusedError(
-            table.where("time"), "missing", expected="a time column, or sample_rate_hz"
-        )
-    if rows == SECTIONS and "section" not in table:
-        raise RefusedError(
-            table.where("section"), "missing", expected="the column that numbers or names the poses"
-        )
-    if angles is not None and rows == SAMPLES:
-        raise RefusedError(
-            table.where(ANGLE_NAMES[angles.kind][0]),
-            "angles with rows of samples",
-            expected='rows = "poses", one row a pose, or "sections"',
-        )
-    section = _column(table, "section") if "section" in table else None
-    if "faces" in table and section is None:
-        raise RefusedError(table.where("faces"), "given without section", expected="its column")
-    return RecordingLayout(
-        file=_file(table),
-        rows=rows,
-        delimiter=DELIMITERS[table.choice("delimiter", tuple(DELIMITERS))]
-        if "delimiter" in table
-        else None,
-        header=_flag(table, "header"),
-        skip_rows=table.integer("skip_rows", 0, 10**6) if "skip_rows" in table else 0,
-        comment=table.text("comment") if "comment" in table else "#",
-        decimal=_word(table, "decimal", (".", ",")),
-        variable=table.text("variable") if "variable" in table else None,
-        acceleration=_acceleration(table),
-        acceleration_unit=table.choice("acceleration_unit", tuple(ACCELERATION_UNITS)),
-        time=time,
-        time_unit=_word(table, "time_unit", tuple(TIME_UNITS)),
-        # A time column says more than a rate; a preset's rate yields to it.
-        sample_rate_hz=None if time is not None else rate,
-        gyro=_columns(table, "gyro", range(3, 4)) if "gyro" in table else None,
-        temperature=_column(table, "temperature") if "temperature" in table else None,
-        temperature_unit=_word(table, "temperature_unit", TEMPERATURE_UNITS),
-        section=section,
-        faces=_faces(table),
-        angles=angles,
-        still_s=table.number("still_s", 1e-3, 1e5) if "still_s" in table else STILL_S,
-        frame=_word(table, "frame", ("sensor", "case")),
-    )
-
-
-def _word(table: Table, key: str, words: tuple[str, ...]) -> str:
-    return table.choice(key, words) if key in table else words[0]
-
-
-def is_in_folder(name: str) -> bool:
-    """Whether the name of a recording stays in the unit's folder."""
-    return (
-        bool(name) and not name.startswith("/") and ".." not in name.replace("\\", "/").split("/")
-    )
-
-
-def _file(table: Table) -> str:
-    name = table.text("file")
-    if not is_in_folder(name):
-        raise table.refuse("file", "a file in the unit's folder", "copy it there")
-    return name
-
-
-def _flag(table: Table, key: str) -> bool | None:
-    if key not in table:
-        return None
-    value = table.values[key]
-    if not isinstance(value, bool):
-        raise table.refuse(key, "true or false")
-    return value
-
-
-def _is_column(value: object) -> bool:
-    if isinstance(value, bool):
-        return False
-    return (isinstance(value, int) and value >= 1) or (isinstance(value, str) and value != "")
-
-
-def _column(table: Table, key: str) -> Column:
-    value = table.values[key]
-    if not _is_column(value):
-        raise table.refuse(key, "the name of a column, or its number from 1")
-    assert isinstance(value, str | int)
-    return value
-
-
-def _columns(table: Table, key: str, lengths: range) -> tuple[Column, ...]:
-    value = table.values[key]
-    if (
-        not isinstance(value, list)
-        or len(value) not in lengths
-        or not all(map(_is_column, value))
-        or len(set(value)) != len(value)
-    ):
-        raise table.refuse(key, f"a list of {lengths[0]} different columns, by name or number")
-    return tuple(value)
-
-
-def _acceleration(table: Table) -> tuple[SignedColumn, SignedColumn, SignedColumn]:
-    """Three columns; a minus before a name or number turns the sign of its readings."""
-    value = table.values["acceleration"]
-    expected = 'three different columns, by name or number, as ["ax", "-ay", "az"]'
-    if not isinstance(value, list) or len(value) != 3:
-        raise table.refuse("acceleration", expected)
-    found = []
-    for item in value:
-        bare = item.removeprefix("-") if isinstance(item, str) else item
-        if isinstance(item, int) and not isinstance(item, bool):
-            bare = abs(item)
-        if not _is_column(bare):
-            raise table.refuse("acceleration", expected)
-        found.append(SignedColumn(bare, 1 if bare == item else -1))
-    if len({c.column for c in found}) != 3:
-        raise table.refuse("acceleration", expected)
-    return (found[0], found[1], found[2])
-
-
-def _faces(table: Table) -> Mapping[str, str]:
-    if "faces" not in table:
-        return {}
-    value = table.values["faces"]
-    if not isinstance(value, dict) or not all(face in FACES for face in value.values()):
-        raise RefusedError(
-            table.where("faces"),
-            f"found {shown(value)}",
-            expected='a label and the axis that points up each, as {top = "+z", bottom = "-z"}',
-        )
-    return {str(label): str(face) for label, face in value.items()}
-
-
-def _angles(table: Table) -> Angles | None:
-    kinds = [k for k, names in ANGLE_NAMES.items() if any(name in table for name in names)]
+def _check_angles(values: Values, layout: RecordingLayout) -> None:
+    kinds = [k for k, names in ANGLE_NAMES.items() if any(name in values for name in names)]
     if not kinds:
-        return None
+        return
     if len(kinds) == 2:
         raise RefusedError(
-            table.where("pitch"),
+            values.where("pitch"),
             "aircraft and inclinometer angles together",
             expected="pitch and roll, or zenith and tool_face",
         )
-    names = ANGLE_NAMES[kinds[0]]
-    missing = [name for name in names[:2] if name not in table]
-    if missing:
-        raise RefusedError(table.where(missing[0]), "missing", expected=" and ".join(names[:2]))
-    if "angle_unit" not in table:
-        raise RefusedError(table.where("angle_unit"), "missing", expected='"deg" or "rad"')
-    columns = tuple(_column(table, name) for name in names if name in table)
-    return Angles(kinds[0], columns, table.choice("angle_unit", ("deg", "rad")))
+    names = ANGLE_NAMES[kinds[0]][:2]
+    for name, expected in (
+        *((n, " and ".join(names)) for n in names),
+        ("angle_unit", '"deg" or "rad"'),
+    ):
+        if name not in values:
+            raise RefusedError(values.where(name), "missing", expected=expected)
+    if layout.rows == SAMPLES:
+        raise RefusedError(
+            values.where(names[0]),
+            "angles with rows of samples",
+            expected='rows = "poses", one row a pose, or "sections"',
+        )
