@@ -81,7 +81,8 @@ def test_every_column_can_be_recorded(unit: Path) -> None:
 def test_a_wrong_effect_is_refused(unit: Path) -> None:
     change(unit, "imu_truth.toml", '"g-drift"', '"drift"')
     assert refusal(unit) == (
-        "IMU-SIM/imu_truth.toml, [unit] effects: found ['delay', 'drift']; expected a list of "
+        "IMU-SIM/imu_truth.toml, [unit] effects: found 'drift' "
+        '(did you mean "g-drift"?); expected a list of '
         "names out of g-drift, delay, accel-positions, mount-elasticity, gyro-elasticity, "
         "second-triad, accel-temperature, gyro-temperature"
     )

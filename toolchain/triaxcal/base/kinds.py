@@ -122,7 +122,7 @@ def whole(low: int, high: int) -> Kind[int]:
     )
 
 
-def decimal(low: float, high: float) -> Kind[Decimal]:
+def decimal(low: float = -math.inf, high: float = math.inf) -> Kind[Decimal]:
     """A finite number from `low` to `high`, exactly as written."""
 
     def parse(value: Any) -> Decimal:
@@ -139,7 +139,7 @@ def decimal(low: float, high: float) -> Kind[Decimal]:
     return Kind(f"a number from {low:g} to {high:g}", parse, schema)
 
 
-def number(low: float, high: float) -> Kind[float]:
+def number(low: float = -math.inf, high: float = math.inf) -> Kind[float]:
     """A finite number from `low` to `high`."""
     exact = decimal(low, high)
     return Kind(exact.expected, lambda v: float(exact.parse(v)), exact.schema)
@@ -195,3 +195,18 @@ def interval(low: float, high: float) -> Kind[tuple[float, float]]:
         return first, last
 
     return Kind(two.expected, parse, two.schema)
+
+
+def three(
+    item: Kind[T], expected: str, good: Callable[[T], bool] = lambda _: True
+) -> Kind[tuple[T, T, T]]:
+    """Three values of a kind that are all `good`."""
+    items = listed(item, range(3, 4), expected)
+
+    def parse(value: Any) -> tuple[T, T, T]:
+        x, y, z = items.parse(value)
+        if not (good(x) and good(y) and good(z)):
+            raise ValueError
+        return x, y, z
+
+    return Kind(expected, parse, items.schema)

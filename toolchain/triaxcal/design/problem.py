@@ -8,26 +8,108 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.tomltable import Layout, Table, read_tables
+from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values
+from triaxcal.base.kinds import listed, number, rising, three, whole, word
 from triaxcal.model.positions import AXES, TEST_POSITIONS
-from triaxcal.unit.description import PLAUSIBLE_DEGC, T0_TOLERANCE_DEGC
+from triaxcal.unit.description import DESCRIPTION, PLAUSIBLE_DEGC, T0_TOLERANCE_DEGC
 
-FORMAT = 1
 CANDIDATES_MAX = 16
 """Every subset of the candidates is tried: 2^13 of them at most, the ends and T0 being fixed."""
-_LAYOUT: Layout = {
-    "": {"format": True, "description": False},
-    "noise": {
-        "reading_micro_g": True,
-        "floor_micro_g": False,
-        "repeatability_arcsec": False,
-    },
-    "rig": {"rate_hz": True, "volts_per_g": True, "turn_s": False},
-    "chamber": {"ramp_k_per_min": True, "soak_min": True},
-    "candidates": {"temperatures_degc": True, "positions": False},
-    "curves": {"t0_degc": True, "order": True},
-    "target": {"expanded_micro_g": False},
-}
+
+READING = Key(
+    "reading_micro_g",
+    number(1e-3, 1e6),
+    "Standard deviation of one reading.",
+    unit="micro-g",
+    example="100",
+)
+FLOOR = Key(
+    "floor_micro_g",
+    number(0.0, 1e6),
+    "Standard deviation of a dwell's mean, however long: what averaging does not remove.",
+    0.0,
+    "micro-g",
+)
+REPEATABILITY = Key(
+    "repeatability_arcsec",
+    number(0.0, 36000.0),
+    "Standard deviation of each dwell's tilt about each axis.",
+    0.0,
+    "arcsec",
+)
+RATE = Key(
+    "rate_hz", whole(10, 10_000), "Readings a second of each axis.", unit="Hz", example="100"
+)
+VOLTS_PER_G = Key(
+    "volts_per_g",
+    three(number(-1e6, 1e6), "a list of 3 numbers"),
+    "Nominal scale of x, y, z with its sign.",
+    unit="V/g",
+    example="[0.5, 0.5, 0.5]",
+)
+TURN = Key(
+    "turn_s",
+    number(0.0, 3600.0),
+    "Time to the next position, before the rig's own settling.",
+    10.0,
+    "s",
+)
+RAMP = Key("ramp_k_per_min", number(0.01, 100.0), "Rate of the chamber.", unit="K/min", example="2")
+SOAK = Key(
+    "soak_min",
+    number(0.0, 1440.0),
+    "Time that the unit takes to follow the chamber.",
+    unit="min",
+    example="60",
+)
+TEMPERATURES = Key(
+    "temperatures_degc",
+    rising(*PLAUSIBLE_DEGC, 2, CANDIDATES_MAX),
+    "Temperatures to choose from; the first and the last are the ends of the working range.",
+    unit="degC",
+    example="[-40, -10, 20, 50, 85]",
+)
+POSITIONS = Key(
+    "positions",
+    listed(word(tuple(TEST_POSITIONS)), range(100), "a list of names TP1 to TP6"),
+    "Positions to choose from; all six are needed.",
+    tuple(TEST_POSITIONS),
+    default_words="all six",
+)
+T0 = Key(
+    "t0_degc",
+    number(*PLAUSIBLE_DEGC),
+    "T0; one of the temperatures is within 2 degC of it.",
+    unit="degC",
+    example="20",
+)
+ORDER = Key(
+    "order",
+    whole(0, 9),
+    "Order of the polynomials that the constants follow over temperature.",
+    example="3",
+)
+TARGET = Key(
+    "expanded_micro_g",
+    number(1e-3, 1e6),
+    "Expanded uncertainty (95 %) that noise and repeatability may give.",
+    None,
+    "micro-g",
+    default_words="that of the usual plan",
+)
+PROBLEM = FileKeys(
+    "problem.toml",
+    "The question to `triaxcal design`",
+    (
+        TableKeys("", "", (FORMAT, DESCRIPTION)),
+        TableKeys("noise", "Noise of the readings.", (READING, FLOOR, REPEATABILITY)),
+        TableKeys("rig", "What the rig does.", (RATE, VOLTS_PER_G, TURN)),
+        TableKeys("chamber", "What the chamber does.", (RAMP, SOAK)),
+        TableKeys("candidates", "What the plan may use.", (TEMPERATURES, POSITIONS)),
+        TableKeys("curves", "What is fitted.", (T0, ORDER)),
+        TableKeys("target", "What is wanted.", (TARGET,)),
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -83,38 +165,27 @@ def read_problem(path: Path) -> Problem:
         When the file breaks a rule of docs/design.md, or the candidates cannot determine the
         constants; says which they leave open.
     """
-    tables = read_tables(path, _LAYOUT, FORMAT)
+    tables = PROBLEM.read(path)
     noise, rig, curves = tables["noise"], tables["rig"], tables["curves"]
-    chamber, target, candidates = tables["chamber"], tables["target"], tables["candidates"]
-    scale = [float(v) for v in rig.decimals("volts_per_g", 3)]
+    chamber, candidates, target = tables["chamber"], tables["candidates"], tables["target"][TARGET]
     problem = Problem(
         source=str(path),
-        reading_g=noise.number("reading_micro_g", 1e-3, 1e6) * 1e-6,
-        floor_g=_number(noise, "floor_micro_g", 0.0, 1e6) * 1e-6,
-        repeatability_rad=float(
-            np.radians(_number(noise, "repeatability_arcsec", 0.0, 36000.0) / 3600.0)
-        ),
-        rate_hz=rig.integer("rate_hz", 10, 10_000),
-        volts_per_g=(scale[0], scale[1], scale[2]),
-        turn_s=_number(rig, "turn_s", 0.0, 3600.0, 10.0),
-        ramp_k_per_min=chamber.number("ramp_k_per_min", 0.01, 100.0),
-        soak_s=60.0 * chamber.number("soak_min", 0.0, 1440.0),
-        temps_degc=candidates.rising(
-            "temperatures_degc", *PLAUSIBLE_DEGC, range(2, CANDIDATES_MAX + 1)
-        ),
-        t0_degc=curves.number("t0_degc", *PLAUSIBLE_DEGC),
-        order=curves.integer("order", 0, 9),
-        target_g=target.number("expanded_micro_g", 1e-3, 1e6) * 1e-6
-        if "expanded_micro_g" in target
-        else None,
+        reading_g=noise[READING] * 1e-6,
+        floor_g=noise[FLOOR] * 1e-6,
+        repeatability_rad=float(np.radians(noise[REPEATABILITY] / 3600.0)),
+        rate_hz=rig[RATE],
+        volts_per_g=rig[VOLTS_PER_G],
+        turn_s=rig[TURN],
+        ramp_k_per_min=chamber[RAMP],
+        soak_s=60.0 * chamber[SOAK],
+        temps_degc=candidates[TEMPERATURES],
+        t0_degc=curves[T0],
+        order=curves[ORDER],
+        target_g=None if target is None else target * 1e-6,
     )
     _refuse_blind_positions(candidates)
     _refuse_few_temperatures(problem, candidates)
     return problem
-
-
-def _number(table: Table, key: str, low: float, high: float, default: float = 0.0) -> float:
-    return table.number(key, low, high) if key in table else default
 
 
 def unobservable(positions: tuple[str, ...]) -> list[str]:
@@ -138,33 +209,29 @@ def unobservable(positions: tuple[str, ...]) -> list[str]:
     return words
 
 
-def _refuse_blind_positions(table: Table) -> None:
-    if "positions" not in table:
-        return
-    value = table.values["positions"]
-    if not isinstance(value, list) or not all(p in TEST_POSITIONS for p in value):
-        raise table.refuse("positions", "a list of names TP1 to TP6")
-    missing = [p for p in TEST_POSITIONS if p not in value]
+def _refuse_blind_positions(values: Values) -> None:
+    positions = values[POSITIONS]
+    missing = [p for p in TEST_POSITIONS if p not in positions]
     if not missing:
         return
-    left_open = unobservable(tuple(value))
+    left_open = unobservable(positions)
     found = f"{', '.join(missing)} left out"
     if left_open:
         found += "; not determined: " + "; ".join(left_open)
     else:
         found += "; the constants are determined, but no residual shows a mistake"
     raise RefusedError(
-        table.where("positions"), found, expected="all six", remedy="leave the key out"
+        values.where(POSITIONS), found, expected="all six", remedy="leave the key out"
     )
 
 
-def _refuse_few_temperatures(problem: Problem, table: Table) -> None:
+def _refuse_few_temperatures(problem: Problem, values: Values) -> None:
     temps, needed = problem.temps_degc, problem.order + 2
     if not any(abs(t - problem.t0_degc) <= T0_TOLERANCE_DEGC for t in temps):
-        raise table.refuse("temperatures_degc", f"one within {T0_TOLERANCE_DEGC:g} degC of t0_degc")
+        raise values.refuse(TEMPERATURES, f"one within {T0_TOLERANCE_DEGC:g} degC of t0_degc")
     if len(temps) < needed:
         raise RefusedError(
-            table.where("temperatures_degc"),
+            values.where(TEMPERATURES),
             f"{len(temps)} candidates; polynomials of order {problem.order} have "
             f"{problem.order + 1} coefficients",
             expected=f"{needed} candidates at least: with {problem.order + 1} temperatures the "

@@ -18,7 +18,15 @@ from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT, Turntable
 from triaxcal.dynamic.registry import extensions
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import GRAVITY, PLAUSIBLE_DEGC, SERIAL, TOP, UNIT_FILE, find_unit
+from triaxcal.unit.description import (
+    GRAVITY,
+    LATITUDE,
+    PLAUSIBLE_DEGC,
+    SERIAL,
+    TOP,
+    UNIT_FILE,
+    find_unit,
+)
 
 _RATE_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180, "deg/h": math.pi / 648000}
 _ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "arcsec": math.pi / 648000}
@@ -190,13 +198,6 @@ class DynamicTable:
     )
 
 
-LATITUDE = Key(
-    "latitude_deg",
-    number(-90.0, 90.0),
-    "Of the place, north positive.",
-    unit="deg",
-    example="50.45",
-)
 SITE = TableKeys("site", "Where the unit is turned.", (LATITUDE, GRAVITY))
 AZIMUTH = Key(
     "azimuth_deg",

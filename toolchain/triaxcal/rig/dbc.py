@@ -19,7 +19,6 @@ from triaxcal.rig.e2e import frame_crc
 from triaxcal.rig.frames import BoolArray, ByteArray, Frames
 from triaxcal.rig.signals import Signal
 
-LAYOUTS = ("classic", "fd")
 REQUIRED = MappingProxyType(
     {
         "RIG_XY": ("Crc", "Sequence", "AccelX", "AccelY"),

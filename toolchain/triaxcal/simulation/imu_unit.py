@@ -8,7 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.tomltable import Layout, Table, read_tables, read_toml
+from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values
+from triaxcal.base.kinds import Kind, listed, meaning, number, three, word
+from triaxcal.base.tomltable import read_toml
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording
 from triaxcal.readings.measurements import write_measurements
 from triaxcal.simulation.imu import simulate_imu
@@ -22,24 +24,87 @@ from triaxcal.simulation.imu_motion import (
     three_axes,
 )
 from triaxcal.simulation.imu_truth import ARCSEC
-from triaxcal.simulation.truth import SEED_MAX, check_seed
-from triaxcal.unit.description import find_unit
+from triaxcal.simulation.truth import SEED as SEED_KIND
+from triaxcal.simulation.truth import check_seed
+from triaxcal.unit.description import GRAVITY, LATITUDE, find_unit
 
-FORMAT = 1
 IMU_TRUTH_FILE = "imu_truth.toml"
 RECORDING_FILE = "recording.csv"
-_LAYOUT: Layout = {
-    "": {"format": True},
-    "unit": {"grade": True, "seed": True, "effects": False},
-    "motion": {
-        "rate_hz": True,
-        "minutes_per_axis": False,
-        "moves": False,
-        "still_s": True,
-        "table": True,
-        "temperature": True,
-    },
-}
+
+
+def _moves(rows: object) -> tuple[Move, ...]:
+    if not isinstance(rows, list) or not rows:
+        raise ValueError
+    moves = tuple(Move(*_THREE_NUMBERS.parse(row)) for row in rows)
+    for move in moves:
+        if not (0 < move.rate_deg_per_s <= 1000 and 0 <= move.stop_s <= 36000):
+            raise ValueError
+        if not move.rate_deg_per_s * _RAMP_S <= abs(move.angle_deg) <= 1e6:
+            raise ValueError
+    return moves
+
+
+_RAMP_S = RoughTable().ramp_s
+_THREE_NUMBERS = three(number(), "")
+GRADE = Key("grade", meaning(GRADES), "How good the sensors are.", example='"mems"')
+SEED = Key("seed", SEED_KIND, "Seed of the constants and the noise.", example="1")
+_EFFECTS = ", ".join(EFFECTS)
+IMU_EFFECTS = Key(
+    "effects",
+    listed(word(tuple(EFFECTS)), range(100), f"a list of names out of {_EFFECTS}"),
+    "Effects of the unit beyond the base model.",
+    (),
+    default_words="none",
+)
+RATE = Key("rate_hz", number(1.0, 1e4), "Samples a second.", unit="Hz", example="50")
+MINUTES = Key(
+    "minutes_per_axis",
+    number(0.5, 600.0),
+    "How long the usual moves are repeated, three at least. This or `moves`.",
+    None,
+    "min",
+    example="4",
+)
+MOVES = Key(
+    "moves",
+    Kind(
+        "a list of [angle in deg, rate in deg/s, stop in s] such as [-360, 30, 5], rates up to "
+        f"1000, stops up to 36000, each angle reaching its rate in {_RAMP_S:g} s",
+        _moves,
+        {"type": "array", "items": _THREE_NUMBERS.schema, "minItems": 1},
+    ),
+    "Moves of each axis: [angle in deg, rate in deg/s, stop in s], the angle signed.",
+    None,
+    example="[[360, 30, 5], [-360, 30, 5]]",
+)
+STILL = Key(
+    "still_s",
+    number(1.0, 36000.0),
+    "Stand-still before the first move of each axis.",
+    unit="s",
+    example="30",
+)
+TABLE = Key(
+    "table",
+    meaning({"rough": RoughTable(), "precise": PRECISE_TABLE}),
+    "rough: 1 deg off level, wobbling, no angles; precise: no wobble, its angle is recorded.",
+    example='"rough"',
+)
+TEMPERATURE = Key(
+    "temperature",
+    meaning({"constant": None, "warming": WARMING}),
+    "constant: 20 degC; warming: 20 to 45 degC, with waves.",
+    example='"constant"',
+)
+IMU_TRUTH = FileKeys(
+    IMU_TRUTH_FILE,
+    "What a simulated IMU is, and how it is moved",
+    (
+        TableKeys("", "", (FORMAT,)),
+        TableKeys("unit", "The sensors.", (GRADE, SEED, IMU_EFFECTS)),
+        TableKeys("motion", "The motion.", (RATE, MINUTES, MOVES, STILL, TABLE, TEMPERATURE)),
+    ),
+)
 
 
 def write_simulated_recording(folder: Path, seed: int | None = None) -> Path:
@@ -53,15 +118,13 @@ def write_simulated_recording(folder: Path, seed: int | None = None) -> Path:
     RefusedError
         When a file is missing or breaks a rule of docs/file-formats.md.
     """
-    tables = read_tables(folder / IMU_TRUTH_FILE, _LAYOUT, FORMAT)
+    tables = IMU_TRUTH.read(folder / IMU_TRUTH_FILE)
     unit, motion = tables["unit"], tables["motion"]
     if seed is None:
-        seed = unit.integer("seed", 0, SEED_MAX)
+        seed = unit[SEED]
     check_seed(seed, "seed")
-    grade = GRADES[unit.choice("grade", tuple(GRADES))]
-    truth = draw_truth(grade, seed, _effects(unit))
-    plan = _plan(folder, motion)
-    recording = simulate_imu(truth, plan, motion.number("rate_hz", 1.0, 1e4), seed)
+    truth = draw_truth(unit[GRADE], seed, unit[IMU_EFFECTS])
+    recording = simulate_imu(truth, _plan(folder, motion), motion[RATE], seed)
     target = folder / RECORDING_FILE
     write_measurements(target, _columns(recording), _rows(recording))
     return target
@@ -75,65 +138,30 @@ def planned_motion(folder: Path) -> tuple[ImuMotion, float]:
     RefusedError
         As `write_simulated_recording`.
     """
-    motion = read_tables(folder / IMU_TRUTH_FILE, _LAYOUT, FORMAT)["motion"]
-    return _plan(folder, motion), motion.number("rate_hz", 1.0, 1e4)
+    motion = IMU_TRUTH.read(folder / IMU_TRUTH_FILE)["motion"]
+    return _plan(folder, motion), motion[RATE]
 
 
-def _plan(folder: Path, motion: Table) -> ImuMotion:
+def _plan(folder: Path, motion: Values) -> ImuMotion:
     site = _site(find_unit(folder))
-    precise = motion.choice("table", ("rough", "precise")) == "precise"
-    warming = motion.choice("temperature", ("constant", "warming")) == "warming"
-    still_s = motion.number("still_s", 1.0, 36000.0)
-    if ("moves" in motion) == ("minutes_per_axis" in motion):
+    moves, minutes = motion[MOVES], motion[MINUTES]
+    if (moves is None) == (minutes is None):
         raise RefusedError(
-            f"{motion.where('moves')} and minutes_per_axis",
-            "both given" if "moves" in motion else "neither given",
+            f"{motion.where(MOVES)} and minutes_per_axis",
+            "neither given" if moves is None else "both given",
             expected="one of them: the moves of an axis, or how long the usual ones are repeated",
         )
-    given = None if "moves" not in motion else _moves(motion, RoughTable().ramp_s)
     plan = three_axes(
-        motion.number("minutes_per_axis", 0.5, 600.0) if given is None else 0.0,
-        still_s=still_s,
-        table=PRECISE_TABLE if precise else RoughTable(),
-        temperature=WARMING if warming else None,
-        moves=given,
+        minutes or 0.0,
+        still_s=motion[STILL],
+        table=motion[TABLE],
+        temperature=motion[TEMPERATURE],
+        moves=moves,
     )
-    return replace(
-        plan,
-        latitude_deg=site.number("latitude_deg", -90.0, 90.0),
-        gravity_m_per_s2=site.number("local_gravity_m_per_s2", 9.7, 9.9),
-    )
+    return replace(plan, latitude_deg=site[LATITUDE], gravity_m_per_s2=site[GRAVITY])
 
 
-def _moves(motion: Table, ramp_s: float) -> tuple[Move, ...]:
-    expected = (
-        "a list of [angle in deg, rate in deg/s, stop in s] such as [-360, 30, 5], rates up to "
-        f"1000, stops up to 36000, each angle reaching its rate in {ramp_s:g} s"
-    )
-    rows = motion.values["moves"]
-    if not isinstance(rows, list) or not rows:
-        raise motion.refuse("moves", expected)
-    for row in rows:
-        sound = (
-            isinstance(row, list)
-            and len(row) == 3
-            and all(type(value) in (int, float) and math.isfinite(value) for value in row)
-        )
-        if not sound or not (0 < row[1] <= 1000 and 0 <= row[2] <= 36000):
-            raise motion.refuse("moves", expected)
-        if not row[1] * ramp_s <= abs(row[0]) <= 1e6:
-            raise motion.refuse("moves", expected)
-    return tuple(Move(float(a), float(rate), float(stop)) for a, rate, stop in rows)
-
-
-def _effects(unit: Table) -> tuple[str, ...]:
-    effects = unit.values.get("effects", [])
-    if not isinstance(effects, list) or not all(effect in EFFECTS for effect in effects):
-        raise unit.refuse("effects", "a list of names out of " + ", ".join(EFFECTS))
-    return tuple(effects)
-
-
-def _site(path: Path) -> Table:
+def _site(path: Path) -> Values:
     """[site] of a unit.toml."""
     site = read_toml(path).get("site")
     values = site if isinstance(site, dict) else {}
@@ -144,7 +172,7 @@ def _site(path: Path) -> Table:
             "missing " + " and ".join(missing),
             expected="the place where the unit is simulated",
         )
-    return Table(str(path), "site", values)
+    return Values(str(path), "site", values)
 
 
 def _columns(recording: ImuRecording) -> tuple[str, ...]:

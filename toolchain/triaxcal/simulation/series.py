@@ -10,7 +10,7 @@ from __future__ import annotations
 import datetime
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +19,13 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.truth import (
-    IMPERFECTIONS,
-    SERIES_KEYS,
     TRUTH_FILE,
     Plan,
+    Spread,
     Truth,
     check_seed,
+    read_spread,
     read_truth,
-    read_truth_tables,
 )
 from triaxcal.simulation.unit import write_simulated_unit
 from triaxcal.unit.description import UNIT_FILE, read_unit
@@ -37,32 +36,6 @@ FIRST_DAY = datetime.date(2026, 1, 5)
 _STREAM = 4
 _OWN_AXIS = (0, 4, 8)
 _SERIAL = re.compile(r'(?m)^serial\s*=\s*"[^"]*"')
-
-
-@dataclass(frozen=True)
-class Spread:
-    """How the units of a series differ; standard deviations.
-
-    Attributes
-    ----------
-    scale_sd_ratio : float
-        Of Kxx, Kyy, Kzz, relative.
-    cross_axis_sd_v_per_g, bias_sd_v : float
-        Of the other entries of K, and of U0.
-    temperature_sd_ratio : float
-        Of each coefficient of dT, dT^2 and dT^3, relative to the template's.
-    units_per_run : int
-        Units measured on one day.
-    runs_between_moves : int
-        Days after which the rig is another: its tilts and its gravity are drawn anew.
-    """
-
-    scale_sd_ratio: float
-    cross_axis_sd_v_per_g: float
-    bias_sd_v: float
-    temperature_sd_ratio: float
-    units_per_run: int
-    runs_between_moves: int
 
 
 def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Iterator[Path]:
@@ -121,33 +94,6 @@ def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Itera
         yield folder
 
 
-def read_spread(folder: Path) -> Spread:
-    """Table [series] of a unit's truth.toml.
-
-    Raises
-    ------
-    RefusedError
-        When it is incomplete or a value is out of range.
-    """
-    table = read_truth_tables(folder)["series"]
-    missing = [key for key in SERIES_KEYS if key not in table]
-    if missing:
-        raise RefusedError(
-            f"{folder / TRUTH_FILE}, [series]",
-            "missing: " + ", ".join(missing),
-            expected="how the units of a series differ",
-            remedy="add them, as docs/file-formats.md tells",
-        )
-    return Spread(
-        scale_sd_ratio=table.number("scale_sd_ratio", 0.0, 0.1),
-        cross_axis_sd_v_per_g=table.number("cross_axis_sd_v_per_g", 0.0, 1.0),
-        bias_sd_v=table.number("bias_sd_v", 0.0, 1.0),
-        temperature_sd_ratio=table.number("temperature_sd_ratio", 0.0, 1.0),
-        units_per_run=table.integer("units_per_run", 1, COUNT_MAX),
-        runs_between_moves=table.integer("runs_between_moves", 1, COUNT_MAX),
-    )
-
-
 def drawn(coefficients: FloatArray, spread: Spread, rng: np.random.Generator) -> FloatArray:
     """One unit's coefficients (12, 4) about the template's."""
     draws = rng.standard_normal(coefficients.shape)
@@ -166,7 +112,7 @@ def truth_text(truth: Truth, plan: Plan, coefficients: FloatArray, seed: int, ri
         f"{name} = {[float(c) for c in row]}"
         for name, row in zip(CONSTANT_NAMES, coefficients, strict=True)
     )
-    wrong = "\n".join(f"{key} = {getattr(truth.imperfections, key)!r}" for key in IMPERFECTIONS)
+    wrong = "\n".join(f"{name} = {value!r}" for name, value in asdict(truth.imperfections).items())
     return f"""# One unit of a simulated series; docs/file-formats.md explains every key.
 format = 1
 

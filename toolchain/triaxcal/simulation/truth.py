@@ -2,79 +2,73 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.tomltable import Layout, Table, read_tables, shown
+from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values, key, keys_of
+from triaxcal.base.kinds import Kind, listed, number, rising, whole
+from triaxcal.base.tomltable import shown
 from triaxcal.model.metrological import CONSTANT_NAMES, voltage_from_force
 from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unit.description import PLAUSIBLE_DEGC, Adc
 
-FORMAT = 1
 TRUTH_FILE = "truth.toml"
 SEED_MAX = 2**63 - 1
-IMPERFECTIONS = {
-    "squareness_sd_arcsec": 36000.0,
-    "repeatability_sd_arcsec": 36000.0,
-    "level_sd_arcsec": 36000.0,
-    "gravity_sd_m_per_s2": 0.1,
-    "thermometer_offset_sd_degc": 10.0,
-}
-"""Keys of [imperfections] and the largest value of each."""
-
-SERIES_KEYS = (
-    "scale_sd_ratio",
-    "cross_axis_sd_v_per_g",
-    "bias_sd_v",
-    "temperature_sd_ratio",
-    "units_per_run",
-    "runs_between_moves",
-)
-"""Keys of [series], which `simulation.series` reads."""
-
-_LAYOUT: Layout = {
-    "": {"format": True},
-    "curves": {"t0_degc": True, **dict.fromkeys(CONSTANT_NAMES, True)},
-    "noise": {"reading_sd_v": True, "thermometer_sd_degc": True, "dwell_temp_sd_degc": True},
-    "plan": {
-        "seed": True,
-        "readings_per_dwell": True,
-        "temperatures_degc": True,
-        "check_temperatures_degc": True,
-        "rig_seed": False,
-    },
-    "imperfections": dict.fromkeys(IMPERFECTIONS, False),
-    "series": dict.fromkeys(SERIES_KEYS, False),
-}
+SEED: Kind[int] = replace(whole(0, SEED_MAX), expected="a whole number from 0 to 2^63 - 1")
 
 
 @dataclass(frozen=True)
 class Imperfections:
-    """Standard deviations of what is wrong with the rig; one draw a seed unless said otherwise.
+    """[imperfections]: standard deviations of what is wrong with the rig."""
 
-    Attributes
-    ----------
-    squareness_sd_arcsec : float
-        Tilt of each test position, about each axis; the same at all temperatures.
-    repeatability_sd_arcsec : float
-        Tilt of each dwell, about each axis.
-    level_sd_arcsec : float
-        Rotation of the whole rig against the unit's axes, about each axis.
-    gravity_sd_m_per_s2 : float
-        Gravity at the rig against the one in unit.toml.
-    thermometer_offset_sd_degc : float
-        What the thermometer shows too much, at all temperatures.
-    """
+    squareness_sd_arcsec: float = key(
+        number(0.0, 36000.0),
+        "Tilt of each test position about each axis, one draw a seed for all temperatures.",
+        0.0,
+        "arcsec",
+    )
+    repeatability_sd_arcsec: float = key(
+        number(0.0, 36000.0), "Tilt of each dwell about each axis.", 0.0, "arcsec"
+    )
+    level_sd_arcsec: float = key(
+        number(0.0, 36000.0),
+        "Rotation of the whole rig against the unit, about each axis, one draw a seed.",
+        0.0,
+        "arcsec",
+    )
+    gravity_sd_m_per_s2: float = key(
+        number(0.0, 0.1),
+        "True gravity against local_gravity_m_per_s2 in unit.toml, one draw a seed.",
+        0.0,
+        "m/s^2",
+    )
+    thermometer_offset_sd_degc: float = key(
+        number(0.0, 10.0), "What the thermometer shows too much, one draw a seed.", 0.0, "degC"
+    )
 
-    squareness_sd_arcsec: float = 0.0
-    repeatability_sd_arcsec: float = 0.0
-    level_sd_arcsec: float = 0.0
-    gravity_sd_m_per_s2: float = 0.0
-    thermometer_offset_sd_degc: float = 0.0
+
+@dataclass(frozen=True)
+class Spread:
+    """[series]: how the units of a series differ; standard deviations."""
+
+    scale_sd_ratio: float = key(number(0.0, 0.1), "Of Kxx, Kyy, Kzz, relative.", example="0.01")
+    cross_axis_sd_v_per_g: float = key(
+        number(0.0, 1.0), "Of the other entries of K.", unit="V/g", example="0.001"
+    )
+    bias_sd_v: float = key(number(0.0, 1.0), "Of U0.", unit="V", example="0.001")
+    temperature_sd_ratio: float = key(
+        number(0.0, 1.0), "Of each coefficient of dT, dT^2, dT^3, relative.", example="0.1"
+    )
+    units_per_run: int = key(whole(1, 9999), "Units measured on one day.", example="8")
+    runs_between_moves: int = key(
+        whole(1, 9999),
+        "Days after which the rig is another: its tilts and its gravity are drawn anew.",
+        example="5",
+    )
 
 
 @dataclass(frozen=True)
@@ -85,20 +79,25 @@ class Truth:
     ----------
     constants : ThermalModel
         Cubic curves of the twelve constants.
-    reading_sd_v : float
-        Noise of one reading of each axis, V.
-    thermometer_sd_degc : float
-        Noise of one reading of the thermometer.
-    dwell_temp_sd_degc : float
-        Spread of the dwells' true temperatures about the nominal ones.
+    reading_sd_v, thermometer_sd_degc, dwell_temp_sd_degc : float
+        [noise] of truth.toml.
     imperfections : Imperfections
         Of the rig; none by default.
     """
 
     constants: ThermalModel
-    reading_sd_v: float
-    thermometer_sd_degc: float
-    dwell_temp_sd_degc: float
+    reading_sd_v: float = key(
+        number(0.0, 1.0), "Noise of one reading of an axis.", unit="V", example="1e-5"
+    )
+    thermometer_sd_degc: float = key(
+        number(0.0, 10.0), "Noise of one reading of the thermometer.", unit="degC", example="0.01"
+    )
+    dwell_temp_sd_degc: float = key(
+        number(0.0, 10.0),
+        "Spread of the dwells' true temperatures about the nominal ones.",
+        unit="degC",
+        example="0.05",
+    )
     imperfections: Imperfections = Imperfections()
 
     def voltage_v(self, force_g: FloatArray, temp_degc: FloatArray | float) -> FloatArray:
@@ -115,25 +114,66 @@ class Truth:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is measured: each test position at each temperature, each check position likewise.
+    """[plan]: what is measured, each test position and check position at its temperatures."""
 
-    Attributes
-    ----------
-    seed : int
-        Seed of the noise.
-    readings_per_dwell : int
-        Readings in each mean.
-    temperatures_degc, check_temperatures_degc : tuple of float
-        Nominal temperatures of TP1..TP6 and of CP1..CP6, rising.
-    rig_seed : int or None
-        Seed of the rig that units measured on it share; None draws a rig for this unit.
-    """
+    seed: int = key(SEED, "Seed of all noise; `--seed` replaces it.", example="1")
+    # Two readings at least: a standard deviation of one has no meaning.
+    readings_per_dwell: int = key(whole(2, 10**6), "Readings in each mean.", example="1000")
+    temperatures_degc: tuple[float, ...] = key(
+        rising(*PLAUSIBLE_DEGC, 0, 64),
+        "Nominal temperatures of TP1 to TP6.",
+        unit="degC",
+        example="[-40, -10, 20, 50, 85]",
+    )
+    check_temperatures_degc: tuple[float, ...] = key(
+        rising(*PLAUSIBLE_DEGC, 0, 64),
+        "Nominal temperatures of CP1 to CP6.",
+        unit="degC",
+        example="[20]",
+    )
+    rig_seed: int | None = key(
+        SEED,
+        "Seed of the rig; units with the same one are measured on the same rig.",
+        None,
+        default_words="a rig of its own",
+    )
 
-    seed: int
-    readings_per_dwell: int
-    temperatures_degc: tuple[float, ...]
-    check_temperatures_degc: tuple[float, ...]
-    rig_seed: int | None = None
+
+T0 = Key("t0_degc", number(*PLAUSIBLE_DEGC), "Where dT = 0.", unit="degC", example="20")
+_CUBIC = listed(number(), range(4, 5), "a list of 4 numbers")
+CURVES = tuple(
+    Key(
+        name,
+        _CUBIC,
+        "Bias c0 + c1 dT + c2 dT^2 + c3 dT^3."
+        if name.startswith("U0")
+        else "Output of the first axis for 1 g along the second: c0 + c1 dT + c2 dT^2 + c3 dT^3.",
+        unit="V, per degC^n" if name.startswith("U0") else "V/g, per degC^n",
+        example="[0.5, 0, 0, 0]" if name in ("Kxx", "Kyy", "Kzz") else "[0, 0, 0, 0]",
+    )
+    for name in CONSTANT_NAMES
+)
+TRUTH = FileKeys(
+    TRUTH_FILE,
+    "What a simulated unit exactly is",
+    (
+        TableKeys("", "", (FORMAT,)),
+        TableKeys("curves", "The constants over temperature.", (T0, *CURVES)),
+        TableKeys("noise", "Noise of the readings.", keys_of(Truth)),
+        TableKeys("plan", "What is measured.", keys_of(Plan)),
+        TableKeys(
+            "imperfections",
+            "What is wrong with the rig, as standard deviations.",
+            keys_of(Imperfections),
+        ),
+        TableKeys(
+            "series",
+            "How units of a series differ (`triaxcal simulate UNIT --series N --into FOLDER`).",
+            keys_of(Spread),
+            optional=True,
+        ),
+    ),
+)
 
 
 def codes_of_voltage(adc: Adc, voltage_v: FloatArray) -> IntArray:
@@ -150,33 +190,32 @@ def read_truth(folder: Path) -> tuple[Truth, Plan]:
     RefusedError
         When the file cannot be read or breaks a rule of docs/file-formats.md.
     """
-    tables = read_truth_tables(folder)
-    noise, wrong = tables["noise"], tables["imperfections"]
-    truth = Truth(
+    tables = TRUTH.read(folder / TRUTH_FILE)
+    truth = tables["noise"].record(
+        Truth,
         constants=_curves(tables["curves"]),
-        reading_sd_v=noise.number("reading_sd_v", 0.0, 1.0),
-        thermometer_sd_degc=noise.number("thermometer_sd_degc", 0.0, 10.0),
-        dwell_temp_sd_degc=noise.number("dwell_temp_sd_degc", 0.0, 10.0),
-        imperfections=Imperfections(
-            **{
-                key: wrong.number(key, 0.0, high)
-                for key, high in IMPERFECTIONS.items()
-                if key in wrong
-            }
-        ),
+        imperfections=tables["imperfections"].record(Imperfections),
     )
-    return truth, _plan(tables["plan"])
+    return truth, tables["plan"].record(Plan)
 
 
-def read_truth_tables(folder: Path) -> dict[str, Table]:
-    """Tables of a unit's truth.toml, keys checked.
+def read_spread(folder: Path) -> Spread:
+    """Table [series] of a unit's truth.toml.
 
     Raises
     ------
     RefusedError
-        When the file cannot be read, or has other keys than docs/file-formats.md says.
+        When it is missing or incomplete, or a value is out of range.
     """
-    return read_tables(folder / TRUTH_FILE, _LAYOUT, FORMAT)
+    values = TRUTH.read(folder / TRUTH_FILE)["series"]
+    if not values:
+        raise RefusedError(
+            f"{folder / TRUTH_FILE}",
+            "no table [series]",
+            expected="how the units of a series differ",
+            remedy="add it, as docs/reference/file-formats.md says",
+        )
+    return values.record(Spread)
 
 
 def check_seed(seed: int, where: str) -> None:
@@ -191,24 +230,10 @@ def check_seed(seed: int, where: str) -> None:
         raise RefusedError(where, f"found {shown(seed)}", expected="a whole number, 0 to 2^63 - 1")
 
 
-def _curves(table: Table) -> ThermalModel:
-    t0_degc = table.number("t0_degc", *PLAUSIBLE_DEGC)
-    rows = [[float(c) for c in table.decimals(name, 4)] for name in CONSTANT_NAMES]
+def _curves(values: Values) -> ThermalModel:
     curves = PiecewisePolynomial(
         breaks_degc=PLAUSIBLE_DEGC,
-        origins_degc=(t0_degc,),
-        coefficients=np.array([rows], dtype=np.float64),
+        origins_degc=(values[T0],),
+        coefficients=np.array([[values[curve] for curve in CURVES]], dtype=np.float64),
     )
-    return ThermalModel(kind="polynomial", t0_degc=t0_degc, curves=curves)
-
-
-def _plan(table: Table) -> Plan:
-    lengths = range(65)
-    return Plan(
-        seed=table.integer("seed", 0, SEED_MAX),
-        # Two readings at least: a standard deviation of one has no meaning.
-        readings_per_dwell=table.integer("readings_per_dwell", 2, 1_000_000),
-        temperatures_degc=table.rising("temperatures_degc", *PLAUSIBLE_DEGC, lengths),
-        check_temperatures_degc=table.rising("check_temperatures_degc", *PLAUSIBLE_DEGC, lengths),
-        rig_seed=table.integer("rig_seed", 0, SEED_MAX) if "rig_seed" in table else None,
-    )
+    return ThermalModel(kind="polynomial", t0_degc=values[T0], curves=curves)

@@ -16,10 +16,10 @@ from triaxcal.base.kinds import (
     Kind,
     checked,
     interval,
-    listed,
     number,
     pattern,
     rising,
+    three,
     whole,
     word,
 )
@@ -69,6 +69,13 @@ GRAVITY = Key(
     "Gravity at the place of the measurements; g is this / 9.80665.",
     unit="m/s^2",
     example="9.8111",
+)
+LATITUDE = Key(
+    "latitude_deg",
+    number(-90.0, 90.0),
+    "Of the place, north positive.",
+    unit="deg",
+    example="50.45",
 )
 
 
@@ -320,9 +327,8 @@ class _Compensation:
 
 POLARITY = Key(
     "polarity",
-    listed(
+    three(
         checked(lambda v: type(v) is int and abs(v) == 1, "a sign", {"enum": [1, -1]}),
-        range(3, 4),
         "a list of three signs, each 1 or -1",
     ),
     "Signs of Kxx, Kyy, Kzz, where they differ.",
@@ -499,7 +505,6 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
     thermal, fit = tables["thermal"], tables["fit"].record(_Fit)
     compensation = tables["compensation"].record(_Compensation)
     recording = recording_layout(tables["recording"]) if "recording" in tables else None
-    polarity = tables["sensor"][POLARITY]
     _ = tables[""][DESCRIPTION]  # for people; checked all the same
     return UnitDescription(
         name=name,
@@ -509,7 +514,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         gravity_g=tables["site"][GRAVITY] / STANDARD_GRAVITY_M_PER_S2,
         t0_degc=thermal[T0],
         range_degc=thermal[RANGE_DEGC],
-        polarity=None if polarity is None else (polarity[0], polarity[1], polarity[2]),
+        polarity=tables["sensor"][POLARITY],
         estimator=fit.estimator,
         thermal=_thermal_choice(thermal),
         method=compensation.method,
