@@ -109,7 +109,7 @@ def test_too_short_a_recording_is_refused(unit: Path) -> None:
 
 
 def test_the_docs_name_every_key_of_an_imu_with_its_table() -> None:
-    text = (REPO / "docs/reference/file-formats.md").read_text(encoding="utf-8")
+    text = (REPO / "docs/reference/keys.md").read_text(encoding="utf-8")
     section = text.split("## unit.toml of an IMU")[1].split("\n## ")[0]
     table, documented = "", set()
     for line in section.splitlines():

@@ -482,7 +482,7 @@ def test_a_copied_unit_is_told_by_its_serial(tmp_path: Path) -> None:
 
 
 def test_the_docs_name_every_key_with_its_table() -> None:
-    text = (REPO / "docs/reference/file-formats.md").read_text(encoding="utf-8")
+    text = (REPO / "docs/reference/keys.md").read_text(encoding="utf-8")
     section = text.split("## unit.toml")[1].split("## measurements.csv")[0]
     table = ""
     documented = set()
@@ -497,6 +497,6 @@ def test_the_docs_name_every_key_with_its_table() -> None:
 
 
 def test_the_example_of_the_docs_is_read(tmp_path: Path) -> None:
-    text = (REPO / "docs/reference/file-formats.md").read_text(encoding="utf-8")
+    text = (REPO / "docs/reference/keys.md").read_text(encoding="utf-8")
     example = text.split("```toml\n")[1].split("```")[0]
     assert read_unit(make_unit(tmp_path, example)).serial == "SN-0042"
