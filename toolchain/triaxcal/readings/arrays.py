@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,9 +74,9 @@ class ArraySource(Source):
         pieces = Pieces(self._path, self.names, numbers, texts)
         for start in range(0, count, PIECE):
             part = slice(start, min(start + PIECE, count))
-            yield pieces.block(partial(self._cut, part))
+            yield pieces.block({k: self._cut(k, part) for k in pieces.wanted})
 
-    def _cut(self, part: slice, k: int) -> Any:
+    def _cut(self, k: int, part: slice) -> Any:
         _, array, field, inner = self._columns[k]
         if not field:
             return np.asarray(array[part] if inner is None else array[part, inner])
@@ -94,7 +93,7 @@ class Pieces:
     names : sequence of str
         Of all columns, for messages.
     numbers, texts : indices into `names`
-        As of `Source.blocks`.
+        As of `Source.blocks`; `wanted` has both, each once and in order.
     """
 
     def __init__(
@@ -104,14 +103,15 @@ class Pieces:
         self._numbers, self._texts = numbers, texts
         self._count = 0
         self._starts: dict[int, int] = {}
+        self.wanted = sorted({*numbers, *texts})
 
-    def block(self, values_of: Callable[[int], Any], rows: IntArray | None = None) -> Block:
+    def block(self, columns: Mapping[int, Any], rows: IntArray | None = None) -> Block:
         """Block of the next piece.
 
         Parameters
         ----------
-        values_of : callable
-            Values of a column in this piece by its index, shape (n,), of any type.
+        columns : mapping of int to arrays of shape (n,)
+            Values in this piece, of any type, of the columns `wanted`.
         rows : array, shape (n,), or None
             None counts them.
 
@@ -120,8 +120,7 @@ class Pieces:
         RefusedError
             Where a column of numbers holds text or dates.
         """
-        columns = {k: np.asarray(values_of(k)) for k in {*self._numbers, *self._texts}}
-        count = len(next(iter(columns.values())))
+        count = len(columns[self.wanted[0]])
         if rows is None:
             rows = np.arange(self._count + 1, self._count + count + 1)
         self._count += count
@@ -139,6 +138,15 @@ class Pieces:
                     remedy="write the column as numbers, or name another",
                 ) from error
         return Block(numbers, tuple(texts_of(columns[k]) for k in self._texts), rows)
+
+
+def column_of(values: Sequence[Any]) -> Any:
+    """Array of values of any kinds; a text among numbers does not make them texts."""
+    if {type(value) for value in values} <= {int, float}:
+        return np.asarray(values)
+    array = np.empty(len(values), dtype=object)
+    array[:] = values
+    return array
 
 
 def _start(values: Any) -> int:

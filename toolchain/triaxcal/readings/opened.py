@@ -140,7 +140,7 @@ class RecordingFile:
         except RefusedError:
             raise
         except ImportError as error:
-            raise self._missing(error.name or str(error)) from error
+            raise self._missing((error.name or str(error)).split(".")[0]) from error
         except Exception as error:
             if not self._format.package:
                 raise

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
 from triaxcal.readings.arrays import ArraySource
 from triaxcal.readings.format import Format, Source, starts_with
 from triaxcal.unit.recordingfile import FileLayout
@@ -17,14 +16,6 @@ from triaxcal.unit.recordingfile import FileLayout
 def _open(path: Path, layout: FileLayout) -> Source:
     from scipy.io import loadmat  # noqa: PLC0415  slow to import
 
-    with path.open("rb") as file:
-        if b"MATLAB 7.3" in file.read(128):
-            raise RefusedError(
-                str(path),
-                "a MAT-file of version 7.3",
-                expected="version 5 to 7.2",
-                remedy="save it in MATLAB with save(..., '-v7')",
-            )
     loaded = loadmat(path, squeeze_me=True, struct_as_record=False)
     found = {name: value for name, value in loaded.items() if not name.startswith("__")}
     return ArraySource(str(path), _arrays(found), layout)
@@ -47,7 +38,8 @@ def _arrays(found: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 ENTRY = Format(
     name="mat",
     label="a MAT-file",
-    doc="A matrix by column numbers, or vectors and fields of structures by name.",
+    doc="A column is a vector by its name, as imu.ax for a field of a structure, or of a matrix, "
+    "as acc[0]; of one matrix, a number from 1. Loaded whole.",
     open=_open,
     extensions=(".mat",),
     sniff=starts_with(b"MATLAB"),

@@ -1,0 +1,392 @@
+"""Every format: the same readings exactly, damage and missing packages in one line."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from written import CASES, Case, Times, readings
+
+from recordings import recording
+from triaxcal.base.errors import RefusedError
+from triaxcal.model.types import FloatArray
+from triaxcal.readings.format import FORMATS
+from triaxcal.readings.opened import RecordingFile
+from triaxcal.unit.recordingfile import FileLayout
+
+LAYOUT = FileLayout("recording")
+every_format = pytest.mark.parametrize("name", CASES)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Writes the recording of `readings` in a format, once."""
+    folder = tmp_path_factory.mktemp("written")
+
+    def written(name: str) -> Path:
+        pytest.importorskip(FORMATS[CASES[name].format].package)
+        path = folder / CASES[name].file
+        if not path.exists():
+            CASES[name].write(path, *readings())
+        return path
+
+    return written
+
+
+def read(path: Path, case: Case) -> tuple[FloatArray, FloatArray, RecordingFile]:
+    """Times in the unit of the file from the first, readings, and the file."""
+    file = RecordingFile(path, LAYOUT)
+    columns = [file.index(column, "acceleration") for column in case.columns]
+    if case.time is None:
+        time, unit = file.source.clocks[file.source.tables[columns[0]]]
+        assert unit == case.unit
+    else:
+        time = file.index(case.time, "time")
+    rows = np.concatenate([block.numbers for block in file.blocks([time, *columns])])
+    return rows[:, 0] - rows[0, 0], rows[:, 1:], file
+
+
+@every_format
+def test_readings_and_times_are_those_written(name: str, files: Callable[[str], Path]) -> None:
+    t_us, a = readings()
+    time, found, file = read(files(name), CASES[name])
+    assert np.array_equal(found, a)
+    if CASES[name].unit == "s":
+        # Microseconds as doubles of at most 64 s: half a unit of the last place, 4e-15 s.
+        assert np.abs(time * 1e6 - (t_us - t_us[0])).max() < 1e-8
+    else:
+        assert np.array_equal(time, (t_us - t_us[0]) * {"us": 1, "ns": 1000}[CASES[name].unit])
+    assert file.source.findings == ()
+
+
+@every_format
+def test_the_format_is_found_whatever_the_file_is_called(
+    name: str, files: Callable[[str], Path], tmp_path: Path
+) -> None:
+    path = files(name)
+    if name == "ros1":
+        pytest.skip("rosbags tells ROS 1 from ROS 2 by the name .bag")
+    if name in {"ros2", "mcap"}:
+        pytest.skip("rosbags tells the storage of ROS 2 by the name")
+    other = tmp_path / "recording"
+    shutil.copy(path, other)
+    assert np.array_equal(read(other, CASES[name])[1], readings()[1])
+
+
+def _cut(content: bytes) -> bytes:
+    return content[: int(0.6 * len(content))]
+
+
+def _start_only(content: bytes) -> bytes:
+    return content[:20]
+
+
+def _start_overwritten(content: bytes) -> bytes:
+    noise = np.random.default_rng(0).bytes(300)
+    return content[:32] + noise + content[332:]
+
+
+def _middle_overwritten(content: bytes) -> bytes:
+    half = len(content) // 2
+    return content[:half] + np.random.default_rng(0).bytes(300) + content[half + 300 :]
+
+
+DAMAGES = (_cut, _start_only, _start_overwritten, _middle_overwritten)
+CUT_IS_READ = {"ulog", "dataflash"}
+"""Loggers write these message by message, and a power cut ends them anywhere."""
+BARE = {
+    ("hdf5", _middle_overwritten),
+    ("mat5", _middle_overwritten),
+    ("mat73", _middle_overwritten),
+    ("mat73", _start_overwritten),
+    ("npy", _middle_overwritten),
+    ("mf4", _middle_overwritten),
+    ("mcap", _middle_overwritten),
+    ("parquet", _start_overwritten),
+}
+"""Bytes of readings, which these formats do not protect, or of what is not read: not to be seen."""
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@every_format
+def test_damage_is_one_line(
+    name: str,
+    damage: Callable[[bytes], bytes],
+    files: Callable[[str], Path],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    if (name, damage) in BARE:
+        pytest.skip("this format does not show it")
+    path = tmp_path / CASES[name].file
+    source = files(name)
+    if source.is_dir():
+        shutil.copytree(source, path)
+        (inner,) = path.glob("*.db3")
+    else:
+        inner = Path(shutil.copy(source, path))
+    inner.write_bytes(damage(inner.read_bytes()))
+    capfd.readouterr()
+    if name in CUT_IS_READ and damage is _cut:
+        _, a, file = read(path, CASES[name])
+        assert np.array_equal(a, readings()[1][: len(a)])
+        assert len(a) > 1000
+        assert file.source.findings == (
+            "the log ends within a message: it was cut, and is read to there",
+        )
+        return
+    with pytest.raises(RefusedError) as refusal:
+        read(path, CASES[name])
+    text = str(refusal.value)
+    assert text.startswith(str(path))
+    assert "\n" not in text
+    if (name, damage) != ("dataflash", _start_only):  # 20 bytes of it are the start of a message
+        assert "damaged" in text
+    assert capfd.readouterr() == ("", "")
+
+
+EXTRAS = {entry.package: entry.extra for entry in FORMATS if entry.extra != "recordings"}
+
+
+def test_every_optional_package_has_its_extra() -> None:
+    import tomllib
+
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())
+    extras = project["project"]["optional-dependencies"]
+    assert all(
+        any(line.startswith(package) for line in extras[extra]) for package, extra in EXTRAS.items()
+    )
+    assert extras["recordings"] == [
+        f"triaxcal[{','.join(e for e in extras if e in EXTRAS.values())}]"
+    ]
+
+
+MAGIC = {
+    "pyarrow": b"PAR1",
+    "h5py": b"\x89HDF\r\n\x1a\n",
+    "openpyxl": b"PK\x03\x04" + bytes(26) + b"[Content_Types].xml",
+    "pyulog": b"ULog\x01\x12\x35",
+    "rosbags": b"#ROSBAG V2.0\n",
+    "pymavlink": b"\xa3\x95\x80\x80",
+    "asammdf": b"MDF     4.10",
+}
+
+
+@pytest.mark.parametrize("package", MAGIC)
+def test_a_missing_package_names_the_command(
+    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "log"
+    path.write_bytes(MAGIC[package])
+    monkeypatch.setitem(sys.modules, package, None)  # as if it were not installed
+    (label,) = [e.label for e in FORMATS if e.package == package and e.sniff(MAGIC[package])]
+    with pytest.raises(RefusedError) as refusal:
+        RecordingFile(path, LAYOUT)
+    assert str(refusal.value) == (
+        f"{path}: the package {package} is missing; expected it, to read {label}; "
+        f"install it: pip install 'triaxcal[{EXTRAS[package]}]'"
+    )
+
+
+def test_a_package_that_lacks_another_is_named_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("rosbags")
+    path = tmp_path / "log.bag"
+    path.write_bytes(MAGIC["rosbags"])
+    for module in [name for name in sys.modules if name.startswith("rosbags")]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "lz4.frame", None)
+    with pytest.raises(RefusedError, match=r"package lz4 is missing; .*'triaxcal\[ros\]'"):
+        RecordingFile(path, LAYOUT)
+
+
+# ---- Two columns of one name ----
+
+
+def refused(path: Path, column: str | int, layout: FileLayout = LAYOUT) -> str:
+    with pytest.raises(RefusedError) as refusal:
+        RecordingFile(path, layout).index(column, "acceleration")
+    return str(refusal.value).removeprefix(f"{path}: ")
+
+
+def values(path: Path, column: str | int, layout: FileLayout = LAYOUT) -> list[float]:
+    file = RecordingFile(path, layout)
+    return [x for b in file.blocks([file.index(column, "x")]) for x in b.numbers[:, 0].tolist()]
+
+
+TWICE = (
+    "2 columns 'ax' ([recording] acceleration); expected one of that name; give its number from 1"
+)
+
+
+def test_parquet_twice(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path = tmp_path / "log.parquet"
+    table = pyarrow.Table.from_arrays([pyarrow.array([1]), pyarrow.array([2])], names=["ax", "ax"])
+    parquet.write_table(table, path)
+    assert refused(path, "ax") == TWICE
+    assert values(path, 2) == [2.0]
+
+
+def test_excel_twice(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    path = tmp_path / "log.xlsx"
+    book = openpyxl.Workbook()
+    book.active.title = "imu"
+    for row in (["ax", "ax", "az"], [1, 2, 3], [None] * 3, [4, None, 6]):
+        book.active.append(row)
+    book.save(path)
+    assert refused(path, "ax") == TWICE
+    assert values(path, "az") == [3.0, 6.0]
+    second = values(path, 2)
+    assert second[0] == 2.0
+    assert np.isnan(second[1])
+
+
+def test_json_twice(tmp_path: Path) -> None:
+    path = tmp_path / "log.json"
+    path.write_text('{"ax": [1], "ax": [2]}')
+    assert refused(path, "ax") == "damaged, or not JSON: two values of one name, 'ax'"
+
+
+def test_mf4_in_two_groups(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    path = tmp_path / "log.mf4"
+    with asammdf.MDF(version="4.10") as file:
+        for k in range(2):
+            file.append(asammdf.Signal(np.array([k, k]) * 1.0, np.array([0.0, 1.0]), name="ax"))
+        file.save(path)
+    assert refused(path, "ax") == (
+        "2 columns 'ax' ([recording] acceleration); expected one of group0.ax, group1.ax"
+    )
+    assert values(path, "group1.ax") == [1.0, 1.0]
+    assert values(path, "ax", FileLayout("recording", variable="group1")) == [1.0, 1.0]
+
+
+# ---- Particular to a format ----
+
+
+def test_columns_of_two_topics_are_refused(files: Callable[[str], Path]) -> None:
+    file = RecordingFile(files("ulog"), LAYOUT)
+    names = ("sensor_accel[1].xyz[0]", "vehicle_status.arming_state")
+    with pytest.raises(RefusedError, match="columns of several tables: sensor_accel") as refusal:
+        list(file.blocks([file.index(name, "acceleration") for name in names]))
+    assert refusal.value.expected == "columns of one table, which has one clock"
+
+
+def test_the_sensors_own_time_in_a_bag(files: Callable[[str], Path]) -> None:
+    file = RecordingFile(files("ros2"), LAYOUT)
+    (block,) = file.blocks([file.index("/imu/data.header.stamp", "time")])
+    t_us, _ = readings()
+    assert np.array_equal(block.numbers[:, 0], (t_us - t_us[0]) * 1000)
+
+
+def test_a_wrong_topic_is_corrected(files: Callable[[str], Path]) -> None:
+    file = RecordingFile(files("ros1"), LAYOUT)
+    with pytest.raises(RefusedError, match=r'did you mean "/imu/data\.linear_acceleration\.x"\?'):
+        file.index("/imu/dat.linear_acceleration.x", "acceleration")
+
+
+def test_a_topic_may_be_named_once(files: Callable[[str], Path]) -> None:
+    layout = FileLayout("recording", variable="/imu/data")
+    file = RecordingFile(files("ros1"), layout)
+    names = file.source.names
+    assert names[file.index("time", "time")] == "/imu/data.time"
+    assert names[file.index("linear_acceleration.y", "a")] == "/imu/data.linear_acceleration.y"
+
+
+def test_an_excel_sheet_without_names_is_numbered(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    path = tmp_path / "log.xlsx"
+    book = openpyxl.Workbook()
+    book.create_sheet("raw").append([0.5, 1.5])
+    book["raw"].append([2.5, "n/a"])
+    book.save(path)
+    layout = FileLayout("recording", variable="raw")
+    assert values(path, 1, layout) == [0.5, 2.5]
+    with pytest.raises(RefusedError, match=r"row 2, column : found 'n/a'; expected a number"):
+        values(path, 2, layout)
+
+
+def test_json_lines_name_the_damaged_one(tmp_path: Path) -> None:
+    path = tmp_path / "log.jsonl"
+    path.write_text('{"ax": 1}\n{"ax": 2}\n{"ax": \n')
+    with pytest.raises(RefusedError) as refusal:
+        values(path, "ax")
+    assert str(refusal.value).startswith(f"{path}, line 3: damaged JSON: Expecting value")
+
+
+def test_parquet_fields_of_structures(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path = tmp_path / "log.parquet"
+    rows = [{"imu": {"acc": {"x": 1.0, "y": 2.0}, "n": 7}, "t": k} for k in range(3)]
+    parquet.write_table(pyarrow.Table.from_pylist(rows), path)
+    assert values(path, "imu.acc.y") == [2.0, 2.0, 2.0]
+    file = RecordingFile(path, LAYOUT)
+    names = ("t", "imu.n", "imu.acc.x")
+    (block,) = file.blocks([file.index(name, "x") for name in names])
+    assert block.numbers.tolist() == [[0, 7, 1], [1, 7, 1], [2, 7, 1]]
+
+
+def test_matlab_vectors_either_way_and_a_matrix_of_rows(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["column"] = np.arange(4.0)[None, :]  # 4 x 1 in MATLAB
+        file["row"] = np.arange(4.0)[:, None]
+        file["wide"] = np.arange(12.0).reshape(4, 3)  # 3 x 4 in MATLAB
+    with path.open("r+b") as out:
+        out.write(b"MATLAB 7.3 MAT-file")
+    assert values(path, "column") == values(path, "row") == [0.0, 1.0, 2.0, 3.0]
+    assert values(path, "wide[1]") == values(path, 2) == [1.0, 4.0, 7.0, 10.0]
+
+
+# ---- Recordings of other makers ----
+
+
+def test_px4_ulog_is_read_as_it_is() -> None:
+    pytest.importorskip("pyulog")
+    path = recording("px4_ulog") / "sample_px4_events.ulg"
+    rows: Callable[[str], int] = lambda name: len(values(path, name))  # noqa: E731
+    for topic, fields, count in (
+        ("sensor_combined", ("gyro_rad", "accelerometer_m_s2"), 7783),
+        ("sensor_accel", ("x", "temperature"), 31),
+        ("sensor_gyro", ("x", "temperature"), 31),
+    ):
+        names = RecordingFile(path, LAYOUT).source.names
+        for field in fields:
+            (first, *_) = [n for n in names if n.split("[")[0] == f"{topic}.{field}"]
+            assert rows(first) == count
+    file = RecordingFile(path, LAYOUT)
+    a = [file.index(f"sensor_combined.accelerometer_m_s2[{k}]", "a") for k in range(3)]
+    mean = np.concatenate([b.numbers for b in file.blocks(a)]).mean(axis=0)
+    # A vehicle that stands or hovers: the mean specific force is gravity, upwards, to 5 %.
+    assert abs(np.linalg.norm(mean) - 9.81) < 0.5
+    assert file.source.findings == ()
+
+
+@pytest.mark.parametrize("name", ["HC", "HC_improved", "IB", "CF"])
+def test_furbrain_is_read_as_it_is(name: str) -> None:
+    path = recording("furbrain_sap6") / f"{name}.json"
+    file = RecordingFile(path, LAYOUT)
+    assert file.source.names == tuple(f"{kind}[{k}]" for kind in ("mag", "grav") for k in range(3))
+    (block,) = file.blocks([file.index(f"grav[{k}]", "acceleration") for k in range(3)])
+    assert block.numbers.shape == (24, 3)
+    # In m/s^2, uncalibrated: scale and bias errors of these instruments are below a tenth.
+    assert (np.abs(np.linalg.norm(block.numbers, axis=1) - 9.81) < 0.981).all()
+
+
+def test_readings_of_the_cases_are_exact_in_single_precision() -> None:
+    t_us: Times
+    t_us, a = readings()
+    assert np.array_equal(a.astype(np.float32).astype(np.float64), a)
+    assert len(np.unique(t_us)) == len(a)

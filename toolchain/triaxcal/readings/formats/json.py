@@ -1,0 +1,114 @@
+"""JSON: an object of arrays, an array of records, or a record a line."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.readings.arrays import ArraySource, Pieces, column_of
+from triaxcal.readings.format import PIECE, Block, Format, Source
+from triaxcal.unit.recordingfile import FileLayout
+
+_NAMES_WITHIN = 1000
+"""Lines in which all names are looked for."""
+
+
+def _open(path: Path, layout: FileLayout) -> Source:
+    with path.open(encoding="utf-8-sig") as file:
+        first, second = file.readline().strip(), file.readline().strip()
+    if first.startswith("{") and first.endswith("}") and second.startswith("{"):
+        return _Lines(path)
+    with path.open(encoding="utf-8-sig") as file:
+        found = json.load(file, object_pairs_hook=_object)
+    return ArraySource(str(path), _columns(found), layout)
+
+
+class _Lines(Source):
+    """A record a line."""
+
+    row_word = "line"
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        records = islice(self._records(), _NAMES_WITHIN)
+        self.names = tuple(dict.fromkeys(name for _, record in records for name in record))
+
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
+        """As `Source.blocks`."""
+        pieces = Pieces(str(self._path), self.names, numbers, texts)
+        records = self._records()
+        while part := list(islice(records, PIECE)):
+            yield pieces.block(
+                {k: column_of([r.get(self.names[k]) for _, r in part]) for k in pieces.wanted},
+                np.array([line for line, _ in part]),
+            )
+
+    def _records(self) -> Iterator[tuple[int, dict[str, Any]]]:
+        with self._path.open(encoding="utf-8-sig") as file:
+            for line, text in enumerate(file, 1):
+                if text.strip():
+                    try:
+                        yield line, _leaves(json.loads(text, object_pairs_hook=_object))
+                    except ValueError as error:
+                        raise RefusedError(
+                            f"{self._path}, line {line}",
+                            f"damaged JSON: {error}",
+                            expected="one record a line",
+                            remedy="remove the line if the file was cut there",
+                        ) from error
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Object of JSON without names that come twice: Python would keep the last."""
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"two values of one name, {twice!r}")
+    return found
+
+
+def _columns(value: Any, prefix: str = "") -> dict[str, Any]:
+    """Arrays by name; those of an object or of records as prefix.name."""
+    if isinstance(value, Mapping):
+        parts = (_columns(v, f"{prefix}.{k}" if prefix else k) for k, v in value.items())
+        return {name: array for part in parts for name, array in part.items()}
+    if not isinstance(value, list) or not value:
+        return {}
+    if all(isinstance(item, Mapping) for item in value):
+        records = [_leaves(item, prefix) for item in value]
+        names = dict.fromkeys(name for record in records for name in record)
+        return {name: column_of([record.get(name) for record in records]) for name in names}
+    if all(isinstance(item, list) and len(item) == len(value[0]) for item in value):
+        return {prefix: np.array(value)}
+    return {prefix: column_of(value)}
+
+
+def _leaves(value: Any, prefix: str = "") -> dict[str, Any]:
+    """Values of one record: name.field, name[0]."""
+    if isinstance(value, Mapping):
+        parts = [_leaves(v, f"{prefix}.{k}" if prefix else k) for k, v in value.items()]
+    elif isinstance(value, list):
+        parts = [_leaves(v, f"{prefix}[{k}]") for k, v in enumerate(value)]
+    else:
+        return {prefix: value}
+    return {name: leaf for part in parts for name, leaf in part.items()}
+
+
+ENTRY = Format(
+    name="json",
+    label="JSON",
+    doc="An object of arrays, an array of records, or a record a line. A column is the path to its "
+    "values, as imu.ax or acc[0]. Loaded whole, but for a record a line.",
+    open=_open,
+    extensions=(".json", ".jsonl", ".ndjson"),
+    sniff=lambda head: re.match(rb'(\xef\xbb\xbf)?\s*(\{\s*"|\[\s*[\[{])', head) is not None,
+    package="json",
+)
