@@ -48,7 +48,7 @@ ONLY_IN = {
     "scipy": {"fitting", "dynamic", "readings"},  # readings: MAT-files
     "can": {"rig"},
     "cantools": {"rig"},
-    "asammdf": {"rig"},
+    "asammdf": {"rig", "readings"},
     "pyarrow": {"rig", "readings"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
@@ -57,6 +57,10 @@ ONLY_IN = {
     "dask": {"batch"},
     "distributed": {"batch"},
     "h5py": {"readings"},
+    "openpyxl": {"readings"},
+    "pyulog": {"readings"},
+    "pymavlink": {"readings"},
+    "rosbags": {"readings"},
 }
 
 
