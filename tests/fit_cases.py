@@ -13,7 +13,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.unit.description import Adc, Limits, TemperatureSensor, ThermalChoice, UnitDescription
 
-AUTO = ThermalChoice("auto", None, None)
+AUTO = ThermalChoice("auto")
 
 # P1, tables 1 and 2, as printed: V/g and V.
 TABLE_TEMPS = (-40.0, 20.0, 70.0)

@@ -16,8 +16,8 @@ import numpy as np
 from triaxcal.fixedpoint.horner import Segment
 from triaxcal.fixedpoint.inversion import InverseShifts
 from triaxcal.fixedpoint.plan import Plan, Shape
-from triaxcal.model.compensation import DIRECT, INVERSE
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
+from triaxcal.model.methods.method import DIRECT, INVERSE
 from triaxcal.unit.description import Adc, Limits, TemperatureSensor, ThermalChoice, UnitDescription
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
@@ -333,7 +333,7 @@ def unit_of(
         range_degc=None,
         polarity=None,
         estimator="auto",
-        thermal=ThermalChoice("auto", None, None),
+        thermal=ThermalChoice("auto"),
         method=method,
         output_q=output_q,
         model_error_max_micro_g=1.0,
@@ -346,7 +346,7 @@ def polynomial_model(
 ) -> ThermalModel:
     """Twelve polynomials about +20 degC: all constants, then all slopes, ..."""
     coefficients = np.array(powers, dtype=np.float64).T[None]
-    return ThermalModel("polynomial", 20.0, PiecewisePolynomial(range_degc, (20.0,), coefficients))
+    return ThermalModel(20.0, PiecewisePolynomial(range_degc, (20.0,), coefficients))
 
 
 # ---- the golden files ----

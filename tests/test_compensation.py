@@ -13,23 +13,19 @@ from hypothesis import strategies as st
 from plans import TABLE_T0
 from strategies import constants, forces_g
 from triaxcal.base.tomltable import read_toml
-from triaxcal.model.compensation import (
-    DIRECT,
-    INVERSE,
-    MAX_ORDER,
-    Compensation,
-    compensate,
-    exact_gain_and_offset,
-    worst_force_error_g,
-)
+from triaxcal.model.compensation import Compensation, compensate
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
+from triaxcal.model.methods.matrix import MAX_ORDER
+from triaxcal.model.methods.method import DIRECT, INVERSE
 from triaxcal.model.metrological import (
     CONSTANT_NAMES,
+    exact_gain_and_offset,
     force_from_voltage,
     pack_constants,
     unpack_constants,
     voltage_from_force,
+    worst_force_error_g,
 )
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
 
 TABLES = read_toml(Path(__file__).parent.parent / "units" / "AT-CHERNIAK" / "tables.toml")[
@@ -48,14 +44,14 @@ def two_segments() -> ThermalModel:
     """P1 (12) on tables 1 and 2: straight from each end to +20 degC."""
     slopes = [(b - a) / (t1 - t0) for (t0, a), (t1, b) in pairwise(zip(TEMPS, POINTS, strict=True))]
     rows = np.array([np.column_stack([POINTS[1], slope]) for slope in slopes])
-    return ThermalModel("piecewise-linear", 20.0, PiecewisePolynomial(TEMPS, (20.0, 20.0), rows))
+    return ThermalModel(20.0, PiecewisePolynomial(TEMPS, (20.0, 20.0), rows))
 
 
 def parabola() -> ThermalModel:
     """P1 (11) on the same points."""
     powers = np.vander(np.array(TEMPS) - 20.0, 3, increasing=True)
     rows = np.linalg.solve(powers, POINTS).T[None]
-    return ThermalModel("polynomial", 20.0, PiecewisePolynomial(RANGE, (20.0,), rows))
+    return ThermalModel(20.0, PiecewisePolynomial(RANGE, (20.0,), rows))
 
 
 def compensation(method: str, thermal: ThermalModel | None = None) -> Compensation:
@@ -157,7 +153,7 @@ def delta_a(
     """Delta_a of a method for a change of the twelve constants, out of the product's functions."""
     rows = np.stack([at_t0, change], axis=1)[None]
     curves = PiecewisePolynomial((0.0, 2.0), (0.0,), rows)
-    thermal = ThermalModel("polynomial", 0.0, curves)
+    thermal = ThermalModel(0.0, curves)
     found = compensate(thermal, method, (0.0, 2.0), VOLTAGE_MAX_V, 1e-6)
     difference: FloatArray = force(found, voltage_v, 1.0) - force(found, voltage_v, 0.0)
     return difference

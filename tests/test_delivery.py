@@ -24,19 +24,21 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
-from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g
+from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.metrological import (
     CONSTANT_NAMES,
+    exact_gain_and_offset,
     force_from_voltage,
     unpack_constants,
     voltage_from_force,
+    worst_force_error_g,
 )
 from triaxcal.model.positions import CHECK_POSITIONS
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.tilts import truth_force_g
 from triaxcal.simulation.truth import Plan, Truth, read_truth
-from triaxcal.unit.description import METHODS, ThermalChoice, UnitDescription
+from triaxcal.unit.description import ThermalChoice, UnitDescription
 
 UNITS = Path(__file__).parent.parent / "units"
 TABLES = read_toml(UNITS / "AT-CHERNIAK" / "tables.toml")["constants"]
@@ -85,7 +87,7 @@ def methods(
     result = {"matrix": delivered["AT-CHERNIAK"]}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(delivery_module, "vector_sets", partial(vector_sets, random_vectors=20_000))
-        for method in METHODS:
+        for method in METHODS.names:
             if method != "matrix":
                 folder = tmp_path_factory.mktemp(method) / "AT-CHERNIAK"
                 shutil.copytree(UNITS / "AT-CHERNIAK", folder)
@@ -123,7 +125,7 @@ def test_compiled_c_is_the_exact_model_at_the_calibration_temperatures(
         assert error <= delivery.bound.lsb * LSB_G + delivery.model_error_g + 1e-12
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", METHODS.names)
 def test_every_method_is_within_its_stated_error_of_the_exact_model(
     methods: dict[str, Delivery], routines: dict[str, Generated], method: str
 ) -> None:
@@ -156,9 +158,9 @@ def test_stated_model_errors_rank_the_methods(methods: dict[str, Delivery]) -> N
 def test_residuals_of_13_before_and_after(methods: dict[str, Delivery]) -> None:
     for chosen in ("matrix", "inverse"):
         by_method = {m.method: m for m in methods[chosen].methods}
-        assert set(by_method) == {BEFORE, *METHODS}
+        assert set(by_method) == {BEFORE.name, *METHODS.names}
         before: dict[float, float] = {}
-        for residual in by_method[BEFORE].residuals:
+        for residual in by_method[BEFORE.name].residuals:
             temp = residual.dwell.temp_degc
             before[temp] = max(before.get(temp, 0.0), abs(residual.error_g))
         assert 13e-3 <= before[-40.0] <= 14e-3
@@ -193,14 +195,14 @@ def test_method_2_in_c_costs_what_theory_says(
         assert 0.99 * (printed_mg - 0.0005) - 1e-4 <= worst_mg <= printed_mg + 0.0005 + 1e-4
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", METHODS.names)
 def test_residuals_are_those_of_the_methods_own_delivery(
     methods: dict[str, Delivery], method: str
 ) -> None:
     """Generated C of a method and reference C of the same method beside another: one result."""
-    own = next(m for m in methods[method].methods if m.method == method)
+    own = next(m for m in methods[method].methods if m.method.name == method)
     other = "matrix" if method != "matrix" else "inverse"
-    beside = next(m for m in methods[other].methods if m.method == method)
+    beside = next(m for m in methods[other].methods if m.method.name == method)
     assert [r.error_g for r in own.residuals] == [r.error_g for r in beside.residuals]
     assert (own.refusal, beside.refusal) == ("", "")
 
@@ -277,7 +279,7 @@ def test_the_standard_deviations_are_honest(
     fail with a probability of 1e-4 on either side.
     """
     truth, plan = sim
-    fixed = ThermalChoice("polynomial", 3, None)
+    fixed = ThermalChoice("polynomial", {"order": 3})
     unit = replace(delivered["AT-SIM"].unit, thermal=fixed, estimator="least-squares")
     places = [(-35.0, 0), (-5.0, 3), (25.0, 4), (65.0, 5)]
     squares = np.zeros((len(places), 20, 3))
@@ -298,7 +300,7 @@ def test_the_papers_two_segments_are_a_hundred_times_worse_on_sim(
     delivered: dict[str, Delivery], sim: tuple[Truth, Plan], tmp_path: Path
 ) -> None:
     delivery, truth = delivered["AT-SIM"], sim[0]
-    unit = replace(delivery.unit, thermal=ThermalChoice("piecewise-linear", None, None))
+    unit = replace(delivery.unit, thermal=ThermalChoice("piecewise-linear"))
     calibration = calibrate(unit, delivery.measurements)
     assert calibration.thermal.curves.order == 1
     assert len(calibration.thermal.curves.origins_degc) == 2

@@ -19,7 +19,7 @@ from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.tryout import model_error_g
 from triaxcal.delivery.firmware import IMAGE_FILE
 from triaxcal.delivery.unit import Delivery
-from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g
+from triaxcal.model.metrological import exact_gain_and_offset, worst_force_error_g
 from triaxcal.report.files import all_files
 
 UNITS = Path(__file__).parent.parent / "units"

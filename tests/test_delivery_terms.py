@@ -50,7 +50,7 @@ def test_terms_reach_plan_proof_and_cross_check(made: Delivery) -> None:
 def test_residuals_are_those_of_the_compensated_force(made: Delivery) -> None:
     """| |a| - g | of l + Q p(l) at 1 g along an axis is |Q_ii| g^2 to first order."""
     assert SMALL.quadratic_per_g is not None
-    chosen = next(m for m in made.methods if m.method == made.unit.method)
+    chosen = next(m for m in made.methods if m.method.name == made.unit.method)
     axis = {"TP6": (0, 1), "TP5": (0, -1), "TP4": (1, 1), "TP2": (1, -1), "TP1": (2, 1)}
     compared = 0
     for residual in chosen.residuals:

@@ -95,7 +95,7 @@ def worst_rms_g(problem: Problem, plan: Design) -> float:
     """
     unit = replace(
         read_unit(ROOT / "units" / "AT-SIM"),
-        thermal=ThermalChoice("polynomial", problem.order, None),
+        thermal=ThermalChoice("polynomial", {"order": problem.order}),
         estimator="least-squares",
         gravity_g=1.0,
     )

@@ -24,14 +24,14 @@ from fit_cases import (
 )
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
-from triaxcal.fitting.core.thermal import relative_coefficients
 from triaxcal.fitting.tilter.calibrate import calibrate
+from triaxcal.model.curves import relative_coefficients
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.description import ThermalChoice
 
 EPS = np.finfo(float).eps
-CUBIC = ThermalChoice("polynomial", 3, None)
-TWO_SEGMENTS = ThermalChoice("piecewise-linear", None, None)
+CUBIC = ThermalChoice("polynomial", {"order": 3})
+TWO_SEGMENTS = ThermalChoice("piecewise-linear")
 
 
 def refusal(measurements: MeasurementSet, **changes) -> str:
@@ -253,7 +253,9 @@ def test_refusals_of_the_parts():
     message = refusal(data, thermal=CUBIC)
     assert "order 3 with 3 calibrated temperatures" in message
     assert "highest order possible is 2" in message
-    message = refusal(data, thermal=ThermalChoice("piecewise-linear", None, (-40.0, 45.0, 50.0)))
+    message = refusal(
+        data, thermal=ThermalChoice("piecewise-linear", {"knots_degc": (-40.0, 45.0, 50.0)})
+    )
     assert "nothing determines the knot" in message
     one = MeasurementSet(data.source, data.dwells[6:12])
     message = refusal(one, thermal=TWO_SEGMENTS)

@@ -10,7 +10,6 @@ import pytest
 from fit_cases import SEVEN, TABLE_TEMPS, TABLES, cubic_truth, readings, tables_truth
 from triaxcal.fitting.core.calibration import curve_covariance
 from triaxcal.fitting.core.grouping import GroupedReadings, group_dwells, grouped_readings
-from triaxcal.fitting.core.thermal import piecewise_linear_shape, polynomial_shape
 from triaxcal.fitting.tilter.curves import (
     TilterData,
     fit_curves,
@@ -18,6 +17,8 @@ from triaxcal.fitting.tilter.curves import (
     shifted_voltage,
 )
 from triaxcal.fitting.tilter.estimators import constants_of, estimator_operators
+from triaxcal.model.thermal.piecewise_linear import PiecewiseLinearShape
+from triaxcal.model.thermal.polynomial import PolynomialShape
 from triaxcal.unit.description import ESTIMATORS
 
 EPS = np.finfo(float).eps
@@ -41,7 +42,7 @@ def amplification(shape, temps) -> float:
 def test_an_exact_cubic_comes_back_exactly(order, spread, g):
     truth = cubic_truth()
     data = tilter_data(readings(truth, SEVEN, gravity_g=g, spread_degc=spread, seed=3), g=g)
-    shape = polynomial_shape(data.readings.temps_degc, 20.0, order)
+    shape = PolynomialShape.over(data.readings.temps_degc, 20.0, order)
     parameters = fit_curves(data, shape)
     temps = np.linspace(-40.0, 70.0, 45)
     found = np.swapaxes(shape.basis(temps) @ np.swapaxes(parameters, -1, -2), 0, 1)
@@ -59,7 +60,7 @@ def test_an_exact_broken_line_comes_back_exactly(spread):
 
     # Inside the ends, as the line is not known beyond.
     data = tilter_data(readings(truth, (-38.0, -10.0, 20.0, 45.0, 68.0), spread_degc=spread))
-    shape = piecewise_linear_shape(data.readings.temps_degc, 20.0, TABLE_TEMPS)
+    shape = PiecewiseLinearShape.over(data.readings.temps_degc, 20.0, TABLE_TEMPS)
     parameters = fit_curves(data, shape)
     tolerance = 20 * EPS * amplification(shape, data.readings.temps_degc)
     np.testing.assert_allclose(
@@ -69,7 +70,7 @@ def test_an_exact_broken_line_comes_back_exactly(spread):
 
 def test_equal_temperatures_are_left_alone_to_the_bit():
     data = tilter_data(readings(tables_truth, TABLE_TEMPS, sd_v=1e-6, seed=1))
-    shape = polynomial_shape(data.readings.temps_degc, 20.0, 2)
+    shape = PolynomialShape.over(data.readings.temps_degc, 20.0, 2)
     parameters = fit_curves(data, shape)
     shifted = shifted_voltage(data.readings, shape, parameters[0], 1.0)
     np.testing.assert_array_equal(shifted, data.readings.voltage_v)
@@ -81,7 +82,7 @@ def test_without_the_shift_readings_would_be_off_by_micro_g():
     temps = data.readings.temps_degc
     plain = constants_of(data.operators[1], data.readings.voltage_v)
     assert np.abs(plain - truth(temps)).max() > 1e-6  # V: 2 micro-g
-    shape = polynomial_shape(temps, 20.0, 3)
+    shape = PolynomialShape.over(temps, 20.0, 3)
     shifted = shifted_voltage(data.readings, shape, fit_curves(data, shape)[1], 1.0)
     np.testing.assert_allclose(constants_of(data.operators[1], shifted), truth(temps), atol=1e-14)
 
@@ -102,9 +103,9 @@ def rounds(data: TilterData, shape, estimator: int, count: int):
 def test_the_solution_is_where_rounds_of_fitting_and_shifting_end(kind, estimator):
     data = tilter_data(readings(cubic_truth(), SEVEN, spread_degc=0.05, sd_v=1e-6, seed=2))
     temps = data.readings.temps_degc
-    shape = polynomial_shape(temps, 20.0, 3)
+    shape = PolynomialShape.over(temps, 20.0, 3)
     if kind == "broken line":
-        shape = piecewise_linear_shape(temps, 20.0, None)
+        shape = PiecewiseLinearShape.over(temps, 20.0, None)
     direct = fit_curves(data, shape)[estimator]
     distance = [np.abs(p - direct).max() for p in rounds(data, shape, estimator, 5)]
     floor = 20 * EPS * amplification(shape, temps)
@@ -121,7 +122,7 @@ def test_exact_interpolation_and_least_squares_agree():
     many = tilter_data(readings(truth, SEVEN))
     fits = []
     for data in (few, many):
-        shape = polynomial_shape(np.array([-40.0, 70.0]), 20.0, 3)
+        shape = PolynomialShape.over(np.array([-40.0, 70.0]), 20.0, 3)
         fits.append(fit_curves(data, shape))
     tolerance = 20 * EPS * amplification(shape, few.readings.temps_degc)
     np.testing.assert_allclose(fits[0], fits[1], atol=tolerance, rtol=0)
@@ -134,7 +135,7 @@ def test_thermal_fit_is_weighted_by_the_points_variances():
     variance = np.broadcast_to(10.0 ** random.uniform(-3, 0, (7, 1, 3)), (7, 6, 3))
     arrays = GroupedReadings(temps, np.broadcast_to(temps[:, None], (7, 6)), voltage, variance)
     operators = estimator_operators("equation-10", 1.0, variance, 7)
-    shape = polynomial_shape(temps, 20.0, 2)
+    shape = PolynomialShape.over(temps, 20.0, 2)
     found = fit_curves(TilterData(arrays, operators[None], 1.0), shape)[0]
     points = constants_of(operators, voltage)
     for c in range(12):
@@ -151,7 +152,7 @@ def test_parameter_covariance_propagates_the_readings(estimator):
     measurements = readings(cubic_truth(), SEVEN, sd_v=1e-6, count=9, spread_degc=0.5)
     data = tilter_data(measurements).only(estimator)
     temps = data.readings.temps_degc
-    shape = polynomial_shape(temps, 20.0, 3)
+    shape = PolynomialShape.over(temps, 20.0, 3)
     variance = data.readings.variance_v2
     assert variance is not None
     covariance = parameter_covariance(data, shape, variance)[0]
@@ -182,7 +183,7 @@ def test_the_covariance_allows_the_errors_that_noise_makes():
         uneven,
     )
     at = np.array([-40.0, 10.0, 62.0])
-    shape = polynomial_shape(exact.temps_degc, 20.0, 3)
+    shape = PolynomialShape.over(exact.temps_degc, 20.0, 3)
     operators = [estimator_operators(e, 1.0, uneven, 7) for e in ESTIMATORS]
     data = TilterData(exact, np.stack(operators), 1.0)
     inverse = np.linalg.inv(

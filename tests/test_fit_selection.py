@@ -19,8 +19,8 @@ from fit_cases import (
     with_checks,
 )
 from triaxcal.fitting.core.calibration import Calibration
-from triaxcal.fitting.tilter.calibrate import calibrate
-from triaxcal.fitting.tilter.selection import PREFERENCE, candidate_shapes
+from triaxcal.fitting.tilter.calibrate import calibrate, candidate_shapes
+from triaxcal.fitting.tilter.selection import PREFERENCE
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.readings.measurements import MeasurementSet
@@ -32,7 +32,7 @@ BETWEEN = (-30.0, -10.0, 10.0, 30.0, 62.0)
 def chosen_row(calibration: Calibration):
     (row,) = [c for c in calibration.candidates if c.chosen]
     assert row.estimator == calibration.estimator
-    assert row.thermal == calibration.thermal.kind
+    assert row.shape == calibration.shape
     return row
 
 
@@ -57,8 +57,8 @@ def test_a_broken_line_is_found_piecewise_linear():
     temps = (-39.9, -20.0, 0.0, 20.0, 40.0, 55.0, 69.9)
     data = readings(broken_line, temps, sd_v=1e-6, count=100, seed=3)
     row = chosen_row(calibrate(unit(), data))
-    assert row.thermal == "piecewise-linear"
-    assert row.knots_degc == (-39.9, 20.0, 69.9)
+    assert row.shape.name == "piecewise-linear"
+    assert row.shape.knots_degc == (-39.9, 20.0, 69.9)
 
 
 def test_a_jagged_line_takes_a_knot_at_every_temperature():
@@ -71,7 +71,7 @@ def test_a_jagged_line_takes_a_knot_at_every_temperature():
 
     between = [(a + b) / 2 for a, b in pairwise(SEVEN)] * 20
     data = with_checks(readings(jagged, SEVEN, sd_v=1e-7, count=9), jagged, between, sd_v=1e-7)
-    assert chosen_row(calibrate(unit(), data)).knots_degc == SEVEN
+    assert chosen_row(calibrate(unit(), data)).shape.knots_degc == SEVEN
 
 
 def test_imperfect_placement_prefers_the_half_sum():
@@ -89,7 +89,7 @@ def test_imperfect_placement_prefers_the_half_sum():
         K, U0 = unpack_constants(truth(np.array(d.temp_degc)))
         dwells.append(replace(d, voltage_v=K @ (tilted / np.linalg.norm(tilted)) + U0))
     data = with_checks(MeasurementSet(clean.source, tuple(dwells)), truth, BETWEEN * 8)
-    choice = ThermalChoice("polynomial", 3, None)
+    choice = ThermalChoice("polynomial", {"order": 3})
     calibration = calibrate(unit(thermal=choice), data)
     scores = {c.estimator: c.held_out_g for c in calibration.candidates}
     assert set(scores) == set(ESTIMATORS)
@@ -99,7 +99,11 @@ def test_imperfect_placement_prefers_the_half_sum():
 def test_three_temperatures_alone_take_the_two_segments_of_the_paper():
     calibration = calibrate(unit(), readings(tables_truth, TABLE_TEMPS))
     row = chosen_row(calibration)
-    assert (row.thermal, row.knots_degc, row.parameters) == ("piecewise-linear", TABLE_TEMPS, 3)
+    assert (row.shape.name, row.shape.knots_degc, row.parameters) == (
+        "piecewise-linear",
+        TABLE_TEMPS,
+        3,
+    )
     assert row.estimator == "least-squares"
     assert all(c.held_out_g is None for c in calibration.candidates)
     assert calibration.selection_reason == (
@@ -122,7 +126,7 @@ def test_three_temperatures_with_check_dwells_are_compared_on_these():
     parabola = readings(broken_line, TABLE_TEMPS)
     data = with_checks(parabola, broken_line, BETWEEN, sd_v=1e-6)
     calibration = calibrate(unit(), data)
-    assert chosen_row(calibration).thermal == "piecewise-linear"
+    assert chosen_row(calibration).shape.name == "piecewise-linear"
     assert "over 30 values (30 check dwells)" in calibration.selection_reason
     assert all(c.held_out_g is not None for c in calibration.candidates)
     # The cubic is nearer to a parabola than to two segments.
@@ -143,7 +147,7 @@ def test_the_fit_residual_does_not_decide():
     row = chosen_row(calibration)
     same = [c for c in calibration.candidates if c.estimator == row.estimator]
     assert row.fit_residual_g > min(c.fit_residual_g for c in same)
-    polynomials = [c for c in same if c.thermal == "polynomial"]
+    polynomials = [c for c in same if c.shape.name == "polynomial"]
     residuals = [c.fit_residual_g for c in polynomials]
     assert residuals == sorted(residuals, reverse=True)
     # Simplest within one standard error of the best, 18 values for each of 5 temperatures.
@@ -158,7 +162,7 @@ def test_the_fit_residual_does_not_decide():
 
 def test_held_out_error_is_that_of_a_fit_without_the_temperature():
     data = readings(cubic_truth(), SEVEN, sd_v=1e-5, seed=4)
-    choice = ThermalChoice("polynomial", 2, None)
+    choice = ThermalChoice("polynomial", {"order": 2})
     calibration = calibrate(unit(thermal=choice, estimator="equation-10"), data)
     squares = []
     for temp in SEVEN[1:-1]:
@@ -179,10 +183,10 @@ def test_held_out_error_is_that_of_a_fit_without_the_temperature():
 
 def test_an_explicit_choice_is_alone_and_still_scored():
     data = readings(cubic_truth(), SEVEN, sd_v=1e-6, count=100)
-    thermal = ThermalChoice("polynomial", 5, None)
+    thermal = ThermalChoice("polynomial", {"order": 5})
     calibration = calibrate(unit(thermal=thermal, estimator="half-sum"), data)
     (row,) = calibration.candidates
-    assert (row.order, row.estimator, row.chosen) == (5, "half-sum", True)
+    assert (row.shape.order, row.estimator, row.chosen) == (5, "half-sum", True)
     assert row.held_out_g is not None
     assert "thermal function from unit.toml; held-out error" in calibration.selection_reason
     assert "compared with nothing" in calibration.selection_reason
@@ -192,13 +196,13 @@ def test_an_explicit_estimator_leaves_the_function_open():
     data = readings(cubic_truth(), SEVEN, sd_v=1e-6, count=100)
     calibration = calibrate(unit(estimator="equation-10"), data)
     assert {c.estimator for c in calibration.candidates} == {"equation-10"}
-    assert chosen_row(calibration).order == 3
+    assert chosen_row(calibration).shape.order == 3
 
 
 def test_polynomial_without_an_order_is_chosen_among_polynomials():
     data = readings(broken_line, SEVEN, sd_v=1e-6, count=100)
-    calibration = calibrate(unit(thermal=ThermalChoice("polynomial", None, None)), data)
-    assert {c.thermal for c in calibration.candidates} == {"polynomial"}
+    calibration = calibrate(unit(thermal=ThermalChoice("polynomial")), data)
+    assert {c.shape.name for c in calibration.candidates} == {"polynomial"}
 
 
 def test_the_table_has_each_function_once_and_each_estimator():
@@ -206,18 +210,27 @@ def test_the_table_has_each_function_once_and_each_estimator():
         data = readings(cubic_truth(), temps, sd_v=1e-6, count=100)
         rows = calibrate(unit(), data).candidates
         labels = [c.label for c in rows if c.estimator == "least-squares"]
-        assert len(labels) == len(set(labels)) == min(len(temps), 8) + 2
-        assert len(rows) == len(labels) + len(PREFERENCE) - 1 <= 12
+        assert len(labels) == len(set(labels)) == min(len(temps), 8) + 4
+        assert len(rows) == len(labels) + len(PREFERENCE) - 1 <= 14
 
 
 def test_shapes_offered():
     def labels(temps):
-        return [s.label for s in candidate_shapes(unit().thermal, np.array(temps), 20.0)]
+        return [s.label for s in candidate_shapes(unit(), np.array(temps))]
 
     assert labels((20.0,)) == ["polynomial of order 0"]
     assert len(labels((20.0, 70.0))) == 2
     assert labels(TABLE_TEMPS)[-1] == "piecewise-linear, knots -40, 20, 70 degC"
     assert len(labels(TABLE_TEMPS)) == 4
-    assert len(labels((-40.0, 0.0, 20.0, 70.0))) == 6
+    assert labels((-40.0, 0.0, 20.0, 70.0))[4:] == [
+        "piecewise-linear, knots -40, 20, 70 degC",
+        "piecewise-linear, knots -40, 0, 20, 70 degC",
+        "natural cubic spline, knots -40, 20, 70 degC",
+        "natural cubic spline, knots -40, 0, 20, 70 degC",
+    ]
     # T0 at an end: lowest and highest only, and every temperature.
-    assert labels((20.0, 30.0, 50.0, 70.0))[-2] == "piecewise-linear, knots 20, 70 degC"
+    assert labels((20.0, 30.0, 50.0, 70.0))[4:] == [
+        "piecewise-linear, knots 20, 70 degC",
+        "piecewise-linear, knots 20, 30, 50, 70 degC",
+        "natural cubic spline, knots 20, 30, 50, 70 degC",
+    ]

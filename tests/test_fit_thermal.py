@@ -11,17 +11,11 @@ from hypothesis import strategies as st
 
 from fit_cases import SEVEN, TABLE_TEMPS, TABLES, TABLES_PRINTED, cubic_truth
 from triaxcal.base.errors import RefusedError
-from triaxcal.fitting.core.thermal import (
-    ThermalShape,
-    dense_knots,
-    piecewise_linear_shape,
-    polynomial_shape,
-    refuse_undetermined,
-    relative_coefficients,
-    undetermined_knot,
-    without_temperature,
-)
+from triaxcal.model.curves import relative_coefficients
 from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
+from triaxcal.model.thermal.piecewise_linear import PiecewiseLinearShape
+from triaxcal.model.thermal.polynomial import PolynomialShape
+from triaxcal.model.thermal.shape import ThermalShape
 
 EPS = np.finfo(float).eps
 
@@ -74,7 +68,7 @@ def test_order_3_is_cramers_rule_of_equation_11():
     temps = [-40, -10, 20, 70]
     # Decimal numbers, so that fractions hold them exactly.
     values = [[Fraction(f"{v:.9f}") for v in cubic_truth()(np.array(float(t)))] for t in temps]
-    shape = polynomial_shape(np.array(temps, dtype=float), 20.0, 3)
+    shape = PolynomialShape.over(np.array(temps, dtype=float), 20.0, 3)
     model = interpolated(shape, temps, np.array([[float(v) for v in row] for row in values]))
     found = relative_coefficients(model)[0]
     deltas = [Fraction(t - 20) for t in temps if t != 20]
@@ -91,7 +85,7 @@ def test_order_3_is_cramers_rule_of_equation_11():
 
 
 def table_3_model():
-    shape = piecewise_linear_shape(np.array(TABLE_TEMPS), 20.0, None)
+    shape = PiecewiseLinearShape.over(np.array(TABLE_TEMPS), 20.0, None)
     assert shape.knots_degc == TABLE_TEMPS
     return interpolated(shape, TABLE_TEMPS, TABLES)
 
@@ -139,7 +133,7 @@ def test_equation_12_by_its_own_formula():
 def test_a_constant_that_is_zero_at_t0_has_no_relative_form():
     values = TABLES.copy()
     values[1, 1] = 0.0
-    shape = piecewise_linear_shape(np.array(TABLE_TEMPS), 20.0, None)
+    shape = PiecewiseLinearShape.over(np.array(TABLE_TEMPS), 20.0, None)
     found = relative_coefficients(interpolated(shape, TABLE_TEMPS, values))
     assert np.isnan(found[:, 1]).all()
     assert np.isfinite(np.delete(found, 1, axis=1)).all()
@@ -148,7 +142,7 @@ def test_a_constant_that_is_zero_at_t0_has_no_relative_form():
 @pytest.mark.parametrize("order", range(10))
 def test_polynomial_model_is_its_basis(order):
     temps = np.linspace(-40.0, 70.0, 23)
-    shape = polynomial_shape(temps, 20.0, order)
+    shape = PolynomialShape.over(temps, 20.0, order)
     assert shape.parameters == order + 1
     parameters = np.random.default_rng(order).normal(size=(12, order + 1))
     model = shape.model(parameters)
@@ -162,7 +156,7 @@ def test_polynomial_model_is_its_basis(order):
     "knots", [(-40.0, 20.0, 70.0), (-40.0, 70.0), SEVEN, (-40.0, 10.0, 30.0, 70.0)]
 )
 def test_piecewise_linear_model_is_its_basis(knots):
-    shape = piecewise_linear_shape(np.array(SEVEN), 20.0, knots)
+    shape = PiecewiseLinearShape.over(np.array(SEVEN), 20.0, knots)
     temps = np.linspace(-41.0, 71.0, 225)
     values = np.random.default_rng(7).normal(size=(12, len(knots)))
     model = shape.model(values)
@@ -178,7 +172,7 @@ def test_piecewise_linear_model_is_its_basis(knots):
 
 def test_origins_are_t0_next_to_t0_and_the_lower_knot_elsewhere():
     def origins(knots):
-        shape = piecewise_linear_shape(np.array(SEVEN), 20.0, knots)
+        shape = PiecewiseLinearShape.over(np.array(SEVEN), 20.0, knots)
         return shape.model(np.zeros((12, shape.parameters))).curves.origins_degc
 
     assert origins(None) == (20.0, 20.0)
@@ -188,20 +182,24 @@ def test_origins_are_t0_next_to_t0_and_the_lower_knot_elsewhere():
 
 def test_default_knots():
     def knots(temps, t0=20.0, chosen=None):
-        return piecewise_linear_shape(np.array(temps), t0, chosen).knots_degc
+        return PiecewiseLinearShape.over(np.array(temps), t0, chosen).knots_degc
 
     assert knots((-39.9, 20.3, 70.1)) == (-39.9, 20.0, 70.1)
     assert knots((20.3, 70.1)) == (20.0, 70.1)  # T0 is an end
     assert knots((-39.9, 19.8)) == (-39.9, 20.0)
     assert knots(SEVEN, chosen=(10.0,)) == (-40.0, 10.0, 70.0)
     assert knots((-39.9, 20.3, 70.1), chosen=(-40.0, 20.0, 70.0)) == (-40.0, 20.0, 70.0)
-    assert dense_knots(np.array((-39.9, 19.7, 70.1)), 20.0) == (-39.9, 20.0, 70.1)
+    assert PiecewiseLinearShape.through(np.array((-39.9, 19.7, 70.1)), 20.0).knots_degc == (
+        -39.9,
+        20.0,
+        70.1,
+    )
 
 
 @given(st.lists(st.floats(-60, 120), min_size=2, max_size=9, unique_by=lambda t: round(t / 3)))
 def test_hats_sum_to_one_and_reproduce_a_line(knots):
     knots = sorted(knots)
-    shape = ThermalShape("piecewise-linear", 20.0, (knots[0], knots[-1]), 1, tuple(knots))
+    shape = PiecewiseLinearShape(20.0, (knots[0], knots[-1]), tuple(knots))
     temps = np.linspace(knots[0] - 0.5, knots[-1] + 0.5, 50)
     hats = shape.basis(temps)
     np.testing.assert_allclose(hats.sum(axis=1), 1.0, atol=10 * EPS)
@@ -212,7 +210,7 @@ def test_hats_sum_to_one_and_reproduce_a_line(knots):
 
 
 def test_one_temperature_makes_a_constant_model():
-    shape = polynomial_shape(np.array([20.3]), 20.0, 0)
+    shape = PolynomialShape.over(np.array([20.3]), 20.0, 0)
     model = shape.model(TABLES[1][:, None])
     np.testing.assert_array_equal(model.constants_at(np.array([20.0, 25.0])), TABLES[[1, 1]])
     assert model.curves.breaks_degc[0] < 20.3 < model.curves.breaks_degc[1]
@@ -223,30 +221,29 @@ def test_one_temperature_makes_a_constant_model():
 
 def test_a_knot_without_data_is_found():
     temps = np.array(SEVEN)
-    shape = piecewise_linear_shape(temps, 20.0, (-40.0, 5.0, 12.0, 15.0, 70.0))
-    assert undetermined_knot(shape, temps) in (5.0, 12.0, 15.0)
-    assert undetermined_knot(piecewise_linear_shape(temps, 20.0, SEVEN), temps) is None
-    assert undetermined_knot(piecewise_linear_shape(temps, 20.0, None), temps) is None
+    shape = PiecewiseLinearShape.over(temps, 20.0, (-40.0, 5.0, 12.0, 15.0, 70.0))
+    assert shape.undetermined_knot(temps) in (5.0, 12.0, 15.0)
+    assert PiecewiseLinearShape.over(temps, 20.0, SEVEN).undetermined_knot(temps) is None
+    assert PiecewiseLinearShape.over(temps, 20.0, None).undetermined_knot(temps) is None
 
 
 def refusal(shape: ThermalShape, temps) -> str:
-    with pytest.raises(RefusedError) as caught:
-        refuse_undetermined("AT-TEST/unit.toml", shape, np.array(temps))
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+    reason = shape.undetermined("AT-TEST/unit.toml", np.array(temps))
+    assert isinstance(reason, RefusedError)
+    assert "\n" not in str(reason)
+    return str(reason)
 
 
 @pytest.mark.parametrize("order", [3, 4, 9])
 def test_too_high_an_order_tells_the_highest_possible(order):
-    message = refusal(polynomial_shape(np.array(TABLE_TEMPS), 20.0, order), TABLE_TEMPS)
+    message = refusal(PolynomialShape.over(np.array(TABLE_TEMPS), 20.0, order), TABLE_TEMPS)
     assert message == (
         f"AT-TEST/unit.toml, [thermal] order: order {order} with 3 calibrated temperatures "
         f"(-40, 20, 70 degC); expected {order + 1} temperatures for this order; "
         "the highest order possible is 2"
     )
-    refuse_undetermined(
-        "u", polynomial_shape(np.array(TABLE_TEMPS), 20.0, 2), np.array(TABLE_TEMPS)
-    )
+    temps = np.array(TABLE_TEMPS)
+    assert PolynomialShape.over(temps, 20.0, 2).undetermined("u", temps) is None
 
 
 @pytest.mark.parametrize(
@@ -255,7 +252,7 @@ def test_too_high_an_order_tells_the_highest_possible(order):
 )
 def test_knots_that_nothing_determines(knots, named):
     temps = np.array(TABLE_TEMPS)
-    message = refusal(piecewise_linear_shape(temps, 20.0, knots), TABLE_TEMPS)
+    message = refusal(PiecewiseLinearShape.over(temps, 20.0, knots), TABLE_TEMPS)
     assert message.startswith(
         "AT-TEST/unit.toml, [thermal] knots_degc: nothing determines the knot"
     )
@@ -269,13 +266,13 @@ def test_without_a_temperature_the_order_or_a_knot_goes():
     remaining = np.delete(temps, 2)  # 0 degC
 
     def reduced(shape):
-        return without_temperature(shape, remaining, 0.0)
+        return shape.without(remaining, 0.0)
 
-    assert reduced(polynomial_shape(temps, 20.0, 6)).order == 5
-    assert reduced(polynomial_shape(temps, 20.0, 3)).order == 3
-    assert reduced(piecewise_linear_shape(temps, 20.0, None)).knots_degc == (-40.0, 20.0, 70.0)
-    assert reduced(piecewise_linear_shape(temps, 20.0, SEVEN)).knots_degc == tuple(remaining)
+    assert reduced(PolynomialShape.over(temps, 20.0, 6)).order == 5
+    assert reduced(PolynomialShape.over(temps, 20.0, 3)).order == 3
+    assert reduced(PiecewiseLinearShape.over(temps, 20.0, None)).knots_degc == (-40.0, 20.0, 70.0)
+    assert reduced(PiecewiseLinearShape.over(temps, 20.0, SEVEN)).knots_degc == tuple(remaining)
     # T0 left out: its knot stays, neighbours on both sides determine it.
     without_t0 = np.delete(temps, 3)
-    kept = without_temperature(piecewise_linear_shape(temps, 20.0, None), without_t0, 20.0)
+    kept = PiecewiseLinearShape.over(temps, 20.0, None).without(without_t0, 20.0)
     assert kept.knots_degc == (-40.0, 20.0, 70.0)

@@ -48,7 +48,7 @@ STATED = StatedUncertainty(8.0, 2.0, 5.0, 2e-5, 0.05, 0.02)
 
 @pytest.fixture(scope="module")
 def unit() -> UnitDescription:
-    thermal = ThermalChoice("polynomial", 3, None)
+    thermal = ThermalChoice("polynomial", {"order": 3})
     return replace(read_unit(AT_SIM), stated=STATED, thermal=thermal, estimator="least-squares")
 
 

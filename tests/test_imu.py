@@ -21,6 +21,7 @@ from triaxcal.fixedpoint.gyro import TriadDescription, make_gyro_plan
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.imu import (
     EXAMPLE_SENSITIVITY,
     ImuCompensation,
@@ -29,7 +30,6 @@ from triaxcal.model.imu import (
     constants_from_errors,
 )
 from triaxcal.model.terms import EXAMPLE_TERMS, NO_TERMS, Terms
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.unit.description import Adc, TemperatureSensor
 
 RANGE = (-40.0, 85.0)
@@ -48,7 +48,7 @@ def triad(seed: int, bias: float, *, flat: bool = False) -> ThermalModel:
     constant = constants_from_errors(rng.normal(0, bias, 3), rng.normal(0, 0.01, (3, 3)))
     slopes = np.concatenate([rng.normal(0, 1e-4, 9), rng.normal(0, bias / 50, 3)])
     lines = np.stack([constant, slopes * (not flat)], axis=1)[None]
-    return ThermalModel("polynomial", 20.0, PiecewisePolynomial(RANGE, (20.0,), lines))
+    return ThermalModel(20.0, PiecewisePolynomial(RANGE, (20.0,), lines))
 
 
 def imu_of(

@@ -93,7 +93,7 @@ def test_page_shows_constants_hashes_and_positions(passports: dict[str, Passport
         assert digest in text
     assert p.delivery.inputs_sha256[:16] in text
     # One circle before and one after for each dwell, one for each point of the twelve curves.
-    dwells = len(p.delivered.residuals)
+    dwells = len(p.delivery.chosen.residuals)
     assert page.count("<circle") == 2 * dwells + 12 * len(p.delivery.calibration.points)
 
 

@@ -24,9 +24,11 @@ from plans import (
 from triaxcal.fixedpoint.formats import MAX_SPARE_BITS
 from triaxcal.fixedpoint.plan import MAX_TEMPERATURE_CODES, Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
-from triaxcal.model.compensation import DIRECT, INVERSE, Compensation, compensate
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
-from triaxcal.unit.description import METHODS, TemperatureSensor, UnitDescription
+from triaxcal.model.compensation import Compensation, compensate
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
+from triaxcal.model.methods.method import DIRECT, INVERSE
+from triaxcal.model.methods.registry import METHODS
+from triaxcal.unit.description import TemperatureSensor, UnitDescription
 
 SQUARES = [1e-2 * slope for slope in TABLE_SLOPES]
 EPS = np.finfo(np.float64).eps
@@ -40,7 +42,7 @@ def cut(breaks: tuple[float, ...]) -> ThermalModel:
     """The same quadratic functions, cut into segments."""
     rows = np.repeat(quadratic().curves.coefficients, len(breaks) - 1, axis=0)
     origins = (20.0,) * (len(breaks) - 1)
-    return ThermalModel("polynomial", 20.0, PiecewisePolynomial(breaks, origins, rows))
+    return ThermalModel(20.0, PiecewisePolynomial(breaks, origins, rows))
 
 
 def planned(
@@ -152,7 +154,7 @@ def test_a_break_on_a_code_belongs_to_the_segment_above() -> None:
 
 
 def test_a_range_of_one_code_is_planned() -> None:
-    for method in METHODS:
+    for method in METHODS.names:
         _, plan = planned(
             unit_of(method=method, sensor=TemperatureSensor(1.0, 0.0)), range_degc=(19.5, 20.4)
         )
@@ -170,7 +172,7 @@ def test_the_most_temperature_codes_are_taken() -> None:
 # ---- what the integers stand for ----
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", METHODS.names)
 @pytest.mark.parametrize(
     "unit",
     [
@@ -201,7 +203,7 @@ def test_real_functions_are_the_compensation_in_their_units(
     )
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", METHODS.names)
 @pytest.mark.parametrize(("bits", "output_q"), [(24, 24), (32, 29), (12, 10)])
 def test_integers_are_rounded_half_up_with_half_for_each_floor(
     method: str, bits: int, output_q: int
@@ -309,7 +311,7 @@ def test_no_word_of_the_inversion_saturates_and_each_is_full(
     assert all(value >= 2**29 for value in largest.values()), largest
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", METHODS.names)
 def test_more_bits_of_output_never_make_the_answer_worse_in_g(method: str) -> None:
     errors = []
     for output_q in (12, 16, 20, 24):

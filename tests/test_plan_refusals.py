@@ -18,14 +18,12 @@ from plans import (
 from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
-from triaxcal.model.compensation import (
-    DIRECT,
-    Compensation,
-    compensate,
-)
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
+from triaxcal.model.compensation import Compensation, compensate
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
+from triaxcal.model.methods.method import DIRECT
+from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import METHODS, TemperatureSensor, UnitDescription
+from triaxcal.unit.description import TemperatureSensor, UnitDescription
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 """45 codes from -40 to 70 degC: few enough for fractions."""
@@ -37,7 +35,7 @@ def planned(unit: UnitDescription, thermal: ThermalModel) -> Plan:
     return make_plan(compensate(thermal, unit.method, (-40.0, 70.0), voltage_max_v, 1e-6), unit)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", METHODS.names)
 @pytest.mark.parametrize(("full_scale_v", "bits"), [(20.0, 32), (100.0, 24)])
 def test_a_raw_range_too_wide_for_the_output_names_the_highest_q_that_works(
     method: str, full_scale_v: float, bits: int

@@ -33,15 +33,12 @@ from triaxcal.delivery.unit import Delivery
 from triaxcal.fixedpoint import integer_model
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import check_ranges, prove
-from triaxcal.model.compensation import (
-    DIRECT,
-    Compensation,
-    compensate,
-    exact_gain_and_offset,
-)
-from triaxcal.model.metrological import pack_constants
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
-from triaxcal.unit.description import METHODS, TemperatureSensor, UnitDescription
+from triaxcal.model.compensation import Compensation, compensate
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
+from triaxcal.model.methods.method import DIRECT
+from triaxcal.model.methods.registry import METHODS
+from triaxcal.model.metrological import exact_gain_and_offset, pack_constants
+from triaxcal.unit.description import TemperatureSensor, UnitDescription
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 """45 codes from -40 to 70 degC: few enough for fractions."""
@@ -57,7 +54,7 @@ def planned(unit: UnitDescription, thermal: ThermalModel) -> Plan:
 def three_segments() -> ThermalModel:
     rows = [np.array([TABLE_T0, [k * s for s in TABLE_SLOPES]]).T for k in (1.0, 1.5, 0.7)]
     curves = PiecewisePolynomial((-40.0, 0.0, 20.0, 70.0), (20.0,) * 3, np.array(rows))
-    return ThermalModel("piecewise-linear", 20.0, curves)
+    return ThermalModel(20.0, curves)
 
 
 def coarse_plans() -> dict[str, Plan]:
@@ -65,7 +62,7 @@ def coarse_plans() -> dict[str, Plan]:
     quadratic = polynomial_model(TABLE_T0, TABLE_SLOPES, SQUARES)
     plans = {
         f"{method}, {label}": planned(replace(unit, method=method), quadratic)
-        for method in METHODS
+        for method in METHODS.names
         for label, unit in {
             "24 bits": unit_of(sensor=COARSE),
             "32 bits saturating": unit_of(sensor=COARSE, bits=32, output_q=28),

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from strategies import constants, forces_g, temperatures_degc
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import read_toml
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.metrological import CONSTANT_NAMES, force_from_voltage, unpack_constants
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, read_measurements
 from triaxcal.simulation.dwells import simulate
@@ -246,7 +246,7 @@ def test_equation_10_finds_any_constants_again(expected: FloatArray) -> None:
     """Without noise and thermal curves, to the rounding of the codes."""
     unit = read_unit(SIM)
     curves = PiecewisePolynomial((-200.0, 400.0), (20.0,), expected[None, :, None])
-    truth = Truth(ThermalModel("polynomial", 20.0, curves), 0.0, 0.0, 0.0)
+    truth = Truth(ThermalModel(20.0, curves), 0.0, 0.0, 0.0)
     dwells = simulate(unit, truth, Plan(1, 2, (20.0,), ())).dwells
     U = {dwell.position: dwell.voltage_v for dwell in dwells}
     K, U0 = unpack_constants(expected)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from triaxcal.model.compensation import compensate
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.imu import ImuModel, compensate_imu, constants_from_errors
 from triaxcal.model.terms import NO_TERMS, PRODUCT_NAMES, RateTerm, Terms, products
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 
 RANGE = (-40.0, 85.0)
 
@@ -18,7 +18,7 @@ def triad(seed: int, size: float) -> ThermalModel:
     rng = np.random.default_rng(seed)
     constant = constants_from_errors(rng.normal(0, size, 3), rng.normal(0, size, (3, 3)))
     lines = np.stack([constant, rng.normal(0, size / 100, 12)], axis=1)[None]
-    return ThermalModel("polynomial", 20.0, PiecewisePolynomial(RANGE, (20.0,), lines))
+    return ThermalModel(20.0, PiecewisePolynomial(RANGE, (20.0,), lines))
 
 
 def test_products_are_named() -> None:

@@ -32,7 +32,7 @@ from triaxcal.unit.description import StatedUncertainty, ThermalChoice, UnitDesc
 UNITS = Path(__file__).parent.parent / "units"
 DEVICE = Device(24, (0.75, 0.75, 0.75), 5e-7)
 ZERO = StatedUncertainty(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-CUBIC = ThermalChoice("polynomial", 3, None)
+CUBIC = ThermalChoice("polynomial", {"order": 3})
 TEMPS = np.array([-35.0, -5.0, 20.0, 48.0, 66.0])
 
 
@@ -272,7 +272,7 @@ def test_without_statistics_the_residuals_give_the_noise() -> None:
 
 
 def test_a_wrong_thermal_function_shows_in_the_budget() -> None:
-    unit = replace(sim_unit(), thermal=ThermalChoice("polynomial", 2, None))
+    unit = replace(sim_unit(), thermal=ThermalChoice("polynomial", {"order": 2}))
     truth, plan = read_truth(UNITS / "AT-SIM")
     measurements = simulate(unit, truth, replace(plan, readings_per_dwell=50))
     calibration, result = evaluated(unit, measurements)

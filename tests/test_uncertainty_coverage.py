@@ -58,7 +58,7 @@ def coverage(
     unit = replace(read_unit(AT_SIM), stated=stated)
     if not auto:
         unit = replace(
-            unit, thermal=ThermalChoice("polynomial", 3, None), estimator="least-squares"
+            unit, thermal=ThermalChoice("polynomial", {"order": 3}), estimator="least-squares"
         )
     truth, plan = read_truth(AT_SIM)
     truth = replace(truth, imperfections=imperfections)

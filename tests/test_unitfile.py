@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from strategies import unit_names
 from triaxcal.base.errors import RefusedError
+from triaxcal.model.methods.registry import METHODS
+from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
 from triaxcal.unit.description import (
-    METHODS,
     Adc,
     Limits,
     TemperatureSensor,
@@ -85,7 +86,7 @@ def test_defaults(tmp_path: Path) -> None:
         range_degc=None,
         polarity=None,
         estimator="auto",
-        thermal=ThermalChoice("auto", None, None),
+        thermal=ThermalChoice("auto"),
         method="matrix",
         output_q=24,
         model_error_max_micro_g=1.0,
@@ -104,7 +105,7 @@ def test_format_1_stays_readable() -> None:
         range_degc=(-30.0, 60.0),
         polarity=(1, 1, -1),
         estimator="half-sum",
-        thermal=ThermalChoice("piecewise-linear", None, (0.0, 21.5, 40.0)),
+        thermal=ThermalChoice("piecewise-linear", {"knots_degc": (0.0, 21.5, 40.0)}),
         method="additive-first-order",
         output_q=20,
         model_error_max_micro_g=2.5,
@@ -129,7 +130,7 @@ def test_byte_order_mark_and_crlf_are_read(tmp_path: Path) -> None:
 
 def test_order_belongs_to_the_polynomial(tmp_path: Path) -> None:
     text = with_lines('[thermal] model = "polynomial"', "[thermal] order = 3")
-    assert read_unit(make_unit(tmp_path, text)).thermal == ThermalChoice("polynomial", 3, None)
+    assert read_unit(make_unit(tmp_path, text)).thermal == ThermalChoice("polynomial", {"order": 3})
 
 
 REFUSED_VALUES = [
@@ -493,7 +494,8 @@ def test_the_docs_name_every_key_with_its_table() -> None:
             documented.add((table, cells[2].strip("`")))
     tables = (*tilter_file().tables, *recording_file().tables)
     assert documented == {(table.name, key.name) for table in tables for key in table.keys}
-    assert all(f'`"{method}"`' in section for method in METHODS)
+    assert all(f'`"{method}"`' in section for method in METHODS.names)
+    assert all(f'`"{function}"`' in section for function in THERMAL_FUNCTIONS.names)
 
 
 def test_the_example_of_the_docs_is_read(tmp_path: Path) -> None:

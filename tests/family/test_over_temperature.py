@@ -58,7 +58,7 @@ def test_biases_of_second_order_are_found_and_end_in_c(tmp_path: Path) -> None:
     assert np.abs((found - truth) / sd).max() < 4.5
     # The compiled C keeps what the fit has, over all temperatures.
     errors = [
-        r.error_g for r in next(m for m in delivery.methods if m.method == "matrix").residuals
+        r.error_g for r in next(m for m in delivery.methods if m.method.name == "matrix").residuals
     ]
     assert delivery.calibration.recording is not None
     limit = delivery.model_error_g * 2.0 + 1e-6  # two axes of the method's error, and rounding

@@ -66,7 +66,7 @@ def test_poses_of_a_log_are_fitted_with_what_the_pair_says(tmp_path: Path) -> No
     assert calibration.recording.rms_g < 0.02e-3
     assert b"quadratic_terms" in calibration_json(delivery)
     errors = [
-        r.error_g for r in next(m for m in delivery.methods if m.method == "matrix").residuals
+        r.error_g for r in next(m for m in delivery.methods if m.method.name == "matrix").residuals
     ]
     rounding = 3 * 2.0**-17 / 9.8 + (delivery.bound.lsb + 1) * 2.0**-24
     assert np.abs(errors - calibration.recording.residual_g).max() < rounding

@@ -65,7 +65,7 @@ def coupled_unit(folder: Path, kip: float) -> Path:
 
 def check_errors_of_the_c(delivery: Delivery) -> float:
     """Largest | |a| - g | of the compiled C at the check dwells, g."""
-    own = next(m for m in delivery.methods if m.method == delivery.unit.method)
+    own = next(m for m in delivery.methods if m.method.name == delivery.unit.method)
     return max(abs(r.error_g) for r in own.residuals if r.dwell.position.startswith("CP"))
 
 

@@ -47,7 +47,7 @@ def test_a_slow_ramp_is_fitted_over_temperature_with_its_rate(tmp_path: Path) ->
     more = '[thermal]\nmodel = "polynomial"\norder = 1\nt0_degc = 5\n'
     folder = write_unit(tmp_path / "U", slow_ramp(), WITH_T, header="t,ax,ay,az,T", more=more)
     calibration = calibrated(folder)
-    assert {c.order for c in calibration.candidates} == {1}
+    assert {c.shape.order for c in calibration.candidates} == {1}
     assert "4 half-cycles left out in turn" in calibration.selection_reason
     rate = calibration.terms.rate
     assert rate is not None
@@ -79,7 +79,8 @@ def test_a_term_that_wins_on_half_cycles_left_out_reaches_the_compiled_c(tmp_pat
     assert calibration.recording is not None
     for method in ("matrix", "inverse"):
         errors = [
-            r.error_g for r in next(m for m in delivery.methods if m.method == method).residuals
+            r.error_g
+            for r in next(m for m in delivery.methods if m.method.name == method).residuals
         ]
         # r is that of T0: K changes by nothing here; rounding, and the method's error in two axes.
         limit = 2.0 * delivery.model_error_g + 2e-6

@@ -123,7 +123,7 @@ def test_a_recording_ends_in_the_same_c(tmp_path: Path) -> None:
     recording = delivery.calibration.recording
     assert recording is not None
     assert delivery.check.total > 10**6
-    compiled = next(m for m in delivery.methods if m.method == "matrix")
+    compiled = next(m for m in delivery.methods if m.method.name == "matrix")
     errors = np.array([r.error_g for r in compiled.residuals])
     # Rounding: a raw code of 2^-16 m/s^2 in three axes, the proven bound, the output.
     rounding = 3 * 2.0**-17 / 9.8 + (delivery.bound.lsb + 1) * 2.0**-24

@@ -151,7 +151,7 @@ def test_quadratic_terms_reach_the_compiled_c(tmp_path: Path) -> None:
     delivery = deliver(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
     assert delivery.calibration.terms.quadratic_per_g is not None
     errors = [
-        r.error_g for r in next(m for m in delivery.methods if m.method == "matrix").residuals
+        r.error_g for r in next(m for m in delivery.methods if m.method.name == "matrix").residuals
     ]
     assert delivery.calibration.recording is not None
     # Rounding: raw codes of 2^-16 m/s^2 in three axes, the proven bound, the output.
@@ -313,7 +313,7 @@ def test_an_order_of_tables_is_the_users(tmp_path: Path) -> None:
     more = '[thermal]\nmodel = "polynomial"\norder = 1\n'
     folder = write_unit(tmp_path / "U", rows, WITH_T, header=HEADER + ",T", more=more)
     calibration = calibrated(folder)
-    assert {c.order for c in calibration.candidates} == {1}
+    assert {c.shape.order for c in calibration.candidates} == {1}
     more = more.replace("1", "3")
     folder = write_unit(tmp_path / "V", rows, WITH_T, header=HEADER + ",T", more=more)
     with pytest.raises(RefusedError, match="order 3 with poses at 3 temperatures; expected 2 at"):

@@ -106,6 +106,11 @@ class Registry(Generic[E]):
         """Names of the entries, in order."""
         return tuple(self.entries())
 
+    @property
+    def explained(self) -> str:
+        """What each entry is, for the documentation of a key that chooses one."""
+        return " ".join(f"{entry.name}: {entry.doc}" for entry in self)
+
     def __iter__(self) -> Iterator[E]:
         return iter(tuple(self.entries().values()))
 

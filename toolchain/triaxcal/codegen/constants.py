@@ -12,7 +12,7 @@ from triaxcal.fixedpoint.gyro import SENSITIVITY_NAMES, sensitivity_log2
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
 from triaxcal.fixedpoint.rate import RATE_Q
-from triaxcal.model.compensation import INVERSE
+from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unit.description import TemperatureSensor
 

@@ -16,7 +16,7 @@ import struct
 import zlib
 
 from triaxcal.fixedpoint.plan import Plan
-from triaxcal.model.compensation import DIRECT
+from triaxcal.model.methods.method import DIRECT
 
 MAGIC = int.from_bytes(b"TRXC", "little")
 VERSION, VERSION_WITH_TERMS = 1, 2

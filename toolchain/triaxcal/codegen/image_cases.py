@@ -34,7 +34,7 @@ from triaxcal.codegen.rate_ties import rate_ties
 from triaxcal.codegen.routines import Generated, Reference
 from triaxcal.fixedpoint.integer_model import STATUS_BAD_IMAGE, STATUS_OK
 from triaxcal.fixedpoint.plan import Plan
-from triaxcal.model.compensation import INVERSE
+from triaxcal.model.methods.method import INVERSE
 
 QUADRATIC_LIMIT, SENSITIVITY_LIMIT = 2**31 - 1, 2**29
 _TABLES = {0: (0, 0), QUADRATIC: (6, QUADRATIC_LIMIT), SENSITIVITY: (3, SENSITIVITY_LIMIT)}

@@ -12,15 +12,27 @@ from triaxcal.codegen.routines import Routine
 from triaxcal.fixedpoint.integer_model import STATUS_OK
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import quadratic_log2
-from triaxcal.model.compensation import exact_gain_and_offset, worst_force_error_g
-from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.curves import ThermalModel
+from triaxcal.model.methods.method import Column
+from triaxcal.model.methods.registry import METHODS
+from triaxcal.model.metrological import (
+    exact_gain_and_offset,
+    force_from_voltage,
+    worst_force_error_g,
+)
 from triaxcal.model.terms import products
-from triaxcal.model.thermal import ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell
 from triaxcal.unit.description import UnitDescription
 
-BEFORE = "before"
+BEFORE = Column(
+    name="before",
+    label="before",
+    doc="the model with the constants of T0",
+    short_label="before",
+    colour="#8a8a8a",
+)
+"""Readings that are not compensated over temperature."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +47,7 @@ class Residual:
 class MethodResult:
     """Residuals of one method, in the order of the dwells; empty when it was refused, and why."""
 
-    method: str
+    method: Column
     residuals: tuple[Residual, ...]
     refusal: str
 
@@ -63,13 +75,13 @@ def run_on_dwells(
     codes = temp.astype(np.int32), np.ascontiguousarray(raw.astype(np.int32))
     at_t0 = thermal.constants_at(unit.t0_degc)
     results = [_result(BEFORE, unit, dwells, force_from_voltage(at_t0, voltages))]
-    for method, routine in routines.items():
+    for method, routine in ((METHODS[name], found) for name, found in routines.items()):
         if isinstance(routine, RefusedError):
             results.append(MethodResult(method, (), str(routine)))
             continue
         accel, status = routine(*codes)
-        flagged = _flagged(source, method, dwells, status)
-        if flagged is not None and method == unit.method:
+        flagged = _flagged(source, method.label, dwells, status)
+        if flagged is not None and method.name == unit.method:
             raise flagged
         if flagged is not None:
             results.append(MethodResult(method, (), str(flagged)))
@@ -99,7 +111,7 @@ def _flagged(
 
 
 def _result(
-    method: str, unit: UnitDescription, dwells: Sequence[Dwell], force_g: FloatArray
+    method: Column, unit: UnitDescription, dwells: Sequence[Dwell], force_g: FloatArray
 ) -> MethodResult:
     errors = np.linalg.norm(force_g, axis=1) - unit.gravity_g
     residuals = tuple(Residual(d, float(e)) for d, e in zip(dwells, errors, strict=True))

@@ -13,6 +13,7 @@ from triaxcal.delivery.fitted import Fitted
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.model.compensation import Compensation, compensate
+from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.unit.description import UnitDescription
@@ -78,8 +79,9 @@ def _files(fitted: Fitted, compensation: Compensation, plan: Plan) -> dict[str, 
     unit, calibration = fitted.unit, fitted.calibration
     low, high = calibration.range_degc
     reading = calibration.reading_unit
+    method = METHODS[compensation.method].label
     summary = (
-        f"method {compensation.method}: {plan.shape.form} form, {low:g} to {high:g} degC",
+        f"method {method}: {plan.shape.form} form, {low:g} to {high:g} degC",
         f"functions of order {plan.shape.order} on {plan.shape.segments} segment(s)",
         f"thermal model: {calibration.shape.label}, bias estimator {calibration.estimator}",
         f"raw code: {unit.adc.bits} bits for {unit.adc.full_scale_v:g} {reading} full scale",
@@ -118,7 +120,7 @@ def _constants_at_t0(calibration: Calibration) -> list[str]:
 def _refuse_model_error(unit: UnitDescription, plan: Plan, error_g: float) -> None:
     """The order of N(T) is chosen on a grid; what counts is every temperature code."""
     limit_g = unit.model_error_max_micro_g * 1e-6
-    if unit.method == "matrix" and error_g > limit_g:
+    if METHODS[unit.method].keeps_error and error_g > limit_g:
         raise RefusedError(
             f"{unit.name}/unit.toml, [compensation] model_error_max_micro_g",
             f"N(T) of order {plan.shape.order} is {error_g * 1e6:.4g} micro-g off the fitted model",

@@ -35,10 +35,11 @@ from triaxcal.fixedpoint.arithmetic import INT32_MAX
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.fixedpoint.rate import RATE_Q
+from triaxcal.model.methods.registry import METHODS
 from triaxcal.readings.measurements import (
     Dwell,
 )
-from triaxcal.unit.description import METHODS, UnitDescription, read_unit
+from triaxcal.unit.description import UnitDescription, read_unit
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,11 @@ class Delivery(Fitted):
     check: CrossCheck
     methods: tuple[MethodResult, ...]
     compiler: str
+
+    @property
+    def chosen(self) -> MethodResult:
+        """Residuals of the unit's own method."""
+        return next(m for m in self.methods if m.method.name == self.unit.method)
 
     @property
     def plan(self) -> Plan:
@@ -140,7 +146,7 @@ def _other_routines(
 ) -> dict[str, Routine | RefusedError]:
     """The methods that the unit did not choose, run by the reference C."""
     routines: dict[str, Routine | RefusedError] = {}
-    for method in METHODS:
+    for method in METHODS.names:
         if method == unit.method:
             continue
         try:
@@ -166,8 +172,7 @@ def _refuse_wrong_bound(unit: UnitDescription, bound: Bound, check: CrossCheck) 
 def _refuse_beyond_limits(delivery: Delivery) -> None:
     """P1 (13) for the compiled C; the fitted model passed, so it is the method or the formats."""
     unit = delivery.unit
-    chosen = next(m for m in delivery.methods if m.method == unit.method)
-    for residual in chosen.residuals:
+    for residual in delivery.chosen.residuals:
         dwell, error_g = residual.dwell, abs(residual.error_g)
         limit, key = unit.limits.at(dwell.temp_degc, unit.t0_degc)
         if error_g > limit:
@@ -178,8 +183,9 @@ def _refuse_beyond_limits(delivery: Delivery) -> None:
                 "times the limit, which the fitted model keeps",
                 expected=f"at most {limit * 1e3:g} mg ({key})",
                 remedy=(
-                    f"method {unit.method} is within {delivery.model_error_g * 1e3:.3g} mg of the "
-                    f"model, its LSB is {1e3 / 2**unit.output_q:.3g} mg: choose another "
+                    f"method {delivery.chosen.method.label} is within "
+                    f"{delivery.model_error_g * 1e3:.3g} mg of the model, its LSB is "
+                    f"{1e3 / 2**unit.output_q:.3g} mg: choose another "
                     "compensation.method, a higher output_q or more adc.bits"
                 ),
             )

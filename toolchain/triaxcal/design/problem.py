@@ -11,7 +11,8 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values
 from triaxcal.base.kinds import listed, number, rising, three, whole, word
 from triaxcal.model.positions import AXES, TEST_POSITIONS
-from triaxcal.unit.description import DESCRIPTION, PLAUSIBLE_DEGC, T0_TOLERANCE_DEGC
+from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
+from triaxcal.unit.description import DESCRIPTION, T0_TOLERANCE_DEGC
 
 CANDIDATES_MAX = 16
 """Every subset of the candidates is tried: 2^13 of them at most, the ends and T0 being fixed."""

@@ -17,11 +17,11 @@ from triaxcal.dynamic.device import DEVICE, Device, device_of
 from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT, Turntable
 from triaxcal.dynamic.registry import extensions
+from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import (
     GRAVITY,
     LATITUDE,
-    PLAUSIBLE_DEGC,
     SERIAL,
     TOP,
     UNIT_FILE,

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from triaxcal.base.keys import TableKeys, Values, key, keys_of
 from triaxcal.base.kinds import interval, number, whole
-from triaxcal.unit.description import OUTPUT_Q_RANGE, PLAUSIBLE_DEGC, Adc, TemperatureSensor
+from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
+from triaxcal.unit.description import OUTPUT_Q_RANGE, Adc, TemperatureSensor
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import numpy as np
 
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.window import gamma_matrix
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.imu import ImuModel, constants_from_errors
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
 
@@ -77,4 +77,4 @@ def _triad(
     curves = PiecewisePolynomial(
         range_degc, (reference,), np.stack([constant, slope], axis=-1)[None]
     )
-    return ThermalModel("polynomial", reference, curves)
+    return ThermalModel(reference, curves)

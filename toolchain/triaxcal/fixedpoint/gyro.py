@@ -12,9 +12,9 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import round_half_up
 from triaxcal.fixedpoint.plan import Plan, Triad, triad_plan
+from triaxcal.model.curves import PiecewisePolynomial
 from triaxcal.model.imu import ImuCompensation
 from triaxcal.model.positions import AXES
-from triaxcal.model.thermal import PiecewisePolynomial
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import Adc, TemperatureSensor
 

@@ -58,3 +58,24 @@ def pack_blocks(blocks: FloatArray) -> FloatArray:
         index = np.array([3 * i, 3 * i + 1, 3 * i + 2, 9 + i])
         full[..., index[:, None], index] = blocks[..., i, :, :]
     return full
+
+
+def exact_gain_and_offset(constants: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """N = K^-1 (..., 3, 3) in g/V and b = -N U0 (..., 3) in g of constants (..., 12)."""
+    K, U0 = unpack_constants(constants)
+    N = np.linalg.inv(K).astype(np.float64)
+    return N, -np.einsum("...ij,...j->...i", N, U0)
+
+
+def worst_force_error_g(
+    found: tuple[FloatArray, FloatArray],
+    exact: tuple[FloatArray, FloatArray],
+    voltage_max_v: float,
+) -> FloatArray:
+    """Largest |error| per axis over all |U_j| <= voltage_max_v, shape (..., 3), in g.
+
+    N U + b is linear in U, so the worst case lies in a corner of the box.
+    """
+    gain_error = np.abs(found[0] - exact[0]).sum(axis=-1)
+    worst: FloatArray = gain_error * voltage_max_v + np.abs(found[1] - exact[1])
+    return worst

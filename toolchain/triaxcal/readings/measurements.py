@@ -12,6 +12,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
+from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements_csv import (
     DEVIATIONS,
@@ -22,7 +23,7 @@ from triaxcal.readings.measurements_csv import (
     read_rows,
     write_measurements,
 )
-from triaxcal.unit.description import PLAUSIBLE_DEGC, Adc, UnitDescription
+from triaxcal.unit.description import Adc, UnitDescription
 
 __all__ = ["Dwell", "MeasurementSet", "read_measurements", "volts", "write_measurements"]
 

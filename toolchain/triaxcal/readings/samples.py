@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 from triaxcal.readings.text import TextTable, read_text
-from triaxcal.unit.description import PLAUSIBLE_DEGC, TemperatureSensor
+from triaxcal.unit.description import TemperatureSensor
 from triaxcal.unit.recording import SAMPLES, TIME_UNITS, Column, RecordingLayout
 
 GAP = 5.0

@@ -19,7 +19,7 @@ from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
 from triaxcal.fixedpoint.rate import RATE_Q
-from triaxcal.model.compensation import INVERSE
+from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.positions import AXES
 from triaxcal.unit.description import TemperatureSensor
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from triaxcal.codegen.templates import environment
-from triaxcal.codegen.tryout import BEFORE, MethodResult
+from triaxcal.codegen.tryout import MethodResult
 from triaxcal.delivery.unit import Delivery
 from triaxcal.report.temperatures import by_temperature, degrees, position_order, with_room
 from triaxcal.unit.description import Limits
@@ -19,15 +19,6 @@ LETTER_WIDTH, LABEL_HEIGHT = 4.4, 10.0
 """Of the labels' letters, 8 px high."""
 FLOOR_MG = 1e-5
 """Errors below this are drawn on the lowest line: a code of a 24-bit converter is more."""
-
-COLOURS = {
-    BEFORE: "#8a8a8a",
-    "matrix": "#0a5fb4",
-    "inverse": "#2a9d8f",
-    "additive": "#c8553d",
-    "additive-simplified": "#e9a23b",
-    "additive-first-order": "#7b4ea3",
-}
 
 
 @dataclass(frozen=True)
@@ -73,7 +64,7 @@ def residuals_svg(delivery: Delivery) -> bytes:
         "panel_height": PANEL_HEIGHT,
         "floor": f"{FLOOR_MG:.5f}",
         "rows": rows,
-        "legend": _legend(methods, delivery.unit.method),
+        "legend": _legend(methods, delivery.chosen),
     }
     return environment().get_template("pictures/residuals.svg.j2").render(context).encode()
 
@@ -128,12 +119,12 @@ def _panel(
     indices = sorted(indices, key=lambda i: position_order(methods[0].residuals[i].dwell.position))
     xs = [_r(x0 + width * (k + 0.5) / len(indices)) for k in range(len(indices))]
     lines = []
-    for method in sorted(methods, key=lambda m: m.method == delivery.unit.method):
+    for method in sorted(methods, key=lambda m: m is delivery.chosen):
         ys = [scale.y(method.residuals[i].error_g * 1e3) for i in indices]
         lines.append(
             {
-                "colour": COLOURS[method.method],
-                "width": 2.4 if method.method == delivery.unit.method else 1.2,
+                "colour": method.method.colour,
+                "width": 2.4 if method is delivery.chosen else 1.2,
                 "points": list(zip(xs, ys, strict=True)),
             }
         )
@@ -146,11 +137,11 @@ def _panel(
     }
 
 
-def _legend(methods: list[MethodResult], chosen: str) -> list[dict[str, object]]:
+def _legend(methods: list[MethodResult], chosen: MethodResult) -> list[dict[str, object]]:
     entries, x = [], LEFT
     for method in methods:
-        label = method.method + (" (delivered)" if method.method == chosen else "")
-        entries.append({"x": _r(x), "label": label, "colour": COLOURS[method.method]})
+        label = method.method.label + (" (delivered)" if method is chosen else "")
+        entries.append({"x": _r(x), "label": label, "colour": method.method.colour})
         x += 34 + 6.6 * len(label)
     return entries
 

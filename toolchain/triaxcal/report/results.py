@@ -13,7 +13,7 @@ from triaxcal.codegen.render import shape_id
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.delivery.unit import Delivery
 from triaxcal.fitting.core.calibration import Calibration
-from triaxcal.fitting.core.thermal import relative_coefficients
+from triaxcal.model.curves import relative_coefficients
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.terms import PRODUCT_NAMES
 from triaxcal.model.types import FloatArray
@@ -31,7 +31,7 @@ def calibration_json(delivery: Delivery) -> bytes:
         "units": [calibration.gain_unit] * 9 + [calibration.reading_unit] * 3,
         "estimator": calibration.estimator,
         "thermal_model": {
-            "kind": calibration.thermal.kind,
+            "kind": calibration.shape.name,
             "label": calibration.shape.label,
             "t0_degc": calibration.thermal.t0_degc,
             "breaks_degc": list(curves.breaks_degc),
@@ -130,7 +130,7 @@ def verification_json(delivery: Delivery) -> bytes:
             "mismatches": 0,
         },
         "residuals_g": {
-            m.method: [
+            m.method.name: [
                 {
                     "row": r.dwell.row,
                     "position": r.dwell.position,
@@ -141,8 +141,8 @@ def verification_json(delivery: Delivery) -> bytes:
             ]
             for m in delivery.methods
         },
-        "refused_methods": {m.method: m.refusal for m in delivery.methods if m.refusal},
-        "before": f"'{BEFORE}' is the model with the constants of T0",
+        "refused_methods": {m.method.name: m.refusal for m in delivery.methods if m.refusal},
+        "before": f"'{BEFORE.name}' is {BEFORE.doc}",
         "limits_g": {
             "at_t0": delivery.unit.limits.at_t0_g,
             "over_range": delivery.unit.limits.over_range_g,

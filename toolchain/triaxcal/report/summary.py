@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from triaxcal.delivery.unit import Delivery
-from triaxcal.fitting.core.calibration import Calibration, Candidate
+from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
@@ -65,7 +65,7 @@ def _head(delivery: Delivery) -> str:
     outside = len(delivery.measurements.dwells) - len(delivery.methods[0].residuals)
     if outside:
         measured += f"; {outside} of the dwells lie outside the range and are not in the residuals"
-    method = f"{delivery.unit.method}: {_method_words(delivery)}"
+    method = f"{delivery.chosen.method.label}: {_method_words(delivery)}"
     return "\n".join(
         [
             _entry("unit", f"{delivery.unit.name}  (serial {delivery.unit.serial})"),
@@ -136,7 +136,7 @@ def _constants(calibration: Calibration) -> str:
 def _candidates(calibration: Calibration) -> str:
     rows = [
         [
-            f"{'*' if c.chosen else ' '} {_short_label(c)}",
+            f"{'*' if c.chosen else ' '} {c.short_label}",
             c.estimator,
             str(c.parameters),
             _micro_g(c.fit_residual_g),
@@ -148,11 +148,6 @@ def _candidates(calibration: Calibration) -> str:
     head = ["candidates, rms micro-g", "bias estimator", "parameters", "fitted", "held out"]
     head += ["condition"] if calibration.recording else []
     return "\n".join(table(head, rows))
-
-
-def _short_label(candidate: Candidate) -> str:
-    knots = len(candidate.knots_degc)
-    return candidate.label if knots <= 3 else f"piecewise-linear, {knots} knots"
 
 
 def _micro_g(value_g: float) -> str:
@@ -167,10 +162,10 @@ def _residuals(delivery: Delivery) -> str:
         for temp, indices in by_temperature(methods[0], prefix):
             largest = [max(abs(m.residuals[i].error_g) for i in indices) for m in methods]
             rows.append([f"  {degrees(temp)} degC, {kind}", *(f"{v * 1e3:.4f}" for v in largest)])
-    names = [m.method.replace("additive-", "add.-") for m in methods]
+    names = [m.method.short_label for m in methods]
     head = ["max | |a| - g |, mg", *names]
     lines = table(head, rows)
-    lines += [f"  {m.method}: {m.refusal}" for m in delivery.methods if m.refusal]
+    lines += [f"  {m.method.label}: {m.refusal}" for m in delivery.methods if m.refusal]
     return "\n".join(lines)
 
 
@@ -203,9 +198,8 @@ def _verdict(made: Passport) -> str:
     delivery = made.delivery
     bound, check, limits = delivery.bound, delivery.check, delivery.unit.limits
     q = delivery.plan.shape.output_q
-    chosen = next(m for m in delivery.methods if m.method == delivery.unit.method)
     by_key: dict[str, float] = {}
-    for r in chosen.residuals:
+    for r in delivery.chosen.residuals:
         _, key = limits.at(r.dwell.temp_degc, delivery.unit.t0_degc)
         by_key[key] = max(by_key.get(key, 0.0), abs(r.error_g))
     at_t0 = by_key.get("limits.at_t0_g")

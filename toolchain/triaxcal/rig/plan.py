@@ -12,8 +12,9 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values, key, keys_of
 from triaxcal.base.kinds import FLAG, number, rising, three, whole, word
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
+from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import DESCRIPTION, PLAUSIBLE_DEGC, UnitDescription
+from triaxcal.unit.description import DESCRIPTION, UnitDescription
 
 
 def _threshold(low: float, doc: str, default: float, unit: str = "sigma") -> float:

@@ -10,8 +10,9 @@ from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys
 from triaxcal.base.kinds import TEXT, decimal, listed, rising
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.positions import TEST_POSITIONS
+from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.readings.measurements import MEASUREMENTS_FILE, write_measurements
-from triaxcal.unit.description import PLAUSIBLE_DEGC, UnitDescription
+from triaxcal.unit.description import UnitDescription
 
 TABLES_FILE = "tables.toml"
 SOURCE = Key("source", TEXT, "Where the numbers were published.", example='"A book, page 1"')

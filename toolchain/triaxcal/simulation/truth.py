@@ -11,10 +11,11 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values, key, keys_of
 from triaxcal.base.kinds import Kind, listed, number, rising, whole
 from triaxcal.base.tomltable import shown
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.metrological import CONSTANT_NAMES, voltage_from_force
-from triaxcal.model.thermal import PiecewisePolynomial, ThermalModel
+from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.unit.description import PLAUSIBLE_DEGC, Adc
+from triaxcal.unit.description import Adc
 
 TRUTH_FILE = "truth.toml"
 SEED_MAX = 2**63 - 1
@@ -236,4 +237,4 @@ def _curves(values: Values) -> ThermalModel:
         origins_degc=(values[T0],),
         coefficients=np.array([[values[curve] for curve in CURVES]], dtype=np.float64),
     )
-    return ThermalModel(kind="polynomial", t0_degc=values[T0], curves=curves)
+    return ThermalModel(t0_degc=values[T0], curves=curves)

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.fitting.core.thermal import EDGE_DEGC, without_temperature
 from triaxcal.fitting.tilter.curves import fit_curves, parameter_operator
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
+from triaxcal.model.thermal.shape import EDGE_DEGC
 from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.propagation import Propagation
 from triaxcal.uncertainty.scatter import Scatter
@@ -104,7 +104,7 @@ def _fold(p: Propagation, left_out: int) -> HeldOut:
     kept = [g for g in range(p.groups) if g != left_out]
     remaining, group = p.data.select(kept), p.data.readings.select([left_out])
     temps = remaining.readings.temps_degc
-    shape = without_temperature(p.calibration.shape, temps, float(group.temps_degc[0]))
+    shape = p.calibration.shape.without(temps, float(group.temps_degc[0]))
     parameters = fit_curves(remaining, shape)[0]
     basis = shape.basis(group.dwell_temps_degc[0])
     constants = basis @ parameters.T

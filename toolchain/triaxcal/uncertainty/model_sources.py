@@ -6,14 +6,9 @@ import math
 
 import numpy as np
 
-from triaxcal.fitting.core.thermal import (
-    POLYNOMIAL,
-    ThermalShape,
-    dense_knots,
-    piecewise_linear_shape,
-    polynomial_shape,
-)
 from triaxcal.fitting.tilter.curves import fit_curves
+from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
+from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.uncertainty.heldout import thermal_error
 from triaxcal.uncertainty.propagation import Propagation, rows_of
 from triaxcal.uncertainty.scatter import Scatter
@@ -89,11 +84,7 @@ def _without_held_out(p: Propagation) -> Source:
 
 
 def _rival(p: Propagation) -> ThermalShape | None:
-    """The other kind of function that the temperatures determine exactly."""
+    """Another function that the temperatures determine exactly."""
     temps, t0 = p.data.readings.temps_degc, p.unit.t0_degc
-    if len(temps) < 3:
-        return None
-    chosen = p.calibration.shape
-    if chosen.kind == POLYNOMIAL and chosen.order == len(temps) - 1:
-        return piecewise_linear_shape(temps, t0, dense_knots(temps, t0))
-    return polynomial_shape(temps, t0, len(temps) - 1)
+    exact = (f.exact(temps, t0) for f in THERMAL_FUNCTIONS if len(temps) >= max(3, f.least_temps))
+    return next((shape for shape in exact if shape != p.calibration.shape), None)

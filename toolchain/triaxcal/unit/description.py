@@ -18,13 +18,15 @@ from triaxcal.base.kinds import (
     interval,
     number,
     pattern,
-    rising,
     three,
     whole,
     word,
 )
 from triaxcal.base.tomltable import has_table, read_toml, shown
+from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.positions import AXES
+from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS, owners, thermal_keys
+from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC, Settings
 from triaxcal.unit.certificate import CERTIFICATE, CertificateDetails, certificate_details
 from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.recording import (
@@ -37,16 +39,12 @@ from triaxcal.unit.recording import (
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
 OUTPUT_Q_RANGE = (8, 30)
-THERMAL_MODELS = ("polynomial", "piecewise-linear")
-METHODS = ("matrix", "inverse", "additive", "additive-simplified", "additive-first-order")
 
 FORMAT = 1
 UNIT_FILE = "unit.toml"
 T0_TOLERANCE_DEGC = 2.0
 """A dwell this near to T0 counts as one at T0."""
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
-PLAUSIBLE_DEGC = (-200.0, 400.0)
-"""Temperatures outside these are mistakes: no electronic accelerometer works there."""
 
 TERMS = ("auto", "linear", "quadratic")
 LOSSES = ("linear", "huber", "cauchy")
@@ -155,29 +153,11 @@ SITE = TableKeys("site", "Where the unit is measured.", (GRAVITY,))
 class ThermalChoice:
     """Which thermal functions to fit; `model` "auto" tries them all on held-out data.
 
-    `order` belongs to "polynomial", `knots_degc` to "piecewise-linear"; None is the default.
+    `settings` are the values of the function's own keys.
     """
 
-    model: str = key(
-        word(("auto", *THERMAL_MODELS)),
-        "Thermal functions, P1 (3), or (4) made continuous. auto takes the one that is best on "
-        "held-out data.",
-        "auto",
-    )
-    order: int | None = key(
-        whole(0, 9),
-        'Order of the polynomial; with model = "polynomial" only.',
-        None,
-        default_words="chosen as by auto",
-    )
-    knots_degc: tuple[float, ...] | None = key(
-        rising(*PLAUSIBLE_DEGC, 1, 64),
-        "Where segments meet; the ends of the calibrated range are added; with "
-        'model = "piecewise-linear" only.',
-        None,
-        "degC",
-        default_words="T0: the two segments of P1 (12)",
-    )
+    model: str
+    settings: Settings = field(default_factory=dict)
 
 
 T0 = Key(
@@ -192,7 +172,10 @@ RANGE_DEGC = Key(
     "the fitted dwells' range, outward in steps of 0.1, at most 0.5 beyond the outer temperatures",
     example="[-40, 85]",
 )
-THERMAL = TableKeys("thermal", "Temperature.", (T0, RANGE_DEGC, *keys_of(ThermalChoice)))
+
+
+def _thermal() -> TableKeys:
+    return TableKeys("thermal", "Temperature.", (T0, RANGE_DEGC, *thermal_keys()))
 
 
 def near_t0(temp_degc: float, t0_degc: float) -> bool:
@@ -315,7 +298,7 @@ class _Fit:
 class _Compensation:
     """[compensation]."""
 
-    method: str = key(word(METHODS), "What the firmware evaluates.", "matrix")
+    method: str = key(TEXT, "What the firmware evaluates.", METHODS.names[0])
     output_q: int = key(whole(*OUTPUT_Q_RANGE), "The LSB of the result is 2^-output_q g.", 24)
     model_error_max_micro_g: float = key(
         number(1e-3, 1e6),
@@ -336,24 +319,29 @@ POLARITY = Key(
     default_words="all alike",
     example="[1, 1, 1]",
 )
-_COMMON = (
-    TableKeys("fit", "How the constants are fitted.", keys_of(_Fit)),
-    TableKeys("sensor", "The sensor itself.", (POLARITY,)),
-    TableKeys("compensation", "What the firmware computes.", keys_of(_Compensation)),
-    TableKeys(
-        "uncertainty",
-        "Standard uncertainties that you know.",
-        keys_of(StatedUncertainty),
-    ),
-    CERTIFICATE,
-    MEASURED,
-    TableKeys(
-        "quadratic",
-        "Cross-coupling that a dividing head has shown.",
-        (CROSS_COUPLING, *keys_of(PairSource)),
-        optional=True,
-    ),
-)
+
+
+def _common() -> tuple[TableKeys, ...]:
+    return (
+        TableKeys("fit", "How the constants are fitted.", keys_of(_Fit)),
+        TableKeys("sensor", "The sensor itself.", (POLARITY,)),
+        TableKeys("compensation", "What the firmware computes.", keys_of(_Compensation)).but(
+            method={"kind": word(METHODS.names), "doc": METHODS.explained}
+        ),
+        TableKeys(
+            "uncertainty",
+            "Standard uncertainties that you know.",
+            keys_of(StatedUncertainty),
+        ),
+        CERTIFICATE,
+        MEASURED,
+        TableKeys(
+            "quadratic",
+            "Cross-coupling that a dividing head has shown.",
+            (CROSS_COUPLING, *keys_of(PairSource)),
+            optional=True,
+        ),
+    )
 
 
 def tilter_file() -> FileKeys:
@@ -361,7 +349,7 @@ def tilter_file() -> FileKeys:
     return FileKeys(
         UNIT_FILE,
         "A unit on a tilter",
-        (TOP, ADC, TEMPERATURE_SENSOR, SITE, THERMAL, LIMITS, *_COMMON),
+        (TOP, ADC, TEMPERATURE_SENSOR, SITE, _thermal(), LIMITS, *_common()),
     )
 
 
@@ -377,9 +365,9 @@ def recording_file() -> FileKeys:
             SITE,
             ADC.relaxed().but(LSB, bits={"default_words": "16 of counts, else 24"}),
             TEMPERATURE_SENSOR.but(degc_per_code={"default": 2.0**-7}),
-            THERMAL.but(t0_degc={"default": 20.0}),
+            _thermal().but(t0_degc={"default": 20.0}),
             LIMITS.but(at_t0_g=limit, over_range_g=limit),
-            *_COMMON,
+            *_common(),
         ),
     )
 
@@ -569,16 +557,19 @@ def _adc_of(recording: RecordingLayout, values: Values) -> Adc:
 
 
 def _thermal_choice(values: Values) -> ThermalChoice:
-    choice = values.record(ThermalChoice)
-    for name, owner in (("order", "polynomial"), ("knots_degc", "piecewise-linear")):
-        if name in values and choice.model != owner:
+    model, *settings = thermal_keys()
+    name = values[model]
+    keys = () if name == AUTO else THERMAL_FUNCTIONS[name].keys
+    for other in settings:
+        if other in values and other.name not in {own.name for own in keys}:
+            models = " or ".join(f'"{f.name}"' for f in owners(other.name))
             raise RefusedError(
-                values.where(name),
-                f'given with model = "{choice.model}"',
-                expected=f'it with model = "{owner}" only',
+                values.where(other),
+                f'given with model = "{name}"',
+                expected=f"it with model = {models} only",
                 remedy="remove it, or choose that model",
             )
-    return choice
+    return ThermalChoice(name, {own.name: values[own] for own in keys})
 
 
 def _refuse_duplicate_serial(folder: Path, serial: str) -> None:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.fitting.core.recorded import PairTerms, RecordingFit
-from triaxcal.fitting.core.thermal import ThermalShape
+from triaxcal.model.curves import ThermalModel
 from triaxcal.model.metrological import pack_blocks
 from triaxcal.model.terms import NO_TERMS, Terms
-from triaxcal.model.thermal import ThermalModel
+from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell
 
@@ -22,11 +22,8 @@ class Candidate:
     Attributes
     ----------
     estimator : str
-    thermal : str
-        "polynomial" or "piecewise-linear".
-    order : int
-    knots_degc : tuple of float
-        Empty for "polynomial".
+    shape : ThermalShape
+        The thermal function.
     parameters : int
         Of each constant's curve.
     held_out_g : float or None
@@ -34,21 +31,20 @@ class Candidate:
     fit_residual_g : float
         Rms error of the force, per component, at the fitted dwells.
     chosen : bool
-    label : str
-        The thermal function in words.
+    label, short_label : str
+        The candidate in words, and for a narrow column.
     condition : float or None
         Condition number, where a recording's poses were anyone's choice.
     """
 
     estimator: str
-    thermal: str
-    order: int
-    knots_degc: tuple[float, ...]
+    shape: ThermalShape
     parameters: int
     held_out_g: float | None
     fit_residual_g: float
     chosen: bool
     label: str
+    short_label: str
     condition: float | None = None
 
 

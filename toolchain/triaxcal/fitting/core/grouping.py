@@ -16,11 +16,9 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
+from triaxcal.model.thermal.shape import GROUP_GAP_DEGC
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
-
-GROUP_GAP_DEGC = 2.0
-"""Dwells nearer than this are at one nominal temperature; also how near T0 its group must be."""
 
 FEW_READINGS = 10
 """A dwell with fewer does not know its own standard deviation to better than a quarter."""

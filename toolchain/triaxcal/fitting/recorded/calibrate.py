@@ -10,7 +10,6 @@ import numpy as np
 from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint
 from triaxcal.fitting.core.outliers import left_out_residuals, worst_outlier
 from triaxcal.fitting.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
-from triaxcal.fitting.core.thermal import polynomial_shape
 from triaxcal.fitting.recorded.checks import (
     crowd_finding,
     refuse_few,
@@ -30,10 +29,11 @@ from triaxcal.fitting.recorded.magnitude import (
 )
 from triaxcal.fitting.recorded.rate import half_cycle_turns, pose_rates
 from triaxcal.fitting.recorded.temperatures import (
+    gain_functions,
     recording_range,
     temperature_findings,
     temperature_groups,
-    thermal_orders,
+    thermal_shapes,
 )
 from triaxcal.fitting.recorded.trials import (
     TURNS_MAX,
@@ -169,12 +169,11 @@ def _trials(
     """
     trials = []
     temps = climate.temps_degc
-    for order in thermal_orders(unit, temps, temperatures):
-        shape = polynomial_shape(temps, unit.t0_degc, order)
-        if order == 0:
+    for shape in thermal_shapes(unit, temps, temperatures):
+        if shape.parameters == 1:
             trials += [Trial(model, shape, 1) for model in _models(unit)]
         else:
-            gains = sorted({1, order, order + 1})
+            gains = gain_functions(shape)
             trials += [Trial(NINE, shape, g) for g in gains]
             if climate.rates is not None:
                 trials += [Trial(NINE, shape, g, rate=True) for g in gains]

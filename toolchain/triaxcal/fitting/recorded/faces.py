@@ -8,9 +8,9 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import did_you_mean, shown
-from triaxcal.fitting.core.grouping import GROUP_GAP_DEGC
 from triaxcal.fitting.recorded.checks import refuse_wrong_unit
 from triaxcal.model.positions import AXES, TEST_POSITIONS
+from triaxcal.model.thermal.shape import GROUP_GAP_DEGC
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.readings.samples import Samples

@@ -1,4 +1,4 @@
-"""Temperatures of a recording's poses: groups of them, the orders they carry, the range."""
+"""Temperatures of a recording's poses: groups of them, the functions they carry, the range."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ import math
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fitting.core.grouping import GROUP_GAP_DEGC
-from triaxcal.fitting.core.thermal import EDGE_DEGC, POLYNOMIAL
+from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS
+from triaxcal.model.thermal.shape import EDGE_DEGC, GROUP_GAP_DEGC, ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
 from triaxcal.unit.description import UnitDescription
 
 THERMAL_SPREAD_DEGC = 5.0
 """Poses over less than this are at one temperature: an order is not asked of them."""
-ORDER_MAX = 3
+PARAMETERS_MAX = 4
+"""Of a curve of a recording: it has no six positions at each temperature."""
 _KELVIN_MIN = 200.0
 """No chamber with an accelerometer in it is as hot in degC, and hardly one as cold in kelvin."""
 
@@ -68,43 +69,56 @@ def temperature_groups(temps_degc: FloatArray) -> list[list[int]]:
     return groups
 
 
-def thermal_orders(
+def thermal_shapes(
     unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]
-) -> tuple[int, ...]:
-    """Orders of the polynomials in temperature that are tried: 0 for one temperature.
+) -> tuple[ThermalShape, ...]:
+    """Thermal functions that are tried; the constant alone for one temperature.
 
     Raises
     ------
     RefusedError
         When unit.toml asks for what the poses' temperatures do not carry.
     """
-    asked = unit.thermal.order
-    where = f"{unit.name}/unit.toml, [thermal]"
-    if unit.thermal.model not in ("auto", POLYNOMIAL):
+    choice, t0, where = unit.thermal, unit.t0_degc, f"{unit.name}/unit.toml, [thermal]"
+    nested = [f for f in THERMAL_FUNCTIONS if f.nested]
+    functions = [f for f in nested if choice.model in (AUTO, f.name)]
+    if not functions:
         raise RefusedError(
             f"{where} model",
-            f'"{unit.thermal.model}" for a recording',
-            expected='"polynomial" or "auto"',
+            f'"{choice.model}" for a recording',
+            expected=" or ".join(f'"{name}"' for name in (*(f.name for f in nested), AUTO)),
         )
+    tried = [s for f in functions for s in f.candidates(temps, t0)]
+    constant = tried[:1]
+    asked = () if choice.model == AUTO else functions[0].stated(choice.settings, temps, t0)
+    key = f"{where} {', '.join(choice.settings)}"
+    most = min(PARAMETERS_MAX, len(temperatures))
     if float(np.ptp(temps)) < THERMAL_SPREAD_DEGC:
-        if asked:
+        if len(asked) == 1 and asked[0].parameters > 1:
             raise RefusedError(
-                f"{where} order",
-                f"order {asked}, but all {len(temps)} poses are at one temperature "
+                key,
+                f"{asked[0].detail}, but all {len(temps)} poses are at one temperature "
                 f"({temps.min():.4g} to {temps.max():.4g} degC)",
                 expected=f"poses over {THERMAL_SPREAD_DEGC:g} degC at least",
                 remedy="record poses at more temperatures, or order = 0",
             )
-        return (0,)
-    highest = min(ORDER_MAX, len(temperatures) - 1)
-    if asked and asked > highest:
+        return tuple(constant)
+    if len(asked) != 1:
+        more = [s for s in tried if 1 < s.parameters <= most]
+        return (*constant, *more)
+    if asked[0].parameters > most:
         raise RefusedError(
-            f"{where} order",
-            f"order {asked} with poses at {len(temperatures)} temperature"
+            key,
+            f"{asked[0].detail} with poses at {len(temperatures)} temperature"
             f"{'s' * (len(temperatures) != 1)}",
-            expected=f"{highest} at most",
+            expected=f"{asked[0].nested(most).detail} at most",
         )
-    return (asked,) if asked else tuple(range(highest + 1))
+    return asked
+
+
+def gain_functions(shape: ThermalShape) -> list[int]:
+    """How many functions of a shape the entries of K are tried with; the biases have all."""
+    return sorted({1, shape.parameters - 1, shape.parameters} - {0})
 
 
 def recording_range(

@@ -19,15 +19,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Candidate
-from triaxcal.fitting.core.thermal import ThermalShape
 from triaxcal.fitting.recorded.checks import CONDITION_MAX
 from triaxcal.fitting.recorded.magnitude import ScalarData, ScalarFit, ScalarModel, fit_scalar
+from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
 
 Turn = tuple[BoolArray, BoolArray]
 """Poses that are left out, and those of them that are judged, as masks."""
 TURNS_MAX = 60
 """Of hundreds of poses one more or less left out changes nothing that a rms could show."""
+
+
+def detail(shape: ThermalShape, gain_functions: int) -> str:
+    """How the constants follow temperature: U0 as `shape`, K with its first functions."""
+    if gain_functions == shape.parameters:
+        return shape.detail
+    return f"{shape.detail}, K of {shape.nested(gain_functions).detail}"
 
 
 @dataclass(frozen=True)
@@ -65,14 +72,8 @@ class Trial:
         """Words for tables."""
         if self.shape.parameters == 1 and not self.rate:
             return self.model.label
-        of_gain = f", K of order {self.gain_functions - 1}"
-        short = f"; {self.shape.label.replace('polynomial of ', '')}"
         of_rate = " and dT/dt" if self.rate else ""
-        return self.model.label + short + (of_gain if self._gain_differs else "") + of_rate
-
-    @property
-    def _gain_differs(self) -> bool:
-        return self.gain_functions != self.shape.parameters
+        return f"{self.model.label}; {detail(self.shape, self.gain_functions)}{of_rate}"
 
 
 @dataclass(frozen=True)
@@ -112,17 +113,15 @@ class Judged:
 
     def candidate(self, estimator: str, *, chosen: bool) -> Candidate:
         """Row of the table."""
-        shape = self.trial.shape
         return Candidate(
             estimator=estimator,
-            thermal=shape.kind,
-            order=shape.order,
-            knots_degc=shape.knots_degc,
+            shape=self.trial.shape,
             parameters=self.trial.parameters,
             held_out_g=self.held_out_g,
             fit_residual_g=self.fit.rms_g,
             chosen=chosen,
             label=self.trial.label,
+            short_label=self.trial.label,
             condition=self.fit.condition,
         )
 

@@ -10,7 +10,6 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint
 from triaxcal.fitting.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
-from triaxcal.fitting.core.thermal import polynomial_shape
 from triaxcal.fitting.recorded.calibrate import (
     BEYOND_1_G,
     covariance_blocks,
@@ -20,7 +19,7 @@ from triaxcal.fitting.recorded.checks import CONDITION_MAX, refuse_wrong_unit
 from triaxcal.fitting.recorded.temperatures import (
     recording_range,
     temperature_findings,
-    thermal_orders,
+    thermal_shapes,
 )
 from triaxcal.fitting.recorded.trials import beats
 from triaxcal.fitting.table.candidates import (
@@ -108,9 +107,8 @@ def calibrate_table(
 def _trials(
     unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]
 ) -> list[TableTrial]:
-    orders = thermal_orders(unit, temps, temperatures)
-    shapes = [polynomial_shape(temps, unit.t0_degc, order) for order in orders]
-    if orders != (0,):
+    shapes = thermal_shapes(unit, temps, temperatures)
+    if shapes[-1].parameters > 1:
         if unit.terms == "quadratic":
             raise RefusedError(
                 f"{unit.name}/unit.toml, [fit] terms",

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Candidate
-from triaxcal.fitting.core.thermal import ThermalShape
 from triaxcal.fitting.recorded.checks import CONDITION_MAX
 from triaxcal.fitting.recorded.frame import rotation_to, turned_constants
 from triaxcal.fitting.recorded.magnitude import NINE, fit_scalar, scalar_data
+from triaxcal.fitting.recorded.temperatures import gain_functions
+from triaxcal.fitting.recorded.trials import detail
 from triaxcal.fitting.table.oriented import (
     OrientedFit,
     SerialGrid,
@@ -26,6 +27,7 @@ from triaxcal.fitting.table.oriented import (
 )
 from triaxcal.model.metrological import force_from_voltage, pack_constants
 from triaxcal.model.terms import products
+from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
 
 LEFT_OUT_MAX = 10.0 * CONDITION_MAX
@@ -150,14 +152,13 @@ class TableRow:
         """Row of the table of candidates."""
         return Candidate(
             estimator=self.trial.way,
-            thermal=self.trial.shape.kind,
-            order=self.trial.shape.order,
-            knots_degc=(),
+            shape=self.trial.shape,
             parameters=self.trial.parameters,
             held_out_g=self.held_out_g,
             fit_residual_g=self.fitted_g,
             chosen=chosen,
             label=self.trial.label,
+            short_label=self.trial.label,
             condition=self.fit.condition,
         )
 
@@ -174,14 +175,11 @@ def one_temperature_trials(shape: ThermalShape) -> list[TableTrial]:
 
 
 def thermal_trials(shape: ThermalShape) -> list[TableTrial]:
-    """The forward form with polynomials of an order, and K with fewer functions."""
-    short = shape.label.replace("polynomial of ", "")
-    trials = []
-    for gains in sorted({1, shape.order, shape.parameters} - {0}):
-        of_gain = f", K of order {gains - 1}" if gains != shape.parameters else ""
-        label = f"linear (28); {short}{of_gain}"
-        trials.append(TableTrial(label, "forward form", shape, None, 0, gains))
-    return trials
+    """The forward form with a thermal function, and K with fewer functions."""
+    return [
+        TableTrial(f"linear (28); {detail(shape, n)}", "forward form", shape, None, 0, n)
+        for n in gain_functions(shape)
+    ]
 
 
 def turns(poses: TablePoses, temperatures: Sequence[Sequence[int]]) -> list[BoolArray]:

@@ -17,12 +17,6 @@ from triaxcal.fitting.core.grouping import (
     grouped_readings,
 )
 from triaxcal.fitting.core.recorded import PairTerms
-from triaxcal.fitting.core.thermal import (
-    EDGE_DEGC,
-    PIECEWISE_LINEAR,
-    ThermalShape,
-    refuse_undetermined,
-)
 from triaxcal.fitting.tilter.contradiction import contradiction
 from triaxcal.fitting.tilter.curves import (
     TilterData,
@@ -39,14 +33,11 @@ from triaxcal.fitting.tilter.estimators import (
     refuse_ill_conditioned,
 )
 from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
-from triaxcal.fitting.tilter.selection import (
-    PREFERENCE,
-    candidate_shapes,
-    check_errors,
-    select,
-)
+from triaxcal.fitting.tilter.selection import PREFERENCE, check_errors, select
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import NO_TERMS, Terms
+from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS
+from triaxcal.model.thermal.shape import EDGE_DEGC, ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.unit.description import UnitDescription
@@ -97,19 +88,8 @@ def _select(
     checks: tuple[Dwell, ...],
     terms: Terms,
 ) -> Selection:
-    temps = data.readings.temps_degc
-    where = f"{unit.name}/unit.toml"
-    if unit.thermal.model == PIECEWISE_LINEAR and len(temps) < 2:
-        raise RefusedError(
-            f"{where}, [thermal] model",
-            f'"{PIECEWISE_LINEAR}" with one calibrated temperature ({temps[0]:.6g} degC)',
-            expected="two temperatures or more",
-            remedy='measure at more temperatures, or choose "polynomial" with order = 0',
-        )
-    shapes = candidate_shapes(unit.thermal, temps, unit.t0_degc)
-    asked_for = unit.thermal.model == PIECEWISE_LINEAR or unit.thermal.order is not None
-    if asked_for:
-        refuse_undetermined(where, shapes[0], temps)
+    shapes = candidate_shapes(unit, data.readings.temps_degc)
+    asked_for = unit.thermal.model != AUTO and len(shapes) == 1
     return select(
         data,
         estimators,
@@ -119,6 +99,32 @@ def _select(
         limit_g=unit.limits.over_range_g,
         terms=terms,
     )
+
+
+def candidate_shapes(unit: UnitDescription, temps_degc: FloatArray) -> tuple[ThermalShape, ...]:
+    """Thermal shapes that unit.toml admits for temperatures (G,), fewer parameters first.
+
+    Raises
+    ------
+    RefusedError
+        When it asks for a function that the temperatures do not determine.
+    """
+    choice, t0, where = unit.thermal, unit.t0_degc, f"{unit.name}/unit.toml"
+    if choice.model == AUTO:
+        return tuple(s for f in THERMAL_FUNCTIONS for s in f.candidates(temps_degc, t0))
+    function = THERMAL_FUNCTIONS[choice.model]
+    if len(temps_degc) < function.least_temps:
+        raise RefusedError(
+            f"{where}, [thermal] model",
+            f'"{function.name}" with one calibrated temperature ({temps_degc[0]:.6g} degC)',
+            expected=f"{function.least_temps} temperatures or more",
+            remedy='measure at more temperatures, or choose "polynomial" with order = 0',
+        )
+    shapes = function.stated(choice.settings, temps_degc, t0)
+    reason = shapes[0].undetermined(where, temps_degc) if len(shapes) == 1 else None
+    if reason is not None:
+        raise reason
+    return shapes
 
 
 def _calibration(

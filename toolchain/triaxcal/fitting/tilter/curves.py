@@ -26,8 +26,8 @@ from functools import cached_property
 import numpy as np
 
 from triaxcal.fitting.core.grouping import GroupedReadings
-from triaxcal.fitting.core.thermal import ThermalShape
 from triaxcal.fitting.tilter.estimators import design_matrix, pack_rows
+from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
 
 

@@ -22,50 +22,15 @@ import numpy as np
 
 from triaxcal.fitting.core.calibration import Candidate, Selection
 from triaxcal.fitting.core.grouping import GroupedReadings
-from triaxcal.fitting.core.thermal import (
-    EDGE_DEGC,
-    PIECEWISE_LINEAR,
-    POLYNOMIAL,
-    ThermalShape,
-    dense_knots,
-    piecewise_linear_shape,
-    polynomial_shape,
-    without_temperature,
-)
 from triaxcal.fitting.tilter.curves import TilterData, fit_curves
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import NO_TERMS, Terms
+from triaxcal.model.thermal.shape import EDGE_DEGC, ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell
-from triaxcal.unit.description import ThermalChoice
 
 PREFERENCE = ("least-squares", "equation-10", "half-sum")
 """Estimators, the one taken first where the data do not tell them apart."""
-ORDER_MAX = 7
-"""Highest order tried by itself; a higher one can be asked for."""
-
-
-def candidate_shapes(
-    choice: ThermalChoice, temps_degc: FloatArray, t0_degc: float
-) -> tuple[ThermalShape, ...]:
-    """Thermal shapes that a choice admits, those that determine fewer parameters first."""
-    if choice.model == POLYNOMIAL and choice.order is not None:
-        return (polynomial_shape(temps_degc, t0_degc, choice.order),)
-    if choice.model == PIECEWISE_LINEAR:
-        return (piecewise_linear_shape(temps_degc, t0_degc, choice.knots_degc),)
-    count = len(temps_degc)
-    shapes = [
-        polynomial_shape(temps_degc, t0_degc, order)
-        for order in range(min(count - 1, ORDER_MAX) + 1)
-    ]
-    if choice.model != POLYNOMIAL:
-        # With two temperatures one segment is the polynomial of order 1.
-        if count > 2:
-            shapes.append(piecewise_linear_shape(temps_degc, t0_degc, None))
-        if count > 3:
-            knots = dense_knots(temps_degc, t0_degc)
-            shapes.append(piecewise_linear_shape(temps_degc, t0_degc, knots))
-    return tuple(dict.fromkeys(shapes))
 
 
 def select(
@@ -138,14 +103,13 @@ class _Row:
         shape = self.shape
         return Candidate(
             estimator=self.estimator,
-            thermal=shape.kind,
-            order=shape.order,
-            knots_degc=shape.knots_degc,
+            shape=shape,
             parameters=shape.parameters,
             held_out_g=self.held_out_g,
             fit_residual_g=self.fit_residual_g,
             chosen=chosen,
             label=shape.label,
+            short_label=shape.short_label,
         )
 
 
@@ -160,18 +124,14 @@ def _choose(rows: list[_Row], values: int) -> _Row:
     )[1]
 
 
-def _exact_key(row: _Row) -> tuple[int, int, int]:
-    """Order where nothing is held out: most parameters, hence exact, then piecewise-linear.
+def _exact_key(row: _Row) -> tuple[int, bool, int]:
+    """Order where nothing is held out: most parameters, hence exact, then the shape between points.
 
-    Of two curves through all points with as many parameters the piecewise-linear one cannot
-    overshoot between them.
+    Of two curves through all points with as many parameters the one that stays between them is
+    taken.
     """
     shape = row.shape
-    return (
-        -shape.parameters,
-        int(shape.kind != PIECEWISE_LINEAR),
-        PREFERENCE.index(row.estimator),
-    )
+    return -shape.parameters, not shape.within_points, PREFERENCE.index(row.estimator)
 
 
 def _reason(rows: list[_Row], best: _Row, folds: int, checks: int, temperatures: int) -> str:
@@ -236,7 +196,7 @@ def _folds(data: TilterData) -> list[_Fold]:
 def _fold_errors(fold: _Fold, shape: ThermalShape, design: FloatArray) -> FloatArray:
     """Errors (E, 1, 6, 3) in g at the temperature left out, of curves fitted without it."""
     temps = fold.remaining.readings.temps_degc
-    reduced = without_temperature(shape, temps, float(fold.left_out.temps_degc[0]))
+    reduced = shape.without(temps, float(fold.left_out.temps_degc[0]))
     parameters = fit_curves(fold.remaining, reduced)
     return _vector_errors(fold.left_out, reduced, parameters, design)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from triaxcal.codegen.tryout import MethodResult, Residual
+from triaxcal.codegen.tryout import Residual
 from triaxcal.delivery.unit import Delivery
 from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.budget import Budget
@@ -100,16 +100,10 @@ class Passport:
         return in_words(DIRECTIONS[self.uncertainty.worst_length()[1]])
 
     @cached_property
-    def delivered(self) -> MethodResult:
-        """Residuals of the unit's own method."""
-        d = self.delivery
-        return next(m for m in d.methods if m.method == d.unit.method)
-
-    @cached_property
     def acceptance(self) -> tuple[Acceptance, ...]:
         """Limits at T0 and over the range, as far as there are dwells to check them on."""
         unit, u = self.delivery.unit, self.uncertainty
-        limits, residuals = unit.limits, self.delivered.residuals
+        limits, residuals = unit.limits, self.delivery.chosen.residuals
         at_t0 = [r for r in residuals if near_t0(r.dwell.temp_degc, unit.t0_degc)]
         others = [r for r in residuals if not near_t0(r.dwell.temp_degc, unit.t0_degc)]
         worst = int(np.argmax(u.force_u[u.t0_index, :, LENGTH]))

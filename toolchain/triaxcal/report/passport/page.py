@@ -6,7 +6,7 @@ from typing import Any
 
 from triaxcal import __version__
 from triaxcal.codegen.templates import environment
-from triaxcal.codegen.tryout import BEFORE
+from triaxcal.codegen.tryout import MethodResult
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.firmware import checked_words, file_rows, proven_words, tool_rows
@@ -43,8 +43,8 @@ def passport_html(p: Passport) -> bytes:
         "panels": curve_panels(p),
         "panel": {"width": WIDTH, "height": HEIGHT, "left": LEFT},
         "residuals": residual_panels(p),
-        "before": _largest(p, BEFORE),
-        "after": _largest(p, p.delivery.unit.method),
+        "before": _largest(p.delivery.methods[0]),
+        "after": _largest(p.delivery.chosen),
         "over_temperature": uncertainty_panel(p),
         "budgets": [
             _budget(p.component_budget, "A component", p.component_orientation),
@@ -73,7 +73,10 @@ def _identity(p: Passport) -> dict[str, Any]:
             ("Local gravity", f"{d.unit.gravity_g * 9.80665:.6g} m/s²"),
             ("Thermal model", f"{signed(d.calibration.shape.label.replace('degC', '°C'))}"),
             ("Bias estimator", d.calibration.estimator),
-            ("Compensation", f"{d.unit.method}, LSB 2⁻{_superscript(d.plan.shape.output_q)} g"),
+            (
+                "Compensation",
+                f"{d.chosen.method.label}, LSB 2⁻{_superscript(d.plan.shape.output_q)} g",
+            ),
             ("Made by", f"triaxcal {__version__}, gcc {d.compiler}"),
             ("Inputs", f"sha256 {d.inputs_sha256[:16]}…"),
         ],
@@ -151,8 +154,7 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
     return rows
 
 
-def _largest(p: Passport, method: str) -> str:
-    result = next(m for m in p.delivery.methods if m.method == method)
+def _largest(result: MethodResult) -> str:
     return g_in_words(max(abs(r.error_g) for r in result.residuals))
 
 
@@ -203,9 +205,7 @@ def _dof(value: float) -> str:
 def _candidates(p: Passport) -> list[dict[str, Any]]:
     return [
         {
-            "label": signed(c.label.replace("degC", "°C"))
-            if len(c.knots_degc) <= 3
-            else f"piecewise-linear, {len(c.knots_degc)} knots",
+            "label": signed(c.short_label.replace("degC", "°C")),
             "estimator": c.estimator,
             "parameters": c.parameters,
             "fitted": g_in_words(c.fit_residual_g),

@@ -32,8 +32,8 @@ class _Axis:
 
 def residual_panels(p: Passport) -> list[dict[str, Any]]:
     """Context of one picture for test and one for check positions, a column a temperature."""
-    before = next(m for m in p.delivery.methods if m.method == BEFORE)
-    largest = max(abs(r.error_g) for m in (before, p.delivered) for r in m.residuals)
+    before = next(m for m in p.delivery.methods if m.method is BEFORE)
+    largest = max(abs(r.error_g) for m in (before, p.delivery.chosen) for r in m.residuals)
     axis = _Axis(round(math.log10(FLOOR_MG)), math.ceil(math.log10(max(largest * 1e3, 1.0))))
     rows = []
     for prefix, title in (
@@ -70,7 +70,7 @@ def _row(
                     {
                         "x": round(x0 + 5.0 + step * (n + 0.5), 2),
                         "before": axis.y(before[i].error_g),
-                        "after": axis.y(p.delivered.residuals[i].error_g),
+                        "after": axis.y(p.delivery.chosen.residuals[i].error_g),
                         "label": labels[n],
                     }
                     for n, i in enumerate(ordered)

@@ -17,7 +17,7 @@ from triaxcal.batch.toolchain import toolchain
 from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.routines import Reference
 from triaxcal.delivery.unit import Delivery, deliver
-from triaxcal.model.thermal import ThermalModel
+from triaxcal.model.curves import ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.report.files import all_files
 from triaxcal.report.passport.content import Passport, passport
@@ -122,4 +122,4 @@ def _worst_source(made: Passport) -> str:
 
 def _shape(delivery: Delivery) -> str:
     shape = delivery.plan.shape
-    return f"{delivery.unit.method}, order {shape.order}, {shape.segments} segment(s)"
+    return f"{delivery.chosen.method.label}, order {shape.order}, {shape.segments} segment(s)"

@@ -1,8 +1,7 @@
-"""Thermal functions of the twelve constants: P1 (3) and (4) in one form.
+"""Curves of the twelve constants over temperature: P1 (3), (4) and others in one form.
 
-Both the polynomial and the continuous piecewise-linear function are piecewise polynomials: one
-segment of any order, or several of order 1. Beyond two segments the paper's form (4), anchored at
-T0, is discontinuous; here each segment has its own origin, so neighbours meet at the knots.
+Every thermal function is a piecewise polynomial. Beyond two segments the paper's form (4), anchored
+at T0, is discontinuous; here each segment has its own origin, so neighbours meet at the knots.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from triaxcal.model.metrological import BIASES
 from triaxcal.model.types import FloatArray, IntArray
 
 
@@ -70,18 +70,31 @@ class ThermalModel:
 
     Attributes
     ----------
-    kind : str
-        "polynomial" or "piecewise-linear".
     t0_degc : float
         Reference temperature of the relative coefficients, P1 (3).
     curves : PiecewisePolynomial
         Twelve functions in the order of `CONSTANT_NAMES`: V/g for K, V for U0.
     """
 
-    kind: str
     t0_degc: float
     curves: PiecewisePolynomial
 
     def constants_at(self, temp_degc: FloatArray | float) -> FloatArray:
         """Twelve constants, shape (..., 12), at temperatures of shape (...)."""
         return self.curves(temp_degc)
+
+
+def relative_coefficients(model: ThermalModel) -> FloatArray:
+    """Coefficients alpha, beta, gamma of P1 (3), (4), shape (segments, 12, order).
+
+    Those of K are divided by the constant's value at T0 (P1 (11) lacks this division in print),
+    1/degC^n; those of U0 (alpha) are V/degC^n. In a segment that does not touch T0 they belong
+    to the segment's own origin. NaN where a constant of K is zero at T0: it has no relative form.
+    """
+    relative = model.curves.coefficients[:, :, 1:].copy()
+    at_t0 = model.constants_at(model.t0_degc)
+    divisor = np.where(np.isin(np.arange(12), BIASES), 1.0, at_t0)[:, None]
+    result: FloatArray = np.divide(
+        relative, divisor, out=np.full_like(relative, np.nan), where=divisor != 0.0
+    )
+    return result

@@ -1,0 +1,1 @@
+"""Compensation methods: a file each."""

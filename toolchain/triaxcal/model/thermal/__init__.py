@@ -1,0 +1,1 @@
+"""Thermal functions: a file each."""
