@@ -157,7 +157,7 @@ def test_stated_model_errors_rank_the_methods(methods: dict[str, Delivery]) -> N
 
 def test_residuals_of_13_before_and_after(methods: dict[str, Delivery]) -> None:
     for chosen in ("matrix", "inverse"):
-        by_method = {m.method: m for m in methods[chosen].methods}
+        by_method = {m.method.name: m for m in methods[chosen].methods}
         assert set(by_method) == {BEFORE.name, *METHODS.names}
         before: dict[float, float] = {}
         for residual in by_method[BEFORE.name].residuals:

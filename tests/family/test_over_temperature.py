@@ -80,7 +80,7 @@ def test_a_slow_ramp_does_not_dominate(tmp_path: Path) -> None:
 def test_an_order_beyond_the_temperatures_is_refused(tmp_path: Path) -> None:
     more = '[thermal]\nmodel = "polynomial"\norder = 3\n'
     folder = unit_with(tmp_path / "U", cycle((0.0, 20.0, 40.0), poses=10), more)
-    with pytest.raises(RefusedError, match="order 3 with poses at 3 temperatures; expected 2 at"):
+    with pytest.raises(RefusedError, match="3 with poses at 3 temperatures; expected order 2 at"):
         calibrated(folder)
 
 
