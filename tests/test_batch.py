@@ -205,7 +205,7 @@ def test_batch_gives_what_calib_gives(bench: Path) -> None:
     assert "2 units: 1 passed, 1 refused" in done.stdout
     lines = done.stderr.splitlines()
     assert len(lines) == 3
-    assert lines[0].endswith("notes.txt: a file, not a unit's folder; left out")
+    assert lines[0].endswith("notes.txt: a file, not a unit's folder; skipped")
     # The place is the unit's own, not the worker's.
     assert lines[1].startswith(f"refused  {bench}/units/BROKEN/measurements.csv, rows")
     assert "TP4 twice at one temperature" in lines[1]
@@ -384,7 +384,7 @@ def test_ctrl_c_while_workers_start_is_one_line(bench: Path, tmp_path: Path, tim
     lines += process.communicate(timeout=120)[1].splitlines()
     assert process.returncode == 1
     assert lines == [
-        "interrupted: finishing 1 unit under way; once more to leave at once\n",
+        "interrupted: finishing 1 unit under way; interrupt again to stop at once\n",
         f"triaxcal: batch: interrupted; {2 - times} of 1 units are done; run it again to go on",
     ]
     assert (tmp_path / "AT-CHERNIAK").exists() == (times == 1)

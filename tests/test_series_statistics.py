@@ -112,7 +112,7 @@ def test_the_terminal_names_what_stands_out() -> None:
     assert text.splitlines() == [
         "series          101 units: 100 passed, 1 refused",
         MADE,
-        "far out         U-0003",
+        "outliers        U-0003",
         text.splitlines()[3],
         "page            build/series.html",
     ]

@@ -26,14 +26,19 @@ from triaxcal.batch.local import cores, run_local
 from triaxcal.batch.order import Make, Order, Outcome, Runner
 from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import Series, run_series
+from triaxcal.cli.options import UnitFolder, example, say
 from triaxcal.report.files import SOMETIMES
 from triaxcal.report.series.page import PAGE_FILE, series_files
 from triaxcal.report.series.summary import series_summary
 from triaxcal.report.series.unit import make_unit
 
 
-@click.command()
-@click.argument("units", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.command(
+    epilog=example(
+        "triaxcal batch units/* --build build/spring", "triaxcal batch AT-SIM AT-CHERNIAK"
+    )
+)
+@click.argument("units", nargs=-1, required=True, type=UnitFolder(files=True))
 @click.option(
     "--build",
     type=click.Path(path_type=Path),
@@ -41,21 +46,28 @@ from triaxcal.report.series.unit import make_unit
     show_default=True,
     help="Folder that receives a folder for each unit, and the series' page.",
 )
-@click.option("--jobs", type=click.IntRange(1, 1024), help="Processes; one a core by default.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, 1024),
+    help="Number of processes; one for each core by default.",
+)
 @click.option("--scheduler", help="Address of a Dask scheduler, as tcp://host:8786.")
 def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str | None) -> None:
-    """Calibrate many UNITS; what is done and unchanged is not done again."""
+    """Calibrate many units; unchanged ones are not repeated.
+
+    UNITS are folders of units, or folders that contain them. The series gets a page of its own.
+    """
     if scheduler is not None and jobs is not None:
         raise click.UsageError("--jobs is for this machine; a cluster has its own workers")
     work = plan_work(units, build)
     for path, reason in work.skipped:
-        click.echo(f"{path}: {reason}; left out", err=True)
+        click.echo(f"{path}: {reason}; skipped", err=True)
     start = time.monotonic()
     if scheduler is None:
         width = jobs or cores()
         series = _run(work, build, _local(width))
     else:
-        # A lost cluster is told in one line; distributed would log tracebacks beside it.
+        # A lost cluster is reported in one line; distributed would log tracebacks beside it.
         logging.disable(logging.CRITICAL)
         client = connect(scheduler)
         try:
@@ -69,7 +81,7 @@ def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str
         journal.rewrite(build, ({**journal.read_journal(build), **series.entries}).values())
     renew(series_files(series), build)
     page = build / PAGE_FILE
-    click.echo(series_summary(series, len(work.done), seconds, width, str(page)))
+    say(series_summary(series, len(work.done), seconds, width, str(page)))
     if series.refused:
         raise RefusedError(
             "batch",
@@ -80,14 +92,16 @@ def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str
 
 def _local(jobs: int) -> Runner:
     def runner(make: Make, orders: list[Order]) -> Iterator[Outcome]:
-        return run_local(make, orders, jobs, _tell_finishing)
+        return run_local(make, orders, jobs, _report_finishing)
 
     return runner
 
 
-def _tell_finishing(count: int) -> None:
+def _report_finishing(count: int) -> None:
     units = "1 unit" if count == 1 else f"{count} units"
-    click.echo(f"interrupted: finishing {units} under way; once more to leave at once", err=True)
+    click.echo(
+        f"interrupted: finishing {units} under way; interrupt again to stop at once", err=True
+    )
 
 
 def _run(work: Work, build: Path, runner: Runner) -> Series:

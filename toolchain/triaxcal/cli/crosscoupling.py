@@ -6,8 +6,10 @@ from pathlib import Path
 
 import click
 
+from triaxcal.cli.options import PICTURE, example, say
 
-@click.command()
+
+@click.command(epilog=example("triaxcal crosscoupling pair.csv --picture pair.svg"))
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "--gravity",
@@ -16,9 +18,13 @@ import click
     show_default=True,
     help="Local gravity, m/s^2.",
 )
-@click.option("--picture", type=click.Path(path_type=Path), help="Also draw the convergence.")
+@PICTURE
 def crosscoupling(file: Path, gravity: float, picture: Path | None) -> None:
-    """Coefficients from FILE, a CSV with columns theta_deg, a_g, b_g, one row a position."""
+    """Fit the cross-coupling of a pair of accelerometers.
+
+    FILE is a CSV with columns theta_deg, a_g, b_g and one row for each position of the dividing
+    head.
+    """
     from triaxcal.cli.recorded import write_picture  # noqa: PLC0415
     from triaxcal.fitting.pair.cross_coupling import fit_pair, recursive_pair  # noqa: PLC0415
     from triaxcal.readings.pair import read_pair  # noqa: PLC0415
@@ -29,4 +35,4 @@ def crosscoupling(file: Path, gravity: float, picture: Path | None) -> None:
     recursion = recursive_pair(theta, a, b, gravity / 9.80665)
     if picture is not None:
         write_picture(picture, pair_picture(recursion))
-    click.echo(pair_text(fit, recursion))
+    say(pair_text(fit, recursion))

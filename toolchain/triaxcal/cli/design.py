@@ -7,16 +7,21 @@ from pathlib import Path
 import click
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.cli.options import example, say
 from triaxcal.design.problem import read_problem
 from triaxcal.design.search import best, usual
 from triaxcal.design.words import comparison, rig_plan
 
 
-@click.command()
+@click.command(epilog=example("triaxcal design rig/design.toml --plan my-plan.toml"))
 @click.argument("question", type=click.Path(path_type=Path))
 @click.option("--plan", type=click.Path(path_type=Path), help="Write the plan for `rig run` here.")
 def design(question: Path, plan: Path | None) -> None:
-    """Find the plan that answers QUESTION, a TOML file, in the least chamber time."""
+    """Find the plan that takes the least chamber time.
+
+    QUESTION is a TOML file with the uncertainty that is wanted and what is known of unit and
+    chamber: see docs/how-to/design.md.
+    """
     problem = read_problem(question)
     ordinary = usual(problem)
     found = best(problem, problem.target_g or ordinary.expanded_g)
@@ -29,6 +34,6 @@ def design(question: Path, plan: Path | None) -> None:
             raise RefusedError(
                 str(plan), f"cannot be written: {(error.strerror or str(error)).lower()}"
             ) from error
-    click.echo(comparison(problem, ordinary, found))
+    say(comparison(problem, ordinary, found))
     if plan is not None:
-        click.echo(f"\n{plan} written; take it with: triaxcal rig run --plan {plan} ...")
+        click.echo(f"\n{plan} written; measure by it with: triaxcal rig run --plan {plan}")

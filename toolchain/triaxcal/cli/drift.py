@@ -6,12 +6,18 @@ from pathlib import Path
 
 import click
 
+from triaxcal.cli.options import PICTURE, UnitFolder, example, say
 
-@click.command()
-@click.argument("unit", type=click.Path(path_type=Path))
-@click.option("--picture", type=click.Path(path_type=Path), help="Also draw it into this SVG.")
+
+@click.command(epilog=example("triaxcal drift MPU-1 --picture drift.svg"))
+@click.argument("unit", type=UnitFolder())
+@PICTURE
 def drift(unit: Path, picture: Path | None) -> None:
-    """Show what the outputs of UNIT do over a thermal cycle at rest in one orientation."""
+    """Compare heating with cooling in one orientation.
+
+    The recording of UNIT is a thermal cycle at rest. Its half-cycles show the hysteresis, and
+    whether a term in dT/dt predicts held-out half-cycles better.
+    """
     from triaxcal.cli.recorded import recorded, write_picture  # noqa: PLC0415
     from triaxcal.fitting.core.drift import study  # noqa: PLC0415
     from triaxcal.report.studies import drift_picture, drift_text  # noqa: PLC0415
@@ -20,4 +26,4 @@ def drift(unit: Path, picture: Path | None) -> None:
     found = study(samples)
     if picture is not None:
         write_picture(picture, drift_picture(samples, found, layout))
-    click.echo(drift_text(found, layout))
+    say(drift_text(found, layout))

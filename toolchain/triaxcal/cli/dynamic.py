@@ -11,21 +11,24 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.termui import progressbar
 
-from triaxcal.cli.options import unit_and_build
+from triaxcal.cli.options import example, say, unit_and_build
 
 if TYPE_CHECKING:
     from triaxcal.delivery.imu import ImuDelivery
 
 
-@click.command()
+@click.command(epilog=example("triaxcal dynamic IMU-SIM", "triaxcal dynamic IMU-SIM --plan"))
 @unit_and_build
 @click.option(
     "--plan",
     is_flag=True,
-    help="Only tell what the motion planned in imu_truth.toml will let see, without a recording.",
+    help="Only report what the motion in imu_truth.toml determines; without a recording.",
 )
 def dynamic(unit: Path, build: Path, plan: bool) -> None:
-    """Calibrate the IMU UNIT, a folder with unit.toml and a recording on a turntable."""
+    """Calibrate a whole IMU from a recording on a turntable.
+
+    The folder UNIT has the recording, and a unit.toml with the table [dynamic].
+    """
     if plan:
         tell_plan(unit)
     else:
@@ -33,13 +36,13 @@ def dynamic(unit: Path, build: Path, plan: bool) -> None:
 
 
 def tell_plan(unit: Path) -> None:
-    """Print what a planned motion will let see; nothing is written."""
+    """Print what a planned motion determines; nothing is written."""
     from triaxcal.design.imu import plan_unit  # noqa: PLC0415
     from triaxcal.report.dynamic import plan_summary  # noqa: PLC0415
 
     with _bar() as progress:
         done = plan_unit(unit, progress)
-    click.echo(plan_summary(done))
+    say(plan_summary(done))
 
 
 def calibrate_imu(unit: Path, build: Path) -> None:
@@ -52,7 +55,7 @@ def calibrate_imu(unit: Path, build: Path) -> None:
     files = dynamic_files(made)
     target = build / made.done.unit.name
     publish(files, target, C_FILES)
-    click.echo(dynamic_summary(made, files, str(target)))
+    say(dynamic_summary(made, files, str(target)))
 
 
 def delivered_imu(unit: Path) -> ImuDelivery:

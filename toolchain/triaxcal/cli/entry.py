@@ -12,8 +12,9 @@ def entry() -> None:
     """Run the command line."""
     try:
         # The same clean way out for a closed terminal and a polite kill as for Ctrl-C.
-        for name in (signal.SIGTERM, signal.SIGHUP):
-            signal.signal(name, signal.default_int_handler)
+        for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP
+            if hasattr(signal, name):
+                signal.signal(getattr(signal, name), signal.default_int_handler)
         from triaxcal.cli.main import run  # noqa: PLC0415
 
         run()

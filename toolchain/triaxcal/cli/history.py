@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from triaxcal.cli.options import UnitFolder, example, say
 from triaxcal.delivery.unit import Delivery
 from triaxcal.report.history import contradiction, history_text
 from triaxcal.uncertainty.history import (
@@ -18,13 +19,16 @@ from triaxcal.uncertainty.history import (
 from triaxcal.unit.description import read_unit
 
 
-@click.command()
-@click.argument("unit", type=click.Path(path_type=Path))
+@click.command(epilog=example("triaxcal history AT-0042"))
+@click.argument("unit", type=UnitFolder())
 def history(unit: Path) -> None:
-    """Compare the calibrations of UNIT: its history/*.csv, by name, and measurements.csv."""
+    """Compare the calibrations of a unit over time.
+
+    UNIT has earlier readings as history/*.csv, whose names are dates, beside measurements.csv.
+    """
     description = read_unit(unit)
     found = read_history(unit, description)
-    click.echo(
+    say(
         history_text(
             description.serial,
             found,

@@ -12,10 +12,19 @@ import click
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
-from triaxcal.cli.options import unit_and_build
+from triaxcal.cli.options import UnitFolder, example, say, unit_and_build
 
 if TYPE_CHECKING:
     from triaxcal.codegen.compiler import Compilation
+
+
+SECTIONS = {
+    "Calibrate": ("calib", "dynamic", "batch"),
+    "Look at readings and results": ("poses", "drift", "crosscoupling", "history"),
+    "Check the generated C": ("verify", "target"),
+    "Plan, measure, simulate": ("init", "design", "rig", "simulate"),
+}
+"""Commands in the order of the help; one that is not named here comes last."""
 
 
 class _Commands(click.Group):
@@ -36,19 +45,40 @@ class _Commands(click.Group):
         assert isinstance(command, click.Command)
         return command
 
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        rest = self.list_commands(ctx)
+        for title, names in {**SECTIONS, "Other commands": tuple(rest)}.items():
+            rows = []
+            for name in (n for n in names if n in rest):
+                command = self.get_command(ctx, name)
+                assert command is not None
+                rows.append((name, command.get_short_help_str(formatter.width)))
+                rest.remove(name)
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=example("triaxcal calib AT-SIM", "triaxcal calib --help"),
+)
 @click.version_option(__version__, prog_name="triaxcal")
 def main() -> None:
-    """From tilter readings of a triaxial accelerometer to verified fixed-point C."""
+    """From readings of a triaxial accelerometer to verified fixed-point C.
+
+    UNIT is the folder of a unit, or its name if the folder lies in units/.
+    """
 
 
-@main.command()
+@main.command(epilog=example("triaxcal calib AT-SIM", "triaxcal calib units/AT-SIM --build out"))
 @unit_and_build
 def calib(unit: Path, build: Path) -> None:
-    """Calibrate UNIT, a folder with unit.toml and measurements.csv, and write its C.
+    """Calibrate a unit and write its C.
 
-    A unit whose unit.toml has [dynamic] is an IMU: the same as `triaxcal dynamic`.
+    The folder UNIT has unit.toml and the readings that it names, usually measurements.csv. A unit
+    whose unit.toml has a table [dynamic] is an IMU: `triaxcal dynamic` does the same.
     """
     from triaxcal.codegen.compiler import reference_under_way  # noqa: PLC0415
 
@@ -81,20 +111,26 @@ def _calibrate_accelerometer(unit: Path, build: Path, reference: Compilation) ->
     files = all_files(delivery, made)
     target = build / delivery.unit.name
     publish(files, target, SOMETIMES)
-    click.echo(summary(made, files, str(target)))
+    say(summary(made, files, str(target)))
     if warning:
         click.echo(warning, err=True)
 
 
-@main.command()
-@click.argument("unit", type=click.Path(path_type=Path))
+@main.command(
+    epilog=example(
+        "triaxcal simulate AT-SIM --seed 7",
+        "triaxcal simulate AT-SIM --series 40 --into build/units",
+    )
+)
+@click.argument("unit", type=UnitFolder())
 @click.option("--seed", type=int, help="Replaces the seed of truth.toml or imu_truth.toml.")
-@click.option("--series", type=int, help="Write so many units that differ from UNIT instead.")
+@click.option("--series", type=int, help="Write this many units that differ from UNIT instead.")
 @click.option("--into", type=click.Path(path_type=Path), help="Folder of the series' units.")
 def simulate(unit: Path, seed: int | None, series: int | None, into: Path | None) -> None:
-    """Write measurements.csv of UNIT, a folder with unit.toml and truth.toml (or tables.toml).
+    """Write the readings of a simulated unit.
 
-    An IMU, with imu_truth.toml, receives recording.csv.
+    The folder UNIT has unit.toml and truth.toml (or tables.toml), and receives measurements.csv. An
+    IMU has imu_truth.toml and receives recording.csv.
     """
     from triaxcal.simulation.series import write_series  # noqa: PLC0415
     from triaxcal.simulation.unit import write_simulated_unit  # noqa: PLC0415

@@ -1,14 +1,54 @@
-"""What the commands that calibrate one unit ask for."""
+"""What the commands share: a unit's folder, the help's form, words on the screen."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
-_UNIT = click.argument("unit", type=click.Path(path_type=Path))
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.screentext import wrapped
+
+UNITS = Path("units")
+_WIDTHS = 60, 120
+"""Columns of text: a narrower terminal breaks the lines itself, a longer line is hard to read."""
+
+
+class UnitFolder(click.ParamType[Path]):
+    """The folder of a unit, by its path or by its name in units/."""
+
+    name = "unit"
+
+    def __init__(self, files: bool = False) -> None:
+        self.files = files  # `batch` skips files: units/* names them as well
+
+    def convert(
+        self, value: Any, _param: click.Parameter | None, _ctx: click.Context | None
+    ) -> Path:
+        """Folder `value`, or units/`value` where only that can be meant."""
+        path = Path(value)
+        if path.is_file() and not self.files:
+            raise RefusedError(
+                str(path), "a file", expected="the unit's folder", remedy=f"give {path.parent}"
+            )
+        is_name = len(path.parts) == 1 and path.name not in {"", ".."}
+        return UNITS / path if is_name and not path.exists() and UNITS.is_dir() else path
+
+    def shell_complete(
+        self, _ctx: click.Context, _param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Names in units/; the shell adds the folders there are."""
+        from triaxcal.unit.description import list_units  # noqa: PLC0415
+
+        names = [CompletionItem(n) for n in list_units(UNITS) if n.startswith(incomplete)]
+        return names or [CompletionItem(incomplete, type="dir")]
+
+
+_UNIT = click.argument("unit", type=UnitFolder())
 _BUILD = click.option(
     "--build",
     type=click.Path(path_type=Path),
@@ -18,6 +58,20 @@ _BUILD = click.option(
 )
 
 
+PICTURE = click.option("--picture", type=click.Path(path_type=Path), help="Also draw this SVG.")
+
+
 def unit_and_build(command: Callable[..., Any]) -> Callable[..., Any]:
     """UNIT and --build."""
     return _UNIT(_BUILD(command))
+
+
+def example(*lines: str) -> str:
+    """Epilog of a command's help: command lines that can be copied."""
+    return "\b\nExample:\n" + "\n".join(f"  {line}" for line in lines)
+
+
+def say(text: str) -> None:
+    """Print text with its words wrapped to the terminal, to 80 columns where there is none."""
+    narrow, wide = _WIDTHS
+    click.echo(wrapped(text, min(max(shutil.get_terminal_size().columns, narrow), wide)))

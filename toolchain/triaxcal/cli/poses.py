@@ -6,12 +6,17 @@ from pathlib import Path
 
 import click
 
+from triaxcal.cli.options import PICTURE, UnitFolder, example, say
 
-@click.command()
-@click.argument("unit", type=click.Path(path_type=Path))
-@click.option("--picture", type=click.Path(path_type=Path), help="Also draw them into this SVG.")
+
+@click.command(epilog=example("triaxcal poses MPU-1 --picture poses.svg"))
+@click.argument("unit", type=UnitFolder())
+@PICTURE
 def poses(unit: Path, picture: Path | None) -> None:
-    """Show the poses in the recording of UNIT, a folder with unit.toml."""
+    """List the poses in a recording, and the stretches refused.
+
+    The unit.toml of UNIT has a table [recording].
+    """
     from triaxcal.cli.recorded import recorded, write_picture  # noqa: PLC0415
     from triaxcal.poses.poses import find_poses  # noqa: PLC0415
     from triaxcal.report.studies import poses_picture, poses_text  # noqa: PLC0415
@@ -20,4 +25,4 @@ def poses(unit: Path, picture: Path | None) -> None:
     found = find_poses(samples, layout)
     if picture is not None:
         write_picture(picture, poses_picture(samples, found, layout))
-    click.echo(poses_text(found, layout))
+    say(poses_text(found, layout))

@@ -7,14 +7,19 @@ from pathlib import Path
 
 import click
 
+from triaxcal.cli.options import UnitFolder, example, say
 
-@click.group()
+
+@click.group(epilog=example("triaxcal target test AT-SIM"))
 def target() -> None:
-    """The generated C on Cortex-M, RISC-V and a big-endian core, under emulation."""
+    """Test and measure the generated C on other processors.
+
+    Cortex-M, RISC-V and a big-endian core are emulated by QEMU.
+    """
 
 
-@target.command()
-@click.argument("unit", required=False, type=click.Path(path_type=Path))
+@target.command(epilog=example("triaxcal target test", "triaxcal target test AT-SIM"))
+@click.argument("unit", required=False, type=UnitFolder())
 @click.option(
     "--build",
     type=click.Path(path_type=Path),
@@ -23,10 +28,10 @@ def target() -> None:
     help="Folder that receives targets.json.",
 )
 def test(unit: Path | None, build: Path) -> None:
-    """Compare every core, compiler and optimisation with Python, bit for bit.
+    """Compare the C on every core with Python, bit for bit.
 
-    UNIT is a folder with unit.toml and measurements.csv; without it, the shapes of the shipped
-    units in units/ are tried. Exit code 1 unless every build was done and passed.
+    Every compiler and optimisation is tried, with the C of UNIT or, without it, of the shipped
+    units in units/. The exit code is 1 unless every build was done and passed.
     """
     from triaxcal.base.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.targets.matrix import (  # noqa: PLC0415
@@ -49,12 +54,12 @@ def test(unit: Path | None, build: Path) -> None:
 
     outcomes = run_builds(builds, progress)
     publish({"targets.json": matrix_json(outcomes).encode()}, build)
-    click.echo(matrix_table(outcomes))
+    say(matrix_table(outcomes))
     if counts(outcomes)[PASSED] != len(outcomes):
         sys.exit(1)
 
 
-@target.command()
+@target.command(epilog=example("triaxcal target bench --build out"))
 @click.option(
     "--build",
     type=click.Path(path_type=Path),
@@ -68,9 +73,10 @@ def test(unit: Path | None, build: Path) -> None:
     help="Markdown page whose generated table is replaced.",
 )
 def bench(build: Path, page: Path | None) -> None:
-    """Count instructions, flash, RAM and stack of a call on every core, beside floating point.
+    """Count instructions, flash, RAM and stack of a call.
 
-    Exit code 1 unless everything was measured.
+    Each core is measured with the generated C and with the same in floating point. The exit code is
+    1 unless everything was measured.
     """
     from triaxcal.base.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.targets.bench import Cost, compiler_versions, run_bench  # noqa: PLC0415

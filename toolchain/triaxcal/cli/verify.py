@@ -8,23 +8,24 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import unit_and_build
+from triaxcal.cli.options import example, say, unit_and_build
 
 
-@click.command()
+@click.command(epilog=example("triaxcal verify AT-SIM"))
 @unit_and_build
 def verify(unit: Path, build: Path) -> None:
-    """Verify the C of UNIT with Gappa, Frama-C, cppcheck, gcc and clang.
+    """Verify the generated C with independent tools.
 
-    UNIT is calibrated as by `calib`; the results go into its verification.json. Exit code 1 when
-    a check failed; tools that are not installed are named, and their checks count as not done.
+    UNIT is calibrated as by `calib`. Then Gappa, Frama-C, cppcheck, gcc and clang check its C, and
+    their results go into verification.json. The checks of a tool that is not installed count as not
+    done. The exit code is 1 when a check failed.
     """
     from triaxcal.base.tomltable import has_table  # noqa: PLC0415
     from triaxcal.unit.description import find_unit  # noqa: PLC0415
 
     run = _verify_imu if has_table(find_unit(unit), "dynamic") else _verify_accelerometer
     target, code = run(unit, build)
-    click.echo(f"\nresults in {target / 'verification.json'}; what they mean: docs/verification.md")
+    say(f"\nresults in {target / 'verification.json'}; what they mean: docs/verification.md")
     sys.exit(code)
 
 
@@ -52,7 +53,7 @@ def _verify_accelerometer(unit: Path, build: Path) -> tuple[Path, int]:
     record(target, tools)
     renew(passport_files(passport(delivery, tools)), target)
     click.echo(f"unit {delivery.unit.name}\n")
-    click.echo(table([*delivery_outcomes(delivery.bound, delivery.check), *outcomes]))
+    say(table([*delivery_outcomes(delivery.bound, delivery.check), *outcomes]))
     return target, exit_code(outcomes)
 
 
@@ -83,5 +84,5 @@ def _verify_imu(unit: Path, build: Path) -> tuple[Path, int]:
     before = imu_delivery_outcomes(made.c.build)
     shown = {name.replace("_", " "): [*before[name], *groups[name]] for name in groups}
     click.echo(f"unit {made.done.unit.name}\n")
-    click.echo(grouped_table(shown))
+    say(grouped_table(shown))
     return target, exit_code([o for outcomes in groups.values() for o in outcomes])

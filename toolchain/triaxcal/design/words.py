@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from triaxcal.base.screentext import table
 from triaxcal.design.problem import Problem
 from triaxcal.design.search import Design
 
@@ -21,7 +22,7 @@ def comparison(problem: Problem, usual: Design, found: Design) -> str:
         ("95 % of a, micro-g", *(f"{d.expanded_g * 1e6:.3g}" for d in (usual, found))),
         ("chamber time", *(_duration(d.chamber_s) for d in (usual, found))),
     ]
-    lines = [f"{name:<24}{a:>12}{b:>14}" for name, a, b in rows]
+    lines = table(rows[0], rows[1:])
     saved = 1.0 - found.chamber_s / usual.chamber_s
     than = "less" if saved >= 0 else "more"
     degrees = ", ".join(f"{t:g}" for t in found.temps_degc)
@@ -40,12 +41,12 @@ def observability(problem: Problem, found: Design) -> list[str]:
     count, order = len(found.temps_degc), problem.order
     spare = count - order - 1
     return [
-        "Six positions determine all twelve constants at each temperature, and two residuals an",
-        "output are left: they show noise and the tilter's squareness, half of it.",
-        f"{count} temperatures determine polynomials of order {order}, {spare} to spare: with one",
-        "left out the curve is still predicted there, and a wrong order shows.",
-        "Not seen by any of this: the tilter's level and alignment as a whole, local gravity, the",
-        "thermometer's scale, hysteresis. Their uncertainty has to be stated.",
+        "Six positions determine all twelve constants at each temperature.",
+        "Two residuals of each output are left: they show noise, and half of the squareness.",
+        f"{count} temperatures determine polynomials of order {order}, with {spare} to spare.",
+        "So the curve can be predicted at a held-out temperature, and a wrong order shows.",
+        "No plan of this kind shows the tilter's level and alignment as a whole, local",
+        "gravity, the thermometer's scale or hysteresis. State their uncertainty.",
     ]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterable
 from typing import Any
 
@@ -136,14 +135,9 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
             call = "  SHOWN: switch it on" if effect.shown else ""
             size = f"{effect.chi_square:.1f} of {effect.states}"
             lines.append(f"  {effect.name:24s} {size:>14s}{call}")
-            lines += textwrap.wrap(
-                effect.hint, 80, initial_indent=" " * 8, subsequent_indent=" " * 8
-            )
+            lines += [" " * 8 + effect.hint] if effect.hint else []
     lines += _seen_lines(seen)
-    lines += ["", *imu_c_lines(made), "", f"files           {target}/"]
-    lines += textwrap.wrap(
-        "  ".join(files), 80, initial_indent=" " * 16, subsequent_indent=" " * 16
-    )
+    lines += ["", *imu_c_lines(made), "", f"files           {target}/", " " * 16 + ", ".join(files)]
     return "\n".join(lines)
 
 
@@ -172,8 +166,7 @@ def _seen_lines(seen: Observability) -> list[str]:
         lines += ["", "not seen by this motion (their values are the prior's guess):"]
         lines += ["  " + " with ".join(names) for names in seen.unseen]
     for weak in seen.weak:
-        lines += ["", "known badly:"]
-        lines += textwrap.wrap(weak_words(weak), 80, initial_indent="  ", subsequent_indent="  ")
+        lines += ["", "known badly:", f"  {weak_words(weak)}"]
     if seen.together:
         lines += ["", "known only together:"]
         lines += [f"  {a} and {b}, correlation {c:+.4f}" for a, b, c in seen.together]

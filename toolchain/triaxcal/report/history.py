@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from triaxcal.base.screentext import table
 from triaxcal.uncertainty.history import EN_MAX, Calibrated, Change, Repeatability
 
 
@@ -9,22 +10,25 @@ def history_text(
     serial: str, history: list[Calibrated], found: list[Change], repeat: Repeatability | None
 ) -> str:
     """Table of the changes, what repeats, and what contradicts."""
+    head = ["calibration", "bias mg", "scale ppm", "cross urad", "En", "where"]
+    rows = [
+        [
+            c.name, f"{c.bias_mg:+.4f}", f"{c.scale_ppm:+.1f}", f"{c.cross_axis_micro_rad:+.1f}",
+            f"{c.en:.2f}", c.where.replace("°C", "degC"),
+        ]
+        for c in found
+    ]  # fmt: skip
     lines = [
         f"{len(history)} calibrations of {serial}; largest change since the one before, at T0",
         "",
-        f"{'calibration':<16}{'bias mg':>10}{'scale ppm':>12}{'cross urad':>12}{'En':>8}  where",
-        f"{history[0].name:<16}{'-':>10}{'-':>12}{'-':>12}{'-':>8}",
-        *(
-            f"{c.name:<16}{c.bias_mg:>+10.4f}{c.scale_ppm:>+12.1f}{c.cross_axis_micro_rad:>+12.1f}"
-            f"{c.en:>8.2f}  {c.where.replace('°C', 'degC')}"
-            for c in found
-        ),
+        *table(head, [[history[0].name, *"----", ""], *rows], left=(0, 5)),
         "",
-        "En: the largest of 36 differences over its expanded uncertainty (95 %). Chance alone",
-        f"gives more than {EN_MAX:.2f} in one comparison of twenty: above it, the two contradict.",
+        "En: the largest of 36 differences, divided by its expanded uncertainty (95 %).",
+        f"Chance alone gives more than {EN_MAX:.2f} in one comparison of twenty; above that, the",
+        "two calibrations contradict each other.",
     ]
     if repeat is None:
-        lines.append("Repeatability: too few calibrations to tell.")
+        lines.append("Repeatability: unknown, there are too few calibrations.")
     else:
         about = "about a straight line in time" if repeat.years else "about their mean"
         lines.append(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from triaxcal.base.screentext import table
 from triaxcal.fitting.core.drift import Drift
 from triaxcal.fitting.pair.cross_coupling import NAMES, UNITS, PairFit, Recursion, converged_at
 from triaxcal.model.positions import AXES
@@ -11,7 +12,6 @@ from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
 from triaxcal.readings.samples import Samples
 from triaxcal.report.line_plot import BAD, COLOURS, GOOD, Band, Line, Panel, line_plot
-from triaxcal.report.summary import table
 from triaxcal.unit.recording import RecordingLayout
 
 _ARCSEC_PER_RAD = 180.0 * 3600.0 / np.pi
@@ -47,8 +47,8 @@ def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
     head = ["pose", "line", "from s", "still s", *(f"{a} {unit}" for a in AXES), "degC", "section"]
     blocks.append("\n".join(table(head, rows)))
     if poses.refused:
-        told = [f"pose {r.number} (line {r.line}): {r.reason}" for r in poses.refused]
-        blocks.append("no poses:\n  " + "\n  ".join(told))
+        reasons = [f"pose {r.number} (line {r.line}): {r.reason}" for r in poses.refused]
+        blocks.append("still, but refused as poses:\n  " + "\n  ".join(reasons))
     if poses.findings:
         blocks.append("found:\n  " + "\n  ".join(poses.findings))
     count, refused = len(poses.poses), len(poses.refused)
@@ -91,7 +91,7 @@ def poses_picture(samples: Samples, poses: PoseSet, layout: RecordingLayout) -> 
 
 
 def drift_text(drift: Drift, layout: RecordingLayout) -> str:
-    """Hysteresis by name, then every candidate with what it misses on half-cycles left out."""
+    """Hysteresis, then every candidate with its error on held-out half-cycles."""
     one_g = layout.reading_of_1_g
     scale, unit = (1e3 / one_g, "mg") if one_g else (1.0, layout.acceleration_unit)
     halves = "; ".join(h.label(drift.temp_degc) for h in drift.halves)
@@ -128,15 +128,15 @@ def _held_out(values: FloatArray, scale: float) -> list[str]:
 def _why(drift: Drift, scale: float, unit: str) -> str:
     chosen = drift.chosen
     if chosen.held_out is None:
-        return "one half-cycle: nothing can be held out, so nothing is chosen by it"
+        return "one half-cycle only: none can be held out, so no candidate is chosen"
     score = f"{chosen.score * scale:.3g} {unit}"
     text = (
-        f"* {chosen.label}: {score} on half-cycles left out, the simplest within 10 % of the best"
+        f"* {chosen.label}: held-out error {score}, the simplest candidate within 10 % of the best"
     )
     plain = [row for row in drift.rows if row.rate is None]
     best = min(plain, key=lambda row: row.score)
     if chosen.rate is None:
-        return text + "; a term in dT/dt does not win"
+        return text + "; a term in dT/dt does not improve it"
     rate = ", ".join(f"{v * scale:.3g}" for v in chosen.rate)
     return (
         f"{text}; without dT/dt the best is {best.score * scale:.3g} ({best.label}). dT/dt term: "

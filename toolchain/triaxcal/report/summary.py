@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
+from triaxcal.base.screentext import table
 from triaxcal.delivery.unit import Delivery
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import RecordingFit
@@ -26,7 +27,7 @@ def summary(made: Passport, files: Iterable[str], where: str) -> str:
         _residuals(delivery),
         _uncertainty(made),
         _verdict(made),
-        _entry("files", f"{where}/", *_wrap("  ".join(sorted(files)))),
+        _entry("files", f"{where}/", ", ".join(sorted(files))),
     ]
     return "\n\n".join(blocks)
 
@@ -34,28 +35,6 @@ def summary(made: Passport, files: Iterable[str], where: str) -> str:
 def _entry(label: str, *lines: str) -> str:
     indent = "\n" + " " * _LABEL
     return f"{label:<{_LABEL}}" + indent.join(lines)
-
-
-def _wrap(text: str, width: int = 80 - _LABEL) -> list[str]:
-    lines = [""]
-    for word in text.split(" "):
-        if len(lines[-1]) + len(word) + 1 > width and lines[-1]:
-            lines.append("")
-        lines[-1] += (" " if lines[-1] else "") + word
-    return [line.strip() for line in lines]
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Columns two spaces apart, the first to the left, the others to the right."""
-    cells = [list(head), *map(list, rows)]
-    widths = [max(len(row[c]) for row in cells) for c in range(len(head))]
-    return [
-        "  ".join(
-            cell.ljust(width) if c == 0 else cell.rjust(width)
-            for c, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in cells
-    ]
 
 
 def _head(delivery: Delivery) -> str:
@@ -69,10 +48,10 @@ def _head(delivery: Delivery) -> str:
     return "\n".join(
         [
             _entry("unit", f"{delivery.unit.name}  (serial {delivery.unit.serial})"),
-            _entry("measured", *_wrap(measured)),
+            _entry("measured", measured),
             *_findings(calibration),
-            _entry("thermal model", *_wrap(calibration.selection_reason)),
-            _entry("method", *_wrap(method)),
+            _entry("thermal model", calibration.selection_reason),
+            _entry("method", method),
             _entry(
                 "range",
                 f"{low:g} to {high:g} degC, {_thousands(delivery.bound.codes)} temperature codes; "
@@ -85,20 +64,20 @@ def _head(delivery: Delivery) -> str:
 def _findings(calibration: Calibration) -> list[str]:
     """What a recording's poses are worth, and what was found in them."""
     recording = calibration.recording
-    found = [_entry("found", *_wrap(finding)) for finding in calibration.findings]
+    found = [_entry("found", finding) for finding in calibration.findings]
     if recording is None:
         return found
     worth = f"condition number {recording.condition:.3g} (1 is the best)"
-    worth += f"; the poses see {recording.weakest} least" if recording.weakest else ""
-    return [_left_out(recording), _entry("observability", *_wrap(worth)), *found]
+    worth += f"; the poses determine {recording.weakest} least" if recording.weakest else ""
+    return [_held_out(recording), _entry("observability", worth), *found]
 
 
-def _left_out(recording: RecordingFit) -> str:
-    """What counts most of a recording: |a| at poses that the fit has not seen."""
+def _held_out(recording: RecordingFit) -> str:
+    """The held-out error of a recording: |a| at poses that the fit has not seen."""
     if recording.left_out_length_g is None:
-        return _entry("left out", "nothing: no pose can be spared to check the others on")
+        return _entry("held out", "nothing: the fit needs every pose, so none is left to check it")
     rms = recording.left_out_length_g * 1e3
-    return _entry("left out", f"|a| - g: {rms:.4f} mg rms at poses that the fit has not seen")
+    return _entry("held out", f"|a| - g: {rms:.4f} mg rms at poses that the fit has not seen")
 
 
 def _thousands(number: int) -> str:
@@ -172,8 +151,8 @@ def _residuals(delivery: Delivery) -> str:
 def _uncertainty(made: Passport) -> str:
     """Expanded uncertainty of the acceleration, what it comes from, and limits it does not keep."""
     if not made.checked:
-        unknown = "unknown: as many constants as poses, so the poses say nothing of it; record more"
-        return _entry("uncertainty", *_wrap(unknown))
+        unknown = "unknown: as many constants as poses leave no residuals; record more poses"
+        return _entry("uncertainty", unknown)
     components, length = made.component_budget, made.length_budget
     reached = (
         f"95 %, worst orientation at 1 g: {_small_g(components.expanded)} a component, "
@@ -187,7 +166,7 @@ def _uncertainty(made: Passport) -> str:
     ]
     lines = [reached, *missed, *made.uncertainty.warnings]
     text = " ".join(lines).replace("°C", "degC").replace("µ", "micro-")
-    return _entry("uncertainty", *_wrap(text))
+    return _entry("uncertainty", text)
 
 
 def _small_g(value_g: float) -> str:

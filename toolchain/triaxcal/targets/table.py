@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 
 from triaxcal import __version__
+from triaxcal.base.screentext import table
 from triaxcal.targets.cores import CORES
 from triaxcal.targets.matrix import (
     ARITHMETIC_NAMES,
@@ -28,7 +29,7 @@ def counts(outcomes: Sequence[Outcome]) -> dict[str, int]:
 def matrix_table(outcomes: Sequence[Outcome]) -> str:
     """A row for each shape and arithmetic, a column for each core: passed of all."""
     names = [core.name.replace(" (big-endian)", "") for core in CORES]
-    lines = [f"{'shape':24}{'arithmetic':12}" + "".join(f"{n:>12}" for n in names)]
+    rows = []
     keys = dict.fromkeys((o.build.case.name, o.build.toolset.arithmetic) for o in outcomes)
     for shape, arithmetic in keys:
         row = [
@@ -36,11 +37,9 @@ def matrix_table(outcomes: Sequence[Outcome]) -> str:
             if o.build.case.name == shape and o.build.toolset.arithmetic == arithmetic
         ]  # fmt: skip
         cells = [_cell([o for o in row if o.build.toolset.core is core]) for core in CORES]
-        lines.append(
-            f"{shape:24}{ARITHMETIC_NAMES[arithmetic]:12}" + "".join(f"{c:>12}" for c in cells)
-        )
-    lines += ["", *_summary(outcomes)]
-    return "\n".join(lines)
+        rows.append([shape, ARITHMETIC_NAMES[arithmetic], *cells])
+    head = ["shape", "arithmetic", *names]
+    return "\n".join([*table(head, rows, left=(0, 1)), "", *_summary(outcomes)])
 
 
 def _cell(outcomes: Sequence[Outcome]) -> str:

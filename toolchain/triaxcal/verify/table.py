@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Mapping, Sequence
 
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 
-WIDTH = 80
 SHOWN_DETAILS = 10
 
 
@@ -28,10 +26,7 @@ def _rows(outcomes: Sequence[Outcome]) -> list[str]:
     left = max(len(o.title) for o in outcomes) + 2
     lines: list[str] = []
     for outcome in outcomes:
-        head = f"{outcome.title:<{left}}{outcome.result:<10}"
-        lines += textwrap.wrap(
-            outcome.finding, WIDTH, initial_indent=head, subsequent_indent=" " * len(head)
-        )
+        lines.append(f"{outcome.title:<{left}}{outcome.result:<10}{outcome.finding}")
         if outcome.result == FAILED:
             lines += [f"  {detail}" for detail in outcome.details[:SHOWN_DETAILS]]
             if len(outcome.details) > SHOWN_DETAILS:

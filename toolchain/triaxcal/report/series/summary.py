@@ -21,8 +21,7 @@ def series_summary(series: Series, kept: int, seconds: float, workers: int, wher
     far = outliers(records, quantities(records)) if records else []
     names = list(dict.fromkeys(o.unit for o in far))
     if names:
-        more = f" and {len(names) - 5} more" if len(names) > 5 else ""
-        lines.append(f"{'far out':<16}{', '.join(names[:5])}{more}")
+        lines.append(f"{'outliers':<16}{', '.join(names)}")
     told = [r for r in (runs(records) if records else []) if r.told]
     if told:
         worst = max(told, key=lambda r: r.z)

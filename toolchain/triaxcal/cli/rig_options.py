@@ -1,0 +1,137 @@
+"""What the commands of `triaxcal rig` ask for: the session, the bus, where the frames come from."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.cli.options import UnitFolder
+
+if TYPE_CHECKING:
+    from triaxcal.rig.engine import Setup
+    from triaxcal.rig.sources import Source
+
+_DEFAULT_PLAN = "five-temperatures.toml"
+_NEEDED = ("can", "cantools", "rich")
+
+
+def refuse_missing_packages() -> None:
+    """Refuse where the bench's packages are missing; `--help` works without them."""
+    missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise RefusedError(
+            "triaxcal rig",
+            "missing packages: " + ", ".join(missing),
+            remedy="install them: pip install 'triaxcal[rig]'",
+        )
+
+
+def _optioned(command: Callable[..., None], *options: Callable[..., Any]) -> Callable[..., None]:
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def session_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options that say what the session is about; `command` gets them as its `setup`."""
+
+    @wraps(command)
+    def with_setup(unit: Path, plan: Path | None, dbc: Path | None, **others: Any) -> None:
+        refuse_missing_packages()
+        command(setup=_setup(unit, plan, dbc), **others)
+
+    return _optioned(
+        with_setup,
+        click.option("--unit", required=True, type=UnitFolder(), help="Folder, or name in units/."),
+        click.option("--plan", type=click.Path(path_type=Path), help="TOML file of the session."),
+        click.option("--dbc", type=click.Path(path_type=Path), help="Frames, if not tilter.dbc."),
+    )
+
+
+@dataclass(frozen=True)
+class BusChoice:
+    """Where the frames come from; faults and seed are the simulated rig's."""
+
+    name: str
+    faults: tuple[str, ...]
+    seed: int
+
+
+def bus_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options of the bus; `command` gets them as its `bus`."""
+
+    @wraps(command)
+    def with_bus(bus: str, fault: tuple[str, ...], seed: int, **others: Any) -> None:
+        command(bus=BusChoice(bus, fault, seed), **others)
+
+    return _optioned(
+        with_bus,
+        click.option(
+            "--bus",
+            required=True,
+            help="virtual (the simulated rig), a CAN device such as can0, or interface:channel.",
+        ),
+        click.option("--fault", multiple=True, help="Of the simulated rig: kind@s[:value[:s]]."),
+        click.option("--seed", type=int, default=1, help="Of the simulated rig."),
+    )
+
+
+SESSIONS = click.option(
+    "--sessions",
+    type=click.Path(path_type=Path),
+    help="Folder of the unit's sessions; sessions/ in the unit's folder by default.",
+)
+PLAIN = click.option("--plain", is_flag=True, help="One line an event, for logs and CI.")
+SECONDS = click.option("--seconds", type=float, help="Stop after this time; else at Ctrl-C.")
+
+
+def _setup(folder: Path, plan: Path | None, dbc: Path | None) -> Setup:
+    from triaxcal.base.shipped import shipped  # noqa: PLC0415
+    from triaxcal.rig.dbc import default_dbc, read_dbc  # noqa: PLC0415
+    from triaxcal.rig.engine import Setup  # noqa: PLC0415
+    from triaxcal.rig.plan import read_plan  # noqa: PLC0415
+    from triaxcal.unit.description import read_unit  # noqa: PLC0415
+
+    description = read_unit(folder)
+    session_plan = read_plan(plan or shipped("rig") / "plans" / _DEFAULT_PLAN, description)
+    return Setup(folder, description, session_plan, read_dbc(dbc or default_dbc()))
+
+
+def open_source(setup: Setup, bus: BusChoice) -> Source:
+    """Frames of the chosen bus.
+
+    Raises
+    ------
+    RefusedError
+        When it cannot be opened, or faults are given for a real bus.
+    """
+    from triaxcal.rig.socketcan import open_socketcan  # noqa: PLC0415
+    from triaxcal.rig.sources import BusSource, SimulatedSource, open_bus  # noqa: PLC0415
+
+    is_fd = setup.plan.layout == "fd"
+    if bus.name == "virtual":
+        return SimulatedSource(simulated(setup, bus))
+    if bus.faults:
+        raise RefusedError("--fault", f"given with --bus {bus.name}", expected="--bus virtual")
+    interface, _, device = bus.name.rpartition(":")
+    if interface in {"", "socketcan"}:
+        return open_socketcan(device, is_fd)
+    return BusSource(open_bus(bus.name, is_fd), bus.name)
+
+
+def simulated(setup: Setup, bus: BusChoice) -> Any:
+    """Rig that does not exist, from the unit's truth.toml."""
+    from triaxcal.rig.simorders import read_fault  # noqa: PLC0415
+    from triaxcal.rig.simulator import RigSettings, SimulatedRig  # noqa: PLC0415
+    from triaxcal.simulation.truth import read_truth  # noqa: PLC0415
+
+    truth, _ = read_truth(setup.folder)
+    settings, faults = RigSettings(seed=bus.seed), tuple(map(read_fault, bus.faults))
+    return SimulatedRig(setup.unit, truth, setup.plan, setup.dbc, settings, faults)
