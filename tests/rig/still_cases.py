@@ -50,9 +50,9 @@ def verdict(rng, ref, added=None, sd=SD_MICRO_G):
     for block in blocks:
         moved = motion(block, previous, ref, SETTINGS, MICRO_G_PER_CODE)
         if moved:
-            return [moved]
+            return [str(moved)]
         previous = block
-    return refusals(blocks, WINDOW, ref, SETTINGS, MICRO_G_PER_CODE)
+    return list(map(str, refusals(blocks, WINDOW, ref, SETTINGS, MICRO_G_PER_CODE)))
 
 
 def seconds():

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from triaxcal.rig.blocks import Block
 from triaxcal.rig.plan import Thermal
+from triaxcal.unit.description import TemperatureSensor
+
+_COVERED = 0.9
+"""Share of the window's seconds that must have a temperature."""
 
 
 @dataclass(frozen=True)
@@ -74,3 +80,56 @@ def time_left_s(now: Trend, before: Trend, apart_s: float, settings: Thermal) ->
     if earlier <= slope * 1.001:
         return None
     return apart_s / math.log(earlier / slope) * math.log(slope / limit)
+
+
+class Thermometer:
+    """Temperatures of the window's seconds, and the trends of the last minute."""
+
+    def __init__(self, settings: Thermal, sensor: TemperatureSensor) -> None:
+        self._settings = settings
+        self._sensor = sensor
+        self._temps: deque[tuple[int, float]] = deque()
+        self._trends: deque[tuple[int, Trend]] = deque(maxlen=60)
+        self.window_s = window_s(settings)
+
+    @property
+    def temp_degc(self) -> float | None:
+        """Latest temperature."""
+        return self._temps[-1][1] if self._temps else None
+
+    @property
+    def trend(self) -> Trend | None:
+        """Latest trend."""
+        return self._trends[-1][1] if self._trends else None
+
+    @property
+    def rests(self) -> bool:
+        """The temperature rests."""
+        return self.trend is not None and self.trend.rests(self._settings)
+
+    @property
+    def seconds(self) -> int:
+        """Seconds of the window that have a temperature."""
+        return len(self._temps)
+
+    @property
+    def left_s(self) -> float | None:
+        """Estimate of the seconds until it rests; None when there is none."""
+        if len(self._trends) < 30:
+            return None
+        (t_before, before), (t_now, now) = self._trends[0], self._trends[-1]
+        return time_left_s(now, before, t_now - t_before, self._settings)
+
+    def take(self, block: Block) -> None:
+        """Take the temperature of one more second."""
+        if self._temps and block.index <= self._temps[-1][0]:
+            self._temps.clear()
+        if block.temp_code is not None:
+            self._temps.append((block.index, self._sensor.degc(block.temp_code)))
+        while self._temps and self._temps[0][0] <= block.index - self.window_s:
+            self._temps.popleft()
+        if len(self._temps) >= _COVERED * self.window_s:
+            seconds, degrees = zip(*self._temps, strict=True)
+            self._trends.append((block.index, trend(seconds, degrees, self._settings)))
+        else:
+            self._trends.clear()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
+from triaxcal.rig.reasons import Reason
 from triaxcal.rig.stillness import Reference
 
 
@@ -20,6 +22,11 @@ class Redo:
 
 
 Command = Agree | Redo
+Kind = Literal[
+    "reference", "equilibrium", "accepted", "refused", "found", "offer", "superseded", "left",
+    "trouble", "done",
+]  # fmt: skip
+Stage = Literal["reference", "temperature", "turn", "still", "settle", "average", "guard", "done"]
 
 
 @dataclass(frozen=True)
@@ -61,27 +68,29 @@ class Event:
 
     Attributes
     ----------
-    kind : str
-        "reference", "equilibrium", "accepted" (these three must survive a crash), "refused",
-        "found", "offer", "superseded", "left", "trouble", "done".
+    kind : Kind
+        Those in `DURABLE` must survive a crash.
     t_ns : int
         When, by the frames' own times.
     text : str
         One line for the operator.
     step : int
         Of the plan, from 0.
+    reasons : tuple of Reason
+        Why something was refused or complained of; the journal has their text only.
     """
 
-    kind: str
+    kind: Kind
     t_ns: int
     text: str
     step: int
     dwell: AcceptedDwell | None = None
     reference: Reference | None = None
     temp_degc: float | None = None
+    reasons: tuple[Reason, ...] = ()
 
 
-DURABLE = ("reference", "equilibrium", "accepted")
+DURABLE: tuple[Kind, ...] = ("reference", "equilibrium", "accepted")
 """Kinds of event that a resumed session starts from."""
 
 
@@ -91,8 +100,7 @@ class View:
 
     Attributes
     ----------
-    phase : str
-        "reference", "temperature", "turn", "still", "settle", "average", "guard", "done".
+    phase : Stage
     order : str
         What to do, in two or three words for big letters.
     headline : str
@@ -111,7 +119,7 @@ class View:
         Estimated seconds to the end of the session.
     """
 
-    phase: str
+    phase: Stage
     order: str
     headline: str
     wanted: str | None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.model.positions import TEST_POSITIONS
+from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.types import FloatArray
 
 AXIS_MIN_G = 0.8
@@ -34,6 +34,6 @@ def recognised(mean_code: FloatArray, micro_g_per_code: FloatArray) -> str | Non
 
 def described(position: str) -> str:
     """Position with the axis that points up, for people."""
-    if position.startswith("CP"):
+    if position in CHECK_POSITIONS:
         return f"{position} ({UP['T' + position[1:]]} up, tilted)"
     return f"{position} ({UP[position]} up)"

@@ -20,6 +20,7 @@ from triaxcal.rig.events import DURABLE, AcceptedDwell, Agree, Command, Event, R
 from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.journal import Journal, Record, disk_refusal, read_journal
 from triaxcal.rig.rawlog import LogState, RawLog, changed_log
+from triaxcal.rig.reasons import Reason
 from triaxcal.rig.stillness import Reference
 
 FORMAT = 1
@@ -66,7 +67,7 @@ class Recording:
         else:
             self.journal.append({**header(setup), "channel": channel})
         self.engine = Engine(setup, channel, history)
-        self._trouble = ""
+        self._trouble: tuple[Reason, ...] = ()
         self._waiting: list[Frames] = []
 
     def feed(self, frames: Frames) -> list[Event]:
@@ -119,13 +120,14 @@ class Recording:
 
     def _acknowledge(self, events: list[Event]) -> list[Event]:
         for event in events:
-            repeated = event.kind == "trouble" and event.text == self._trouble
-            self._trouble = event.text if event.kind == "trouble" else ""
+            trouble = event.reasons if event.kind == "trouble" else ()
+            repeated = trouble and trouble == self._trouble
+            self._trouble = trouble
             if repeated:
                 continue  # the same trouble every second would bury the rest
             # A journal that knows more of the log than the disk has would be no witness.
             self.log.flush(sync=True)
-            self.journal.append({"kind": "event", "event": asdict(event), **self._place()})
+            self.journal.append({"kind": "event", "event": _record(event), **self._place()})
         return events
 
     def _place(self) -> dict[str, Any]:
@@ -182,6 +184,11 @@ def durable_events(records: tuple[Record, ...]) -> tuple[Event, ...]:
     """Events that a resumed session starts from."""
     events = (r["event"] for r in records if r["kind"] == "event")
     return tuple(_event(e) for e in events if e["kind"] in DURABLE)
+
+
+def _record(event: Event) -> Record:
+    """What the journal keeps of an event; of its reasons, the text."""
+    return {name: value for name, value in asdict(event).items() if name != "reasons"}
 
 
 def _event(raw: dict[str, Any]) -> Event:

@@ -52,9 +52,9 @@ class Robot:
         """Set the chamber, turn the tilter."""
         if session.done:
             return
-        self._rig.target_degc = session.plan.steps[session.step].temp_degc
+        self._rig.target_degc = session.target_degc
         if session.reseat is not None:
-            self._rig.turn_to("TP1" if session.reseat != "TP1" else "TP2")
+            self._rig.turn_to("TP1" if session.reseat.position != "TP1" else "TP2")
         elif session.wanted is not None:
             self._rig.turn_to(session.wanted)
 

@@ -16,6 +16,7 @@ from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.rig.blocks import Block
 from triaxcal.rig.plan import Stillness
+from triaxcal.rig.reasons import Reason, Why, because
 
 
 @dataclass(frozen=True)
@@ -81,19 +82,19 @@ def motion(
     reference: Reference | None,
     settings: Stillness,
     micro_g_per_code: FloatArray,
-) -> str:
-    """Why a block is not at rest, in words; "" when it is."""
+) -> Reason | None:
+    """Why a block is not at rest; None when it is."""
     if previous is not None and previous.index == block.index - 1:
         step = np.abs((block.mean - previous.mean) * micro_g_per_code)
         axis = int(np.argmax(step))
         if step[axis] > settings.moving_step_micro_g:
-            return f"moved by {step[axis]:.0f} micro-g on {AXES[axis]}"
+            return because(Why.MOVED, micro_g=float(step[axis]), axis=AXES[axis])
     if reference is not None:
         ratio = np.array(block.variance) / _at_least(reference.variance)
         axis = int(np.argmax(ratio))
         if ratio[axis] > _moving_ratio(settings, block.count):
-            return f"shaken: variance on {AXES[axis]} {ratio[axis]:.1f} times that at rest"
-    return ""
+            return because(Why.SHAKEN, ratio=float(ratio[axis]), axis=AXES[axis])
+    return None
 
 
 _CREEP_TAU_S = (10.0, 20.0, 40.0)
@@ -106,8 +107,8 @@ def refusals(
     reference: Reference,
     settings: Stillness,
     micro_g_per_code: FloatArray,
-) -> list[str]:
-    """Why an average is not to be trusted, each in words; empty when it is.
+) -> list[Reason]:
+    """Why an average is not to be trusted; empty when it is.
 
     `rest` is the whole rest, `rest[dwell]` is averaged; what lies before and behind it is its
     guard: a slip near an end of the dwell shows against it.
@@ -129,10 +130,9 @@ def refusals(
     u_micro_g = np.array(average(averaged, settings, micro_g_per_code).u_code) * scale
     axis = int(np.argmax(u_micro_g))
     if u_micro_g[axis] > settings.u_max_micro_g:
-        found.append(
-            f"u(A) of {AXES[axis]} is {u_micro_g[axis]:.1f} micro-g, "
-            f"more than {settings.u_max_micro_g:g}"
-        )
+        limit = settings.u_max_micro_g
+        u = float(u_micro_g[axis])
+        found.append(because(Why.UNCERTAIN, axis=AXES[axis], micro_g=u, limit=limit))
     return found
 
 
@@ -182,12 +182,12 @@ def _moving_ratio(settings: Stillness, count: int) -> float:
 
 def _slip(
     blocks: Sequence[Block], start: int, reference: Reference, scale: FloatArray
-) -> tuple[float, str]:
-    """The largest step between what lies before and after any moment: t value, and words."""
+) -> tuple[float, Reason]:
+    """The largest step between what lies before and after any moment: t value, and reason."""
     means = _means(blocks)
     n = len(means)
     if n < 4:
-        return 0.0, ""
+        return 0.0, because(Why.SLIP)
     noise = _noise_of_means(means, reference)
     sums = np.cumsum(means - means[0], axis=0)
     # Two blocks at least on either side: one alone is the motion detector's business.
@@ -197,13 +197,13 @@ def _slip(
     t = np.abs(right - left) / np.sqrt(noise * (1.0 / split + 1.0 / (n - split))[:, None])
     at, axis = np.unravel_index(int(np.argmax(t)), t.shape)
     size = abs(right[at, axis] - left[at, axis]) * scale[axis]
-    moment = int(split[at]) - start
-    when = f"at {moment} s" if moment >= 0 else "while settling"
-    return float(t[at, axis]), f"slip of {size:.0f} micro-g on {AXES[axis]} {when}"
+    at_s = int(split[at]) - start
+    slip = because(Why.SLIP, micro_g=float(size), axis=AXES[axis], at_s=at_s)
+    return float(t[at, axis]), slip
 
 
-def _creep(rest: Sequence[Block], reference: Reference, scale: FloatArray) -> tuple[float, str]:
-    """What settles exponentially since the unit was left alone: t value, and words.
+def _creep(rest: Sequence[Block], reference: Reference, scale: FloatArray) -> tuple[float, Reason]:
+    """What settles exponentially since the unit was left alone: t value, and reason.
 
     The best test there is for a known form in white noise is its correlation with that form
     (matched filter); a straight line finds a tenth of it.
@@ -221,24 +221,24 @@ def _creep(rest: Sequence[Block], reference: Reference, scale: FloatArray) -> tu
         axis = int(np.argmax(t))
         best = max(best, (float(t[axis]), axis, float(abs(size[axis]) * scale[axis]), tau_s))
     t_value, axis, micro_g, tau_s = best
-    return t_value, f"creep of {micro_g:.0f} micro-g with about {tau_s:.0f} s on {AXES[axis]}"
+    return t_value, because(Why.SETTLING, micro_g=micro_g, tau_s=tau_s, axis=AXES[axis])
 
 
-def _slope(dwell: Sequence[Block], settings: Stillness, scale: FloatArray) -> list[str]:
+def _slope(dwell: Sequence[Block], settings: Stillness, scale: FloatArray) -> list[Reason]:
     slope, t = slope_micro_g_per_min(dwell, scale)
     axis = int(np.argmax(np.abs(t)))
     if abs(t[axis]) <= settings.slope_t:
         return []
-    return [f"creep of {slope[axis]:+.1f} micro-g/min on {AXES[axis]}"]
+    return [because(Why.CREEP, micro_g_per_min=float(slope[axis]), axis=AXES[axis])]
 
 
-def _noise(dwell: Sequence[Block], reference: Reference, settings: Stillness) -> list[str]:
+def _noise(dwell: Sequence[Block], reference: Reference, settings: Stillness) -> list[Reason]:
     pooled, readings = _pooled(dwell)
     ratio = pooled / _at_least(reference.variance)
     limit = 1.0 + settings.noise_sigma * np.sqrt(2.0 / readings + 2.0 / reference.readings)
     axis = int(np.argmax(ratio))
     if ratio[axis] > limit:
-        return [f"noise on {AXES[axis]} {ratio[axis]:.2f} times that at rest"]
+        return [because(Why.NOISE, ratio=float(ratio[axis]), axis=AXES[axis])]
     return []
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from triaxcal.model.positions import CHECK_POSITIONS
 from triaxcal.model.types import FloatArray
 from triaxcal.rig.blocks import Block
-from triaxcal.rig.equilibrium import time_left_s, window_s
-from triaxcal.rig.events import View
+from triaxcal.rig.events import Stage, View
 from triaxcal.rig.orientation import UP, described
+from triaxcal.rig.phases import Dwelling, Learning, Turning
 from triaxcal.rig.session import Session
 from triaxcal.rig.stillness import slope_micro_g_per_min
 
@@ -20,22 +21,22 @@ _WARM_UP_S = 1200
 
 def view(session: Session) -> View:
     """View of a session as it is."""
-    phase = _phase(session)
+    phase, *progress = session.phase.progress(session)
     blocks = _shown_blocks(session)
     numbers = _numbers(session, blocks)
-    trend = session.trends[-1][1] if session.trends else None
+    trend = session.thermometer.trend
     plan = session.plan
     return View(
         phase=phase,
-        order=_order(session, phase),
-        headline=_headline(session, phase),
+        order=_order(session, phase, progress[0]),
+        headline=_headline(session, phase, *progress),
         wanted=session.wanted,
         seen=session.seen,
         offered=session.offered,
         step=session.step,
         steps=len(plan.steps),
-        target_degc=None if session.done else plan.steps[session.step].temp_degc,
-        progress=_progress(session, phase),
+        target_degc=None if session.done else session.target_degc,
+        progress=(progress[0], progress[1]),
         checklist=_checklist(session),
         mean_g=numbers[0],
         sd_micro_g=numbers[1],
@@ -52,67 +53,35 @@ def view(session: Session) -> View:
     )
 
 
-def _phase(session: Session) -> str:
-    if session.done:
-        return "done"
-    if session.reference is None:
-        return "reference"
-    if session.taking is not None:
-        rested = len(session.rest)
-        settled, averaged, _ = session.dwell_s
-        if rested < settled:
-            return "settle"
-        return "average" if rested < averaged else "guard"
-    if not session.at_temperature:
-        return "temperature"
-    return "still" if session.seen == session.wanted and not session.reseat else "turn"
-
-
-def _progress(session: Session, phase: str) -> tuple[int, int]:
-    settings = session.plan.stillness
-    settled, averaged, _ = session.dwell_s
-    rested = len(session.rest)
-    if phase == "reference":
-        return len(session.learning), settings.reference_s
-    if phase == "temperature":
-        return len(session.temps), window_s(session.plan.thermal)
-    return {
-        "still": (rested, settings.clean_blocks),
-        "settle": (rested - settings.clean_blocks, settings.settle_s),
-        "average": (rested - settled, settings.average_s),
-        "guard": (rested - averaged, settings.guard_s),
-    }.get(phase, (0, 0))
-
-
-def _order(session: Session, phase: str) -> str:
+def _order(session: Session, phase: Stage, done: int) -> str:
     """What to do, in the letters of `bigtext`."""
     if phase == "done":
         return "DONE"
     if phase == "reference":
-        return f"HANDS OFF {session.plan.stillness.reference_s - len(session.learning)}"
-    if session.taking is not None or phase == "still":
+        return f"HANDS OFF {session.plan.stillness.reference_s - done}"
+    if session.phase.position is not None or phase == "still":
         return f"HANDS OFF {session.dwell_s[2] - len(session.rest)}"
     if session.reseat is not None:
-        return f"RESEAT {_up(session.reseat)}"
+        return f"RESEAT {_up(session.reseat.position)}"
     if phase == "temperature" and session.seen == session.wanted:
-        return f"WAIT FOR {session.plan.steps[session.step].temp_degc:g}"
+        return f"WAIT FOR {session.target_degc:g}"
     assert session.wanted is not None
     return f"TURN TO {_up(session.wanted)}"
 
 
 def _up(position: str) -> str:
-    tilted = " TILTED" if position.startswith("CP") else ""
+    tilted = " TILTED" if position in CHECK_POSITIONS else ""
     return f"{UP['T' + position[1:]]} UP{tilted}"
 
 
-def _headline(session: Session, phase: str) -> str:
+def _headline(session: Session, phase: Stage, done: int, whole: int) -> str:
     if phase == "done":
         return "DONE - every position has been accepted"
-    done, whole = _progress(session, phase)
     wanted = described(session.wanted) if session.wanted else ""
-    target = session.plan.steps[session.step].temp_degc
+    target = session.target_degc
     if session.reseat is not None:
-        return f"TURN AWAY FROM {described(session.reseat)} AND BACK - {session.reseat_why}"
+        position, reason = session.reseat.position, session.reseat.reason
+        return f"TURN AWAY FROM {described(position)} AND BACK - {reason}"
     if session.offered is not None:
         return f"TURN TO {wanted} - or press y to take {described(session.offered)} now"
     return {
@@ -131,7 +100,7 @@ def _checklist(session: Session) -> tuple[tuple[str, str], ...]:
         return tuple((p, "done") for p in session.plan.steps[-1].positions)
     states = []
     for position in session.plan.steps[session.step].positions:
-        if position == session.taking:
+        if position == session.phase.position:
             state = "now"
         elif position in session.redo:
             state = "redo"
@@ -142,8 +111,9 @@ def _checklist(session: Session) -> tuple[tuple[str, str], ...]:
 
 
 def _shown_blocks(session: Session) -> list[Block]:
-    blocks = session.rest or session.learning[-60:]
-    if session.taking is not None:
+    learned = session.phase.blocks[-60:] if isinstance(session.phase, Learning) else []
+    blocks = session.rest or learned
+    if session.phase.position is not None:
         blocks = blocks[-session.plan.stillness.average_s :]
     return blocks or ([session.previous] if session.previous else [])
 
@@ -173,16 +143,13 @@ def _left_s(session: Session) -> float | None:
         return 0.0
     dwell = session.dwell_s[2] + _TURN_S
     later = session.plan.steps[session.step + 1 :]
-    left = float(dwell * len(session.pending) - len(session.rest) * (session.taking is not None))
+    rested = len(session.rest) if session.phase.position is not None else 0
+    left = float(dwell * len(session.pending) - rested)
     left += sum(dwell * len(step.positions) + _WARM_UP_S for step in later)
-    if session.at_temperature:
+    if isinstance(session.phase, Turning | Dwelling):
         return left
-    if len(session.trends) >= 30:
-        (t_before, before), (t_now, now) = session.trends[0], session.trends[-1]
-        wait = time_left_s(now, before, t_now - t_before, session.plan.thermal)
-        if wait is not None:
-            return left + wait
-    return left + _WARM_UP_S
+    wait = session.thermometer.left_s
+    return left + (_WARM_UP_S if wait is None else wait)
 
 
 def _triple(values: FloatArray) -> Triple:
