@@ -91,15 +91,35 @@ class Registry(Generic[E]):
             del self._entries[entry.name]
 
     def entries(self) -> dict[str, E]:
-        """All entries by name."""
+        """All entries by name.
+
+        Raises
+        ------
+        RefusedError
+            When a file of the folder cannot be loaded, or its entry lacks a part.
+        """
         if not self._read:
             self._read = True
-            package = importlib.import_module(self._package)
-            for module in pkgutil.iter_modules(package.__path__, self._package + "."):
-                entry = getattr(importlib.import_module(module.name), "ENTRY", None)
-                if entry is not None:
-                    self.add(entry, module.name)
+            try:
+                self._load()
+            except RefusedError:
+                self._read = False
+                raise
         return self._entries
+
+    def _load(self) -> None:
+        package = importlib.import_module(self._package)
+        for module in pkgutil.iter_modules(package.__path__, self._package + "."):
+            try:
+                entry = getattr(importlib.import_module(module.name), "ENTRY", None)
+            except (AttributeError, ImportError, TypeError) as fault:
+                raise RefusedError(
+                    module.name,
+                    f"the {self.kind} cannot be loaded: {fault}",
+                    expected=f"an ENTRY with {', '.join(self._parts)}",
+                ) from fault
+            if entry is not None:
+                self.add(entry, module.name)
 
     @property
     def names(self) -> tuple[str, ...]:
