@@ -29,8 +29,8 @@ def blocks(page: str) -> list[Block]:
 
 
 def assert_prints(what: str, expected: str, found: str) -> None:
-    """Equal, but for `...`, which stands for anything."""
-    alike = CHECKER.check_output(expected, found, doctest.ELLIPSIS)
+    """Equal, but for `...`, which stands for anything, and for how lines are wrapped."""
+    alike = CHECKER.check_output(expected, found, doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert alike, f"{what}\nshown in the page:\n{expected}\nprinted:\n{found}"
 
 
