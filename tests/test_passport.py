@@ -18,10 +18,10 @@ from triaxcal.delivery.unit import Delivery, deliver
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.files import all_files
 from triaxcal.report.passport.content import Passport, passport
-from triaxcal.report.passport.curves import Frame, ticks
 from triaxcal.report.passport.document import passport_json
 from triaxcal.report.passport.page import passport_html
-from triaxcal.report.passport.words import g_in_words, significant, with_uncertainty
+from triaxcal.report.pictures.curves import Frame, ticks
+from triaxcal.report.words.numbers import g_in_words, significant, with_uncertainty
 
 UNITS = Path(__file__).parent.parent / "units"
 VOID = {"meta", "circle", "path", "polyline", "polygon", "br"}

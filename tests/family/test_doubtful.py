@@ -17,7 +17,7 @@ from test_tables import AIR, HEADER, rows_of, table
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.outliers import fisher_tail, worst_outlier
 from triaxcal.model.types import FloatArray
-from triaxcal.report.temperatures import with_room
+from triaxcal.report.words.temperatures import with_room
 
 
 def findings(folder: Path) -> str:

@@ -13,9 +13,9 @@ from triaxcal.codegen.templates import environment
 from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Weak
-from triaxcal.report.firmware import file_rows, tool_rows
 from triaxcal.report.imuc import NO_C, imu_verification
-from triaxcal.report.passport.words import signed, thousands
+from triaxcal.report.words.firmware import file_rows, tool_rows
+from triaxcal.report.words.numbers import signed, thousands
 
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
 BAND = 10.0

@@ -8,7 +8,7 @@ from triaxcal.report.dcc import certificate_xml
 from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.passport.document import passport_json
 from triaxcal.report.passport.page import passport_html
-from triaxcal.report.residual_plot import residuals_svg
+from triaxcal.report.pictures.residual_plot import residuals_svg
 from triaxcal.report.results import calibration_json, verification_json
 
 CERTIFICATE = "certificate.dcc.xml"

@@ -15,8 +15,8 @@ from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.device import REQUIRED
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
-from triaxcal.report.firmware import checked_words, proven_words
-from triaxcal.report.passport.words import g_in_words, significant, thousands
+from triaxcal.report.words.firmware import checked_words, proven_words
+from triaxcal.report.words.numbers import g_in_words, significant, thousands
 
 VERIFICATION_FILE = "verification.json"
 C_FILES = (

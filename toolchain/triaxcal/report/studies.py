@@ -11,7 +11,7 @@ from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
 from triaxcal.readings.samples import Samples
-from triaxcal.report.line_plot import BAD, COLOURS, GOOD, Band, Line, Panel, line_plot
+from triaxcal.report.pictures.line_plot import BAD, COLOURS, GOOD, Band, Line, Panel, line_plot
 from triaxcal.unit.recording import RecordingLayout
 
 _ARCSEC_PER_RAD = 180.0 * 3600.0 / np.pi

@@ -10,9 +10,9 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
-from triaxcal.report.measured import measured_words
 from triaxcal.report.passport.content import Passport
-from triaxcal.report.temperatures import by_temperature, degrees
+from triaxcal.report.words.measured import measured_words
+from triaxcal.report.words.temperatures import by_temperature, degrees
 
 _LABEL = 16
 

@@ -88,6 +88,12 @@ class Uncertainty:
         each = np.sqrt(np.maximum(np.stack(variance), 0.0))
         return _expanded(each, [s.dof for s in sources])
 
+    @property
+    def worst_over_temperature(self) -> FloatArray:
+        """Expanded uncertainty in the worst orientation, (n, 4): a_x, a_y, a_z, |a|, in g."""
+        result: FloatArray = self.force_u.max(axis=1)
+        return result
+
     def _of_constants(self) -> list[Source]:
         return [s for s in self.sources if s.constants is not None]
 

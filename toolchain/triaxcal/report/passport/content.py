@@ -11,7 +11,6 @@ import numpy as np
 
 from triaxcal.codegen.tryout import Residual
 from triaxcal.delivery.unit import Delivery
-from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
@@ -134,12 +133,6 @@ class Passport:
         """Whether the data say anything of how well the constants are known."""
         recording = self.delivery.calibration.recording
         return recording is None or recording.checked
-
-    @cached_property
-    def worst_over_temperature(self) -> FloatArray:
-        """Expanded uncertainty in the worst orientation, (n, 4): a_x, a_y, a_z, |a|, in g."""
-        result: FloatArray = self.uncertainty.force_u.max(axis=1)
-        return result
 
 
 def passport(delivery: Delivery, tools: Mapping[str, Any]) -> Passport:

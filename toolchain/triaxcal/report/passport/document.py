@@ -62,7 +62,7 @@ def passport_json(p: Passport) -> bytes:
             "temp_degc": u.temps_degc.tolist(),
             "constants": d.calibration.thermal.constants_at(u.temps_degc).tolist(),
             "constants_expanded_uncertainty": u.constants_u.tolist(),
-            "acceleration_expanded_uncertainty_g": p.worst_over_temperature.tolist(),
+            "acceleration_expanded_uncertainty_g": u.worst_over_temperature.tolist(),
         },
         "warnings": list(u.warnings),
         "files_sha256": {n: hashlib.sha256(c).hexdigest() for n, c in d.files.items()},

@@ -9,12 +9,12 @@ from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import MethodResult
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
-from triaxcal.report.firmware import checked_words, file_rows, proven_words, tool_rows
-from triaxcal.report.measured import measured_words
 from triaxcal.report.passport.content import Acceptance, Passport
-from triaxcal.report.passport.curves import HEIGHT, LEFT, WIDTH, curve_panels, uncertainty_panel
-from triaxcal.report.passport.residuals import residual_panels
-from triaxcal.report.passport.words import (
+from triaxcal.report.pictures.curves import HEIGHT, LEFT, WIDTH, curve_panels, uncertainty_panel
+from triaxcal.report.pictures.residual_panels import residual_panels
+from triaxcal.report.words.firmware import checked_words, file_rows, proven_words, tool_rows
+from triaxcal.report.words.measured import measured_words
+from triaxcal.report.words.numbers import (
     g_in_words,
     handy,
     in_unit,
@@ -40,12 +40,12 @@ def passport_html(p: Passport) -> bytes:
         "warnings": (*p.uncertainty.warnings, *_findings(p)),
         "constants": _constants(p),
         "t0": signed(f"{p.delivery.calibration.thermal.t0_degc:g}"),
-        "panels": curve_panels(p),
+        "panels": curve_panels(p.delivery.calibration, p.uncertainty),
         "panel": {"width": WIDTH, "height": HEIGHT, "left": LEFT},
-        "residuals": residual_panels(p),
+        "residuals": residual_panels(p.delivery),
         "before": _largest(p.delivery.methods[0]),
         "after": _largest(p.delivery.chosen),
-        "over_temperature": uncertainty_panel(p),
+        "over_temperature": uncertainty_panel(p.delivery.calibration, p.uncertainty),
         "budgets": [
             _budget(p.component_budget, "A component", p.component_orientation),
             _budget(p.length_budget, "The length |a|", p.length_orientation),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from triaxcal.delivery.unit import Delivery
-from triaxcal.report.temperatures import degrees
+from triaxcal.report.words.temperatures import degrees
 
 
 def measured_words(delivery: Delivery) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from triaxcal.codegen.templates import environment
 from triaxcal.model.types import FloatArray
-from triaxcal.report.passport.curves import ticks
+from triaxcal.report.pictures.curves import ticks
 
 WIDTH, LEFT, RIGHT, TOP = 960.0, 80.0, 16.0, 76.0
 HEIGHT, FOOT = 190.0, 62.0

@@ -8,7 +8,7 @@ from typing import Any
 
 from triaxcal.codegen.crosscheck import CrossCheck
 from triaxcal.fixedpoint.proof import Bound
-from triaxcal.report.passport.words import thousands
+from triaxcal.report.words.numbers import thousands
 
 
 def proven_words(bound: Bound, check: CrossCheck, size: str) -> str:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from triaxcal.codegen.tryout import BEFORE, Residual
-from triaxcal.report.passport.content import Passport
-from triaxcal.report.passport.words import signed
-from triaxcal.report.temperatures import by_temperature, degrees, position_order, with_room
+from triaxcal.delivery.unit import Delivery
+from triaxcal.report.words.numbers import signed
+from triaxcal.report.words.temperatures import by_temperature, degrees, position_order, with_room
 
 WIDTH, LEFT, RIGHT = 700.0, 56.0, 6.0
 PLOT, HEAD, FOOT = 150.0, 24.0, 26.0
@@ -30,10 +30,10 @@ class _Axis:
         return round(HEAD + PLOT * (self.high - exponent) / (self.high - self.low), 2)
 
 
-def residual_panels(p: Passport) -> list[dict[str, Any]]:
+def residual_panels(delivery: Delivery) -> list[dict[str, Any]]:
     """Context of one picture for test and one for check positions, a column a temperature."""
-    before = next(m for m in p.delivery.methods if m.method is BEFORE)
-    largest = max(abs(r.error_g) for m in (before, p.delivery.chosen) for r in m.residuals)
+    before = next(m for m in delivery.methods if m.method is BEFORE)
+    largest = max(abs(r.error_g) for m in (before, delivery.chosen) for r in m.residuals)
     axis = _Axis(round(math.log10(FLOOR_MG)), math.ceil(math.log10(max(largest * 1e3, 1.0))))
     rows = []
     for prefix, title in (
@@ -43,14 +43,17 @@ def residual_panels(p: Passport) -> list[dict[str, Any]]:
     ):
         groups = by_temperature(before, prefix)
         if groups:
-            rows.append({"title": title, **_row(p, before.residuals, groups, axis)})
+            rows.append({"title": title, **_row(delivery, before.residuals, groups, axis)})
     return rows
 
 
 def _row(
-    p: Passport, before: tuple[Residual, ...], groups: list[tuple[float, list[int]]], axis: _Axis
+    delivery: Delivery,
+    before: tuple[Residual, ...],
+    groups: list[tuple[float, list[int]]],
+    axis: _Axis,
 ) -> dict[str, Any]:
-    limits = p.delivery.unit.limits
+    limits = delivery.unit.limits
     span = (WIDTH - LEFT - RIGHT) / len(groups)
     columns = []
     for k, (temp, indices) in enumerate(groups):
@@ -65,12 +68,12 @@ def _row(
                 "middle": round(x0 + span / 2, 2),
                 "end": round(x0 + span, 2),
                 "title": signed(degrees(temp)) + " °C",
-                "limit": axis.y(limits.at(temp, p.delivery.unit.t0_degc)[0]),
+                "limit": axis.y(limits.at(temp, delivery.unit.t0_degc)[0]),
                 "marks": [
                     {
                         "x": round(x0 + 5.0 + step * (n + 0.5), 2),
                         "before": axis.y(before[i].error_g),
-                        "after": axis.y(p.delivery.chosen.residuals[i].error_g),
+                        "after": axis.y(delivery.chosen.residuals[i].error_g),
                         "label": labels[n],
                     }
                     for n, i in enumerate(ordered)

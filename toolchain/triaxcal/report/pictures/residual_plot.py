@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import MethodResult
 from triaxcal.delivery.unit import Delivery
-from triaxcal.report.temperatures import by_temperature, degrees, position_order, with_room
+from triaxcal.report.words.temperatures import by_temperature, degrees, position_order, with_room
 from triaxcal.unit.description import Limits
 
 WIDTH = 960.0

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
-from triaxcal.report.passport.content import Passport
-from triaxcal.report.passport.words import handy, in_unit, signed
+from triaxcal.report.words.numbers import handy, in_unit, signed
+from triaxcal.uncertainty.evaluate import Uncertainty
 
 WIDTH, HEIGHT = 232.0, 150.0
 LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 8.0, 20.0
@@ -55,9 +56,8 @@ def ticks(low: float, high: float, count: int) -> list[float]:
     return [round(k * step, 12) for k in range(first, math.floor(high / step + 1e-9) + 1)]
 
 
-def curve_panels(p: Passport) -> list[dict[str, Any]]:
+def curve_panels(calibration: Calibration, u: Uncertainty) -> list[dict[str, Any]]:
     """Context of the twelve panels: change since T0 in handy units, points, curve, band."""
-    calibration, u = p.delivery.calibration, p.uncertainty
     units = u.units
     scale = handy(units[9])[1]
     curves = calibration.thermal.constants_at(u.temps_degc) * scale
@@ -115,11 +115,11 @@ def y_ticks(frame: Frame, count: int) -> list[dict[str, Any]]:
     ]
 
 
-def uncertainty_panel(p: Passport) -> dict[str, Any]:
+def uncertainty_panel(calibration: Calibration, u: Uncertainty) -> dict[str, Any]:
     """Context of the picture of the expanded uncertainty over temperature, in µg."""
-    worst = p.worst_over_temperature * 1e6
+    worst = u.worst_over_temperature * 1e6
     components = worst[:, :3].max(axis=1)
-    temps = p.uncertainty.temps_degc
+    temps = u.temps_degc
     xs = [float(t) for t in temps]
     high = float(worst.max()) * 1.08 or 1.0
     frame = Frame((xs[0], xs[-1]), (0.0, high), width=700.0, height=190.0, left=56.0)
@@ -131,5 +131,5 @@ def uncertainty_panel(p: Passport) -> dict[str, Any]:
         "length": frame.points(xs, worst[:, 3].tolist()),
         "x_ticks": x_ticks(frame),
         "y_ticks": y_ticks(frame, 5),
-        "calibrated": [frame.x(q.temp_degc) for q in p.delivery.calibration.points],
+        "calibrated": [frame.x(q.temp_degc) for q in calibration.points],
     }

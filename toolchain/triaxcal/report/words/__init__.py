@@ -1,0 +1,1 @@
+"""Numbers, temperatures and tables as people read them."""
