@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.noise import DataSheet
-from triaxcal.dynamic.registry import extensions
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_motion import ImuMotion
@@ -98,7 +98,7 @@ def judge(
     recording = simulate_imu(truth, motion, rate_hz, seed)
     samples = recording.all()
     recording = replace(recording, pieces=lambda: (samples,))
-    wanted = tuple(block for name in blocks for block in extensions()[name].blocks)
+    wanted = tuple(block for name in blocks for block in EXTENSIONS[name].blocks)
     result = calibrate_dynamic(recording, data_sheet(noise or truth.noise), wanted)
     true = true_constants(truth)
     states = result.layout.states

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from plans import TABLE_T0
 from strategies import constants, forces_g
 from triaxcal.base.tomltable import read_toml
-from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
+from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.methods.matrix import MAX_ORDER
 from triaxcal.model.methods.method import DIRECT, INVERSE
 from triaxcal.model.metrological import (

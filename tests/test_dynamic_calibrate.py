@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 
 from dynamic_cases import aviation, changed, held, mems_short, sheet
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.missing import missing_effects
 from triaxcal.dynamic.observability import observability
-from triaxcal.dynamic.registry import extensions
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
 from triaxcal.simulation.imu_motion import three_axes
@@ -83,7 +83,7 @@ def test_a_heading_known_to_tens_of_degrees_settles() -> None:
     """Whole steps swing ever wider here: 0.2, 0.3, 0.5, 0.7, 1.05, 1.1 sd, and so on."""
     truth = draw_truth(MEMS, 20240229, ("delay", "g-drift"))
     recording = held(simulate_imu(truth, three_axes(1.5, still_s=12.0), 50.0, 20240229))
-    blocks = extensions()["delay"].blocks + extensions()["g-drift"].blocks
+    blocks = EXTENSIONS["delay"].blocks + EXTENSIONS["g-drift"].blocks
     result = calibrate_dynamic(recording, sheet(truth), blocks)
     worst, chi = normalised(result, truth)
     assert worst < 4.0
@@ -103,6 +103,6 @@ def test_a_missing_effect_is_named() -> None:
     off = calibrate_dynamic(shifted, sheet(truth))
     effects = {e.name: e for e in missing_effects(shifted, sheet(truth), off)}
     assert effects["delay"].shown
-    on = calibrate_dynamic(shifted, sheet(truth), extensions()["delay"].blocks)
+    on = calibrate_dynamic(shifted, sheet(truth), EXTENSIONS["delay"].blocks)
     place = on.layout.place("delay").start
     assert abs(on.p[place] - 5e-3) < 4 * on.sd[place]

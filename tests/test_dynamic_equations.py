@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from dynamic_cases import held, short_motion
-from triaxcal.dynamic.attitude import matrix_of, quaternion_of, rotation_of, running_product
+from triaxcal.dynamic.blocks.attitude import matrix_of, quaternion_of, rotation_of, running_product
 from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.channels import Moments, extra_rows, table_axes
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.preintegrate import BlockEquations, equations
 from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuRecording, Turntable
-from triaxcal.dynamic.registry import extensions
 from triaxcal.dynamic.window import About, Frame, Window
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import GRADES, draw_truth
@@ -24,7 +24,7 @@ from triaxcal.simulation.imu_motion import PRECISE_TABLE, WARMING
 from triaxcal.simulation.imu_truth import ImuNoise, ImuTruth
 
 RATE_HZ, BLOCK = 100.0, 20
-ALL = tuple(dict.fromkeys(b for e in extensions().values() for b in e.blocks))
+ALL = tuple(dict.fromkeys(b for e in EXTENSIONS for b in e.blocks))
 LAYOUT = Layout((*BASE, *ALL))
 EARTH = 7.292115e-5 * np.array([0.0, np.cos(np.radians(50)), np.sin(np.radians(50))])
 
@@ -107,7 +107,7 @@ def test_exact_physics_leaves_nothing() -> None:
 def test_table_rows_are_derivatives() -> None:
     """y = psi - psi_0 - L' beta by turning the instrument exactly."""
     rng = np.random.default_rng(3)
-    layout = Layout((*BASE, *extensions()["mount-elasticity"].blocks))
+    layout = Layout((*BASE, *EXTENSIONS["mount-elasticity"].blocks))
     turntable = Turntable(0.7, 0.02, ())
     noise = DataSheet(0.1, 10.0, table_sd_arcsec=1.0)
     angle = rng.standard_normal(4)

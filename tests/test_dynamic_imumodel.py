@@ -8,17 +8,17 @@ import numpy as np
 
 from test_dynamic_calibrate import mems_result
 from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.imumodel import imu_model
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.registry import extensions
-from triaxcal.model.imu import ImuCompensation, compensate_imu
+from triaxcal.model.methods.imu import ImuCompensation, compensate_imu
 
 G_STANDARD = 9.80665
 
 
 def test_compensated_readings_are_the_true_ones() -> None:
     names = ("g-drift", "accelerometer-thermal", "gyro-thermal")
-    layout = Layout((*BASE, *(b for n in names for b in extensions()[n].blocks)))
+    layout = Layout((*BASE, *(b for n in names for b in EXTENSIONS[n].blocks)))
     rng = np.random.default_rng(7)
     p = 1e-2 * rng.standard_normal(len(layout)) * np.minimum(layout.prior_sd, 1.0)
     base = mems_result()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.observability import observability
-from triaxcal.dynamic.registry import extensions
 from triaxcal.report.dynamic import weak_words
 
-LAYOUT = Layout((*BASE, *extensions()["elastic-gyro"].blocks))
+LAYOUT = Layout((*BASE, *EXTENSIONS["elastic-gyro"].blocks))
 NAMES = [state.name for state in LAYOUT.states]
 
 
@@ -50,7 +50,7 @@ def test_a_state_that_nothing_measures() -> None:
 
 def test_a_combination_that_is_known_badly_is_stated_with_its_sd() -> None:
     """D11 = D22 = D33 is a rate about the vertical: 98 each where the differences are to 1.4."""
-    layout = Layout((*BASE, *extensions()["g-drift"].blocks))
+    layout = Layout((*BASE, *EXTENSIONS["g-drift"].blocks))
     unit = layout.per_unit
     n = len(layout)
     place = layout.place("g-drift")

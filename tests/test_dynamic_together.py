@@ -10,12 +10,12 @@ import pytest
 from dynamic_cases import aviation, changed, held, sheet
 from dynamic_judge import data_sheet, judge
 from test_dynamic_judge import ALL, CENTRES, motion
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.channels import steady
 from triaxcal.dynamic.missing import missing_effects
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuRecording
-from triaxcal.dynamic.registry import extensions
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import AVIATION, EFFECTS, draw_truth
 from triaxcal.simulation.imu_motion import three_axes
@@ -71,7 +71,7 @@ def test_an_angle_within_a_circle_is_as_good_as_one_that_counts_on() -> None:
     assert angle is not None
     circle = angle % (2 * np.pi)
     assert (np.abs(np.diff(circle)) > 6).sum() > 100
-    blocks = extensions()["table-angles"].blocks + extensions()["mount-elasticity"].blocks
+    blocks = EXTENSIONS["table-angles"].blocks + EXTENSIONS["mount-elasticity"].blocks
     counted, wrapped = (
         calibrate_dynamic(changed(recording, table_angle_rad=a), data_sheet(truth.noise), blocks)
         for a in (angle, circle)

@@ -22,7 +22,7 @@ from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
-from triaxcal.model.imu import (
+from triaxcal.model.methods.imu import (
     EXAMPLE_SENSITIVITY,
     ImuCompensation,
     ImuModel,

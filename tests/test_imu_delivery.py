@@ -21,7 +21,7 @@ from triaxcal.delivery import imu as imudelivery
 from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.imumodel import imu_model
-from triaxcal.model.imu import ImuModel, compensate_imu
+from triaxcal.model.methods.imu import ImuModel, compensate_imu
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
 from triaxcal.report.dynamicpage import digits, dynamic_page

@@ -11,7 +11,7 @@ from test_imu_delivery import DEG_PER_H, STANDARD_G, allowed, change, copied
 from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
 from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
 from triaxcal.dynamic.imumodel import imu_model
-from triaxcal.model.imu import ImuModel
+from triaxcal.model.methods.imu import ImuModel
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.report.imuc import imu_c_lines
 from triaxcal.simulation.imu_grades import MEMS, draw_truth

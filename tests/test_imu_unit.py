@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.description import imu_file, read_dynamic
 from triaxcal.dynamic.reading import read_recording
-from triaxcal.dynamic.registry import extensions
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
 from triaxcal.simulation.imu_motion import three_axes
@@ -124,7 +124,7 @@ def test_the_docs_name_every_extension() -> None:
     text = (REPO / "docs/how-to/imu.md").read_text(encoding="utf-8")
     rows = [line.split("|")[1] for line in text.splitlines() if line.count("|") == 4]
     named = {name.strip() for row in rows for name in row.split(",")}
-    assert set(extensions()) <= named, set(extensions()) - named
+    assert set(EXTENSIONS.names) <= named, set(EXTENSIONS.names) - named
 
 
 def test_the_example_of_the_docs_is_read(tmp_path: Path) -> None:

@@ -24,8 +24,8 @@ from plans import (
 from triaxcal.fixedpoint.formats import MAX_SPARE_BITS
 from triaxcal.fixedpoint.plan import MAX_TEMPERATURE_CODES, Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
-from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
+from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.methods.method import DIRECT, INVERSE
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.unit.description import TemperatureSensor, UnitDescription

@@ -18,8 +18,8 @@ from plans import (
 from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
-from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
+from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.methods.method import DIRECT
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.types import FloatArray

@@ -33,8 +33,8 @@ from triaxcal.delivery.unit import Delivery
 from triaxcal.fixedpoint import integer_model
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import check_ranges, prove
-from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
+from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.methods.method import DIRECT
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.metrological import exact_gain_and_offset, pack_constants

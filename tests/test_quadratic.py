@@ -31,7 +31,7 @@ from triaxcal.codegen.routines import Generated, Reference, start_generated
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
-from triaxcal.model.compensation import Compensation, compensate
+from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.terms import EXAMPLE_TERMS, Terms
 from triaxcal.unit.description import TemperatureSensor, UnitDescription
 

@@ -22,7 +22,7 @@ from triaxcal.codegen.routines import Reference, routines_of, start_generated
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
-from triaxcal.model.compensation import Compensation, compensate
+from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, RateTerm, Terms
 from triaxcal.unit.description import TemperatureSensor, UnitDescription
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from triaxcal.model.compensation import compensate
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
-from triaxcal.model.imu import ImuModel, compensate_imu, constants_from_errors
+from triaxcal.model.methods.compensation import compensate
+from triaxcal.model.methods.imu import ImuModel, compensate_imu, constants_from_errors
 from triaxcal.model.terms import NO_TERMS, PRODUCT_NAMES, RateTerm, Terms, products
 
 RANGE = (-40.0, 85.0)

@@ -31,7 +31,7 @@ from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.integer_model import STATUS_BAD_IMAGE, STATUS_OK, apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan, Triad, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
-from triaxcal.model.imu import ImuCompensation
+from triaxcal.model.methods.imu import ImuCompensation
 
 IMU_FILES = ("triax_imu.h", "triax_imu.c")
 IMU_IMAGE_FILE = "triax_imu.bin"

@@ -12,7 +12,7 @@ from triaxcal.codegen.tryout import model_error_g
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fixedpoint.plan import Plan, make_plan
-from triaxcal.model.compensation import Compensation, compensate
+from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES

@@ -23,9 +23,9 @@ from triaxcal.dynamic.imumodel import imu_model, left_out
 from triaxcal.dynamic.unit import DynamicUnit, calibrate_unit
 from triaxcal.fixedpoint.gyro import TriadDescription
 from triaxcal.fixedpoint.plan import Plan
-from triaxcal.model.compensation import Compensation
 from triaxcal.model.curves import ThermalModel
-from triaxcal.model.imu import ImuCompensation, ImuModel, compensate_imu
+from triaxcal.model.methods.compensation import Compensation
+from triaxcal.model.methods.imu import ImuCompensation, ImuModel, compensate_imu
 from triaxcal.model.metrological import exact_gain_and_offset, worst_force_error_g
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import Adc

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.block import StateBlock
 from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet

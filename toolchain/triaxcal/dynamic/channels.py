@@ -23,8 +23,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.dynamic.attitude import rotation_of
-from triaxcal.dynamic.block import Signals
+from triaxcal.dynamic.blocks.attitude import rotation_of
+from triaxcal.dynamic.blocks.block import Signals
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import ARCSEC, DataSheet
 from triaxcal.dynamic.recording import Turntable

@@ -12,11 +12,11 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import FileKeys, Key, TableKeys, Values, key, keys_of
 from triaxcal.base.kinds import TEXT, Kind, listed, meaning, number, word
 from triaxcal.base.tomltable import has_table
-from triaxcal.dynamic.block import StateBlock
+from triaxcal.dynamic.blocks.block import StateBlock
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.device import DEVICE, Device, device_of
 from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT, Turntable
-from triaxcal.dynamic.registry import extensions
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import (
@@ -98,7 +98,7 @@ class DynamicDescription:
 
     def state_blocks(self) -> tuple[StateBlock, ...]:
         """Blocks of the extensions that are switched on."""
-        return tuple(b for name in self.blocks for b in extensions()[name].blocks)
+        return tuple(b for name in self.blocks for b in EXTENSIONS[name].blocks)
 
 
 def _three(value: object) -> tuple[str, ...]:
@@ -221,7 +221,7 @@ MOUNTINGS = Key(
 
 def imu_file() -> FileKeys:
     """Keys of the unit.toml of an IMU."""
-    names = tuple(extensions())
+    names = EXTENSIONS.names
     blocks = listed(
         word(names), range(100), f"names out of {', '.join(names)}, each once", different=True
     )
@@ -232,7 +232,7 @@ def imu_file() -> FileKeys:
             TOP,
             SITE,
             TableKeys("dynamic", "The recording.", keys_of(DynamicTable)).but(
-                blocks={"kind": blocks}
+                blocks={"kind": blocks, "doc": EXTENSIONS.explained}
             ),
             TableKeys("noise", "White noise, as data sheets state it.", keys_of(DataSheet)),
             TableKeys(
@@ -319,7 +319,7 @@ _COLUMN_OF = {
 
 def _blocks(values: Values, found: DynamicTable) -> tuple[str, ...]:
     for name in found.blocks:
-        for block in extensions()[name].blocks:
+        for block in EXTENSIONS[name].blocks:
             key = _COLUMN_OF.get(block.needs, "")
             if key and key not in values:
                 raise RefusedError(

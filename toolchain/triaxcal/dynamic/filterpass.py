@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from triaxcal.dynamic.attitude import level, rotation_of
+from triaxcal.dynamic.blocks.attitude import level, rotation_of
 from triaxcal.dynamic.channels import Moments, extra_rows, steady
 from triaxcal.dynamic.noise import ARCSEC
 from triaxcal.dynamic.passdata import History, PassResult, Reference, Task

@@ -12,7 +12,7 @@ import numpy as np
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.window import gamma_matrix
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
-from triaxcal.model.imu import ImuModel, constants_from_errors
+from triaxcal.model.methods.imu import ImuModel, constants_from_errors
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
 

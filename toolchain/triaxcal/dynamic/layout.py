@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.dynamic.block import Signals, State, StateBlock
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock
 from triaxcal.model.types import FloatArray, IntArray
 
 

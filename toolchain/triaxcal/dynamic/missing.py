@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from triaxcal.dynamic.block import Extension
+from triaxcal.dynamic.blocks.block import Extension
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.passdata import Reference, Task
 from triaxcal.dynamic.recording import ImuRecording
-from triaxcal.dynamic.registry import extensions
 from triaxcal.model.types import FloatArray
 
 SIGNIFICANCE = 1e-3
@@ -65,7 +65,7 @@ def missing_effects(
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Effect, ...]:
     """Test every extension that is off and whose columns are there, the strongest first."""
-    candidates = [e for e in extensions().values() if _possible(e, recording, result)]
+    candidates = [e for e in EXTENSIONS if _possible(e, recording, result)]
     if not candidates:
         return ()
     added = tuple(block for extension in candidates for block in extension.blocks)
@@ -91,7 +91,7 @@ def missing_effects(
         shown = bool(chi2.sf(value, len(index)) < SIGNIFICANCE)
         hint = _hint(extension.name, done.p[index], covariance[np.ix_(index, index)], recording)
         found.append(
-            Effect(extension.name, extension.title, value, len(index), shown, hint if shown else "")
+            Effect(extension.name, extension.label, value, len(index), shown, hint if shown else "")
         )
     return tuple(sorted(found, key=lambda e: -e.chi_square / e.states))
 

@@ -14,7 +14,7 @@ from itertools import permutations, product
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.attitude import skew
+from triaxcal.dynamic.blocks.attitude import skew
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import Windows
 from triaxcal.model.types import FloatArray

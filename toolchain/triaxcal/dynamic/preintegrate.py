@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from triaxcal.dynamic.attitude import (
+from triaxcal.dynamic.blocks.attitude import (
     matrix_of,
     quaternion_of,
     quaternion_product,
@@ -35,7 +35,7 @@ from triaxcal.dynamic.attitude import (
     running_product,
     skew,
 )
-from triaxcal.dynamic.block import Signals
+from triaxcal.dynamic.blocks.block import Signals
 from triaxcal.dynamic.window import Window, inverse_of_one_plus
 from triaxcal.model.types import FloatArray
 

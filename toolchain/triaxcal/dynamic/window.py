@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from triaxcal.dynamic.attitude import rotation_of
-from triaxcal.dynamic.block import Signals
+from triaxcal.dynamic.blocks.attitude import rotation_of
 from triaxcal.dynamic.blocks.base import BASE, LOWER
+from triaxcal.dynamic.blocks.block import Signals
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.recording import INCREMENT, ImuSamples
 from triaxcal.model.types import FloatArray

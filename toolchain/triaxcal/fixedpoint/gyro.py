@@ -13,7 +13,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.fixedpoint.arithmetic import round_half_up
 from triaxcal.fixedpoint.plan import Plan, Triad, triad_plan
 from triaxcal.model.curves import PiecewisePolynomial
-from triaxcal.model.imu import ImuCompensation
+from triaxcal.model.methods.imu import ImuCompensation
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import Adc, TemperatureSensor

@@ -24,7 +24,7 @@ from triaxcal.fixedpoint.horner import Segment, horner, segment_of
 from triaxcal.fixedpoint.quadratic import quadratic_log2, quantise_quadratic
 from triaxcal.fixedpoint.rate import RatePlan, largest_offset_g, plan_rate
 from triaxcal.fixedpoint.shape import Shape
-from triaxcal.model.compensation import Compensation
+from triaxcal.model.methods.compensation import Compensation
 from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unit.description import Adc, TemperatureSensor

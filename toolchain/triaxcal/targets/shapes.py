@@ -17,7 +17,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan
-from triaxcal.model.imu import EXAMPLE_SENSITIVITY, ImuCompensation
+from triaxcal.model.methods.imu import EXAMPLE_SENSITIVITY, ImuCompensation
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS
 from triaxcal.readings.measurements import MEASUREMENTS_FILE, read_measurements
 from triaxcal.unit.description import UnitDescription, read_unit

@@ -6,8 +6,8 @@ are made in `channels`.
 
 from __future__ import annotations
 
-from triaxcal.dynamic.block import Extension, State, StateBlock
 from triaxcal.dynamic.blocks.base import ARCSEC
+from triaxcal.dynamic.blocks.block import Extension, State, StateBlock
 
 BLOCK = StateBlock(
     "rotation-axis",
@@ -16,4 +16,9 @@ BLOCK = StateBlock(
     reset=True,
     needs="table",
 )
-EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))
+ENTRY = Extension(
+    BLOCK.name,
+    BLOCK.title,
+    "Direction of the table's axis in the unit while it turns; for units whose azimuth drifts.",
+    (BLOCK,),
+)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.dynamic.block import Signals, State, StateBlock, same, spread
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, same, spread
 from triaxcal.model.types import FloatArray
 
 MM_PER_S2 = 1e-3

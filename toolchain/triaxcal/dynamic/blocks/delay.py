@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.dynamic.attitude import rotation_of
-from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
+from triaxcal.dynamic.blocks.attitude import rotation_of
+from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock
 from triaxcal.model.types import FloatArray
 
 
@@ -41,4 +41,9 @@ BLOCK = StateBlock(
     motion=rows,
     motion_curve=curve,
 )
-EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))
+ENTRY = Extension(
+    BLOCK.name,
+    BLOCK.title,
+    "The accelerometers are sampled later than the gyros of the same time stamp.",
+    (BLOCK,),
+)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from triaxcal.dynamic.block import Extension, Signals, State, StateBlock, spread
 from triaxcal.dynamic.blocks.base import DEG_PER_H
+from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, spread
 from triaxcal.model.types import FloatArray
 
 
@@ -22,4 +22,9 @@ BLOCK = StateBlock(
         'angle separates it (block "table-angles")'
     ),
 )
-EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))
+ENTRY = Extension(
+    BLOCK.name,
+    BLOCK.title,
+    "Gyro drift in proportion to the specific force.",
+    (BLOCK,),
+)

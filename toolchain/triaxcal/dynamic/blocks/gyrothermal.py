@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
 from triaxcal.dynamic.blocks.base import DEG_PER_H, PPM
+from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock
 from triaxcal.dynamic.blocks.thermal import rows
 from triaxcal.model.types import FloatArray
 
@@ -22,4 +22,9 @@ BLOCK = StateBlock(
     rate=_rate,
     needs="temp_degc",
 )
-EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))
+ENTRY = Extension(
+    BLOCK.name,
+    BLOCK.title,
+    "Linear temperature coefficients of the gyros' drifts and scale factors.",
+    (BLOCK,),
+)

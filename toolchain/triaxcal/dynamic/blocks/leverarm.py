@@ -9,8 +9,8 @@ acceleration; the signs in print are damaged.
 
 from __future__ import annotations
 
-from triaxcal.dynamic.attitude import skew
-from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
+from triaxcal.dynamic.blocks.attitude import skew
+from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock
 from triaxcal.model.types import FloatArray
 
 
@@ -33,4 +33,9 @@ BLOCK = StateBlock(
     edges2=_velocity,
     reset=True,
 )
-EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))
+ENTRY = Extension(
+    BLOCK.name,
+    BLOCK.title,
+    "The unit is not in the table's centre.",
+    (BLOCK,),
+)

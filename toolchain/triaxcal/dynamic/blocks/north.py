@@ -8,8 +8,8 @@ pass, new at each alignment.
 
 from __future__ import annotations
 
-from triaxcal.dynamic.block import State, StateBlock
 from triaxcal.dynamic.blocks.base import DEG_PER_H
+from triaxcal.dynamic.blocks.block import State, StateBlock
 
 BLOCK = StateBlock(
     "north",

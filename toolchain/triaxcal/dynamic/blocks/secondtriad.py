@@ -6,8 +6,8 @@ is its own because its electronics are: with it the states of all blocks number 
 
 from __future__ import annotations
 
-from triaxcal.dynamic.block import Extension, Signals, State, StateBlock, same, spread
 from triaxcal.dynamic.blocks.base import ARCSEC, MM_PER_S2, PPM
+from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, same, spread
 from triaxcal.dynamic.blocks.delay import curve, rows
 from triaxcal.model.types import FloatArray
 
@@ -46,4 +46,9 @@ DELAY = StateBlock(
     motion_curve=curve,
     needs="force2",
 )
-EXTENSION = Extension("second-triad", "second accelerometer triad", (BIAS, MATRIX, DELAY))
+ENTRY = Extension(
+    "second-triad",
+    "second accelerometer triad",
+    "A second accelerometer triad with biases, a full matrix and a delay of its own.",
+    (BIAS, MATRIX, DELAY),
+)

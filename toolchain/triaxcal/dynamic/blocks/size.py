@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.dynamic.attitude import skew
-from triaxcal.dynamic.block import Extension, Signals, State, StateBlock
+from triaxcal.dynamic.blocks.attitude import skew
+from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock
 from triaxcal.model.types import FloatArray
 
 _MASSES = (1, 2)
@@ -48,4 +48,9 @@ BLOCK = StateBlock(
     motion=_rest,
     edges=_ends,
 )
-EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))
+ENTRY = Extension(
+    BLOCK.name,
+    BLOCK.title,
+    "Accelerometers 2 and 3 are not where accelerometer 1 is.",
+    (BLOCK,),
+)

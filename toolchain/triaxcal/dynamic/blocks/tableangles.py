@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from triaxcal.dynamic.block import Extension, Signals, State, StateBlock, same
 from triaxcal.dynamic.blocks.base import ARCSEC
+from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, same
 from triaxcal.model.types import FloatArray
 
 
@@ -19,4 +19,9 @@ BLOCK = StateBlock(
     reset=True,
     needs="table_angle_rad",
 )
-EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))
+ENTRY = Extension(
+    BLOCK.name,
+    BLOCK.title,
+    "Angles between unit and plate by the table's angle at rest, new at each mounting.",
+    (BLOCK,),
+)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.dynamic.block import Extension, Signals, State, StateBlock, diagonal, same
 from triaxcal.dynamic.blocks.base import MM_PER_S2, PPM
+from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, diagonal, same
 from triaxcal.model.types import FloatArray
 
 
@@ -33,4 +33,9 @@ BLOCK = StateBlock(
     force=_force,
     needs="temp_degc",
 )
-EXTENSION = Extension(BLOCK.name, BLOCK.title, (BLOCK,))
+ENTRY = Extension(
+    BLOCK.name,
+    BLOCK.title,
+    "Linear temperature coefficients of the accelerometers' biases and scale factors.",
+    (BLOCK,),
+)

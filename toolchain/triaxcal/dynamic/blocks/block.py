@@ -134,7 +134,8 @@ class Extension:
     """What is switched on by one name: one block, or some that make no sense without each other."""
 
     name: str
-    title: str
+    label: str
+    doc: str
     blocks: tuple[StateBlock, ...]
 
 

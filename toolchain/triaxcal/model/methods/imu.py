@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.model.compensation import Compensation, compensate
 from triaxcal.model.curves import ThermalModel
+from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.metrological import pack_constants
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.types import FloatArray
