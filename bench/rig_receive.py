@@ -21,7 +21,7 @@ from triaxcal.rig.dbc import default_dbc, load_database
 from triaxcal.rig.recording import Recording
 from triaxcal.rig.simulator import RigSettings, SimulatedRig
 from triaxcal.rig.socketcan import SocketSource, packed
-from triaxcal.rig.sources import PACE_S
+from triaxcal.rig.source import PACE_S
 from triaxcal.simulation.truth import read_truth
 
 SECONDS = int(sys.argv[1]) if len(sys.argv) > 1 else 8

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from rig_cases import rig_of, short_setup
 
+from triaxcal.rig.canbus import frames_of, messages_of
 from triaxcal.rig.candump import format_frames, parse, read_log
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG, Frames, concatenate, widened
 from triaxcal.rig.samples import SampleDecoder
-from triaxcal.rig.sources import frames_of, messages_of
 
 
 def mixed(seed=1, count=400):

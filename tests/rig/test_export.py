@@ -13,12 +13,12 @@ from rig_cases import rig_of, short_setup
 from test_candump import mixed, same
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.rig.canbus import frames_of
 from triaxcal.rig.candump import format_frames
 from triaxcal.rig.dbc import default_dbc
 from triaxcal.rig.export import WRITERS, export_log
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, Frames, widened
 from triaxcal.rig.samples import SampleDecoder
-from triaxcal.rig.sources import frames_of
 
 WITHOUT = "not installed: .venv/bin/pip install -c constraints.txt -e '.[export]'"
 """Not among the developers' tools: python-can imports asammdf, and that pandas, at every start."""

@@ -23,6 +23,7 @@ from test_cli_rig import bench_copy, triaxcal
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.rig import rig
+from triaxcal.rig.canbus import BusSource, messages_of, open_bus
 from triaxcal.rig.candump import parse
 from triaxcal.rig.check import findings
 from triaxcal.rig.frames import empty
@@ -30,7 +31,6 @@ from triaxcal.rig.journal import read_journal
 from triaxcal.rig.recording import JOURNAL_FILE, Recording
 from triaxcal.rig.runner import live
 from triaxcal.rig.samples import SampleDecoder
-from triaxcal.rig.sources import BusSource, messages_of, open_bus
 
 ENTRY = "from triaxcal.cli.entry import entry; entry()"
 CHANNELS = count(1)

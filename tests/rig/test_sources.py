@@ -8,12 +8,16 @@ import time
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from rig_cases import rig_of, short_setup
 
 from triaxcal.base.errors import RefusedError, UsageError
+from triaxcal.cli.rig import rig
+from triaxcal.rig.canbus import SimulatedSource, open_bus
 from triaxcal.rig.frames import concatenate
+from triaxcal.rig.rawlog import RawLog
 from triaxcal.rig.socketcan import SocketSource, open_refusal, packed
-from triaxcal.rig.sources import SimulatedSource, open_bus
+from triaxcal.rig.source import SOURCES, SourceKind, Wanted, kind_of
 
 
 def same(a, b, names=("can_id", "length", "fd")):
@@ -153,3 +157,42 @@ def test_why_a_device_cannot_be_opened(number, said):
 def test_an_interface_that_python_can_does_not_know():
     with pytest.raises(UsageError, match=r'found \'pcann\' \(did you mean "pcan"\?\)'):
         open_bus("pcann:X", fd=False)
+
+
+@pytest.mark.parametrize(
+    ("bus", "name"),
+    [
+        ("virtual", "virtual"), ("virtual:bench", "python-can"), ("can0", "socketcan"),
+        ("socketcan:vcan1", "socketcan"), ("pcan:PCAN_USBBUS1", "python-can"),
+        ("replay:frames.log", "replay"),
+    ],
+)  # fmt: skip
+def test_the_kind_of_source_that_a_bus_names(bus, name):
+    assert kind_of(bus).name == name
+
+
+def test_a_source_added_at_run_time_is_opened_and_explained():
+    toy = SourceKind("toy", "toy", "frames of a test", lambda bus: bus == "toy", lambda _: None, 1)
+    with SOURCES.added(toy):
+        assert kind_of("toy") is toy
+        assert "toy: frames of a test" in CliRunner().invoke(rig, ["run", "--help"]).output
+    assert kind_of("toy").name == "socketcan"
+
+
+def test_a_log_is_a_source_until_it_ends(tmp_path):
+    source_rig, path = rig_of(short_setup(tmp_path)), tmp_path / "x.log"
+    frames = [source_rig.advance() for _ in range(2)]
+    log = RawLog(path, "can0")
+    for part in frames:
+        log.append(part)
+    log.close()
+    with path.open("ab") as more:
+        more.write(b"no frame\n")
+    wanted = Wanted(f"replay:{path}", False, lambda: source_rig)
+    source = kind_of(wanted.bus).open(wanted)
+    same(source.read(), concatenate(frames))
+    assert source.notes() == [f"{path}: 1 lines are no frames"]
+    assert source.notes() == []
+    with pytest.raises(RefusedError, match=r"the log has ended; .*`triaxcal rig replay`"):
+        source.read()
+    source.close()

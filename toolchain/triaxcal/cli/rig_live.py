@@ -21,6 +21,7 @@ from rich.live import Live
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.rig import recording, runner, store
+from triaxcal.rig.canbus import Bus, SimulatedSource, messages_of
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.events import Agree, Command, Redo
 from triaxcal.rig.plan import SessionPlan
@@ -28,7 +29,7 @@ from triaxcal.rig.rawlog import LogState
 from triaxcal.rig.screen import BusView, plain_status, screen
 from triaxcal.rig.simulator import SimulatedRig
 from triaxcal.rig.socketcan import SocketSource
-from triaxcal.rig.sources import Bus, SimulatedSource, Source, messages_of
+from triaxcal.rig.source import Source
 from triaxcal.rig.view import view
 
 _REFRESH_S = 0.25

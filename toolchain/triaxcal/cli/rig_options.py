@@ -13,10 +13,11 @@ import click
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.options import UnitFolder
+from triaxcal.rig.source import SOURCES, Wanted, kind_of
 
 if TYPE_CHECKING:
     from triaxcal.rig.engine import Setup
-    from triaxcal.rig.sources import Source
+    from triaxcal.rig.source import Source
 
 _DEFAULT_PLAN = "five-temperatures.toml"
 _NEEDED = ("can", "cantools", "rich")
@@ -64,6 +65,14 @@ class BusChoice:
     seed: int
 
 
+class _BusOption(click.Option):
+    """Explained by the registry of sources."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        self.help = "; ".join(f"{kind.label}: {kind.doc}" for kind in SOURCES) + "."
+        return super().get_help_record(ctx)
+
+
 def bus_options(command: Callable[..., None]) -> Callable[..., None]:
     """Options of the bus; `command` gets them as its `bus`."""
 
@@ -73,11 +82,7 @@ def bus_options(command: Callable[..., None]) -> Callable[..., None]:
 
     return _optioned(
         with_bus,
-        click.option(
-            "--bus",
-            required=True,
-            help="virtual (the simulated rig), a CAN device such as can0, or interface:channel.",
-        ),
+        click.option("--bus", required=True, cls=_BusOption),
         click.option("--fault", multiple=True, help="Of the simulated rig: kind@s[:value[:s]]."),
         click.option("--seed", type=int, default=1, help="Of the simulated rig."),
     )
@@ -112,18 +117,10 @@ def open_source(setup: Setup, bus: BusChoice) -> Source:
     RefusedError
         When it cannot be opened, or faults are given for a real bus.
     """
-    from triaxcal.rig.socketcan import open_socketcan  # noqa: PLC0415
-    from triaxcal.rig.sources import BusSource, SimulatedSource, open_bus  # noqa: PLC0415
-
-    is_fd = setup.plan.layout == "fd"
-    if bus.name == "virtual":
-        return SimulatedSource(simulated(setup, bus))
-    if bus.faults:
+    kind = kind_of(bus.name)
+    if bus.faults and not kind.simulated:
         raise RefusedError("--fault", f"given with --bus {bus.name}", expected="--bus virtual")
-    interface, _, device = bus.name.rpartition(":")
-    if interface in {"", "socketcan"}:
-        return open_socketcan(device, is_fd)
-    return BusSource(open_bus(bus.name, is_fd), bus.name)
+    return kind.open(Wanted(bus.name, setup.plan.layout == "fd", lambda: simulated(setup, bus)))
 
 
 def simulated(setup: Setup, bus: BusChoice) -> Any:

@@ -11,7 +11,7 @@ with one wrong character is dropped and counted.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -226,7 +226,7 @@ def _frames(
     )
 
 
-def read_log(path: Path, start: int = 0, end: int | None = None) -> Iterator[Parsed]:
+def read_log(path: Path, start: int = 0, end: int | None = None) -> Generator[Parsed, None, None]:
     """Frames of a log, a chunk of whole lines at a time.
 
     Parameters

@@ -13,7 +13,7 @@ from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.orientation import described, recognised
 from triaxcal.rig.samples import BAD_CRC, DUPLICATE, ORPHAN, SampleDecoder, Samples
-from triaxcal.rig.sources import Source
+from triaxcal.rig.source import Source
 
 _RATE_TOLERANCE = 0.02
 """Of the plan's rate; a few seconds' count is exact to a sample or two."""

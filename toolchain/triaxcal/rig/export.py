@@ -11,10 +11,10 @@ import can
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.rig.canbus import messages_of
 from triaxcal.rig.candump import NS_PER_US, read_log
 from triaxcal.rig.export_columns import mf4_writer, parquet_writer
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, Frames
-from triaxcal.rig.sources import messages_of
 
 Put = Callable[[Frames], None]
 """Adds frames to a file that is being written."""

@@ -14,7 +14,7 @@ from triaxcal.rig.frames import Frames
 from triaxcal.rig.recording import Recording
 from triaxcal.rig.session import Session
 from triaxcal.rig.simulator import SimulatedRig
-from triaxcal.rig.sources import Source
+from triaxcal.rig.source import Source
 
 _RATE_WINDOW_S = 2.0
 _CLASSIC_OVERHEAD_BITS = 47 + 12

@@ -12,6 +12,7 @@ import socket
 import struct
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from triaxcal.rig.burst import (
     BurstReceiver,
 )
 from triaxcal.rig.frames import Frames, empty
-from triaxcal.rig.sources import PACE_S, WAIT_S, can_devices
+from triaxcal.rig.source import PACE_S, WAIT_S, Watched
 
 QUEUE_BYTES = 4 << 20
 _SO_RCVBUFFORCE = 33
@@ -34,12 +35,13 @@ _FRAME_QUEUE_BYTES = 384
 _ENOUGH_S = 0.5
 _FULL_RATE = 9000
 _REOPEN_S = 0.2
-_SILENCE_S = 0.9
+_CAN_DEVICE = "280"  # ARPHRD_CAN
+_NETWORK = Path("/sys/class/net")
 _HEAD = struct.Struct("@IB")
 _GONE = {errno.ENODEV, errno.ENXIO, errno.EBADF, errno.ENETUNREACH}
 
 
-class SocketSource:
+class SocketSource(Watched):
     """Frames of a CAN device of Linux.
 
     Parameters
@@ -61,16 +63,14 @@ class SocketSource:
         RefusedError
             When there is no such device (names those that there are), or no permission.
         """
-        self.name = name
+        super().__init__(name)
         self.dropped = 0
         self._connect = connect
-        self._notes: list[str] = []
         self._socket: socket.socket | None = None
         self._counted = 0
         self._burst = BurstReceiver()
         self._read_at = 0.0
-        self._down = self._silent = False
-        self._heard = self._tried = time.monotonic()
+        self._tried = time.monotonic()
         try:
             self._open()
         except OSError as error:
@@ -105,7 +105,11 @@ class SocketSource:
             time.sleep(max(0.0, self._read_at + PACE_S - time.monotonic()))
             self._read_at = time.monotonic()
             frames = self._receive(self._socket)
-        self._watch(bool(len(frames)))
+        # A removed device says so once, and one that came back under its name never does:
+        # a socket that stays silent is made anew.
+        if self._watch(bool(len(frames))) and time.monotonic() - self._tried > 1.0:
+            self._close()
+            self._tried = time.monotonic() - _REOPEN_S
         return frames
 
     def _receive(self, link: socket.socket) -> Frames:
@@ -147,29 +151,6 @@ class SocketSource:
             return
         self._notes.append(f"{self.name}: the device is back")
 
-    def _watch(self, heard: bool) -> None:
-        now = time.monotonic()
-        if heard:
-            if self._silent or self._down:
-                self._notes.append(f"{self.name}: frames come again")
-            self._heard, self._silent, self._down = now, False, False
-            return
-        if now - self._heard <= _SILENCE_S:
-            return
-        if not self._silent:
-            self._silent = True
-            self._notes.append(f"{self.name}: no frames; is the rig on, the plug in, the bus up?")
-        # A removed device says so once, and one that came back under its name never does:
-        # a socket that stays silent is made anew.
-        if now - self._tried > 1.0:
-            self._close()
-            self._tried = now - _REOPEN_S
-
-    def notes(self) -> list[str]:
-        """What happened to the connection since last asked."""
-        said, self._notes = self._notes, []
-        return said
-
     def _close(self) -> None:
         if self._socket is not None:
             self._socket.close()
@@ -178,17 +159,6 @@ class SocketSource:
     def close(self) -> None:
         """Close the socket."""
         self._close()
-
-
-def open_socketcan(device: str, fd: bool) -> SocketSource:
-    """Receiver of a CAN device.
-
-    Raises
-    ------
-    RefusedError
-        When this machine has no SocketCAN, no such device, or does not permit it.
-    """
-    return SocketSource(device, lambda: can_socket(device, fd))
 
 
 def can_socket(device: str, fd: bool) -> socket.socket:
@@ -210,6 +180,16 @@ def can_socket(device: str, fd: bool) -> socket.socket:
         opened.close()
         raise
     return opened
+
+
+def can_devices() -> list[str]:
+    """Names of the CAN network devices of this machine."""
+    if not _NETWORK.is_dir():
+        return []
+    types = ((d.name, d / "type") for d in sorted(_NETWORK.iterdir()))
+    return [
+        name for name, kind in types if kind.is_file() and kind.read_text().strip() == _CAN_DEVICE
+    ]
 
 
 def packed(frames: Frames) -> list[bytes]:

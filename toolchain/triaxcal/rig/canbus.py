@@ -1,10 +1,9 @@
-"""Where frames come from: python-can's buses, and the simulated rig on one of them."""
+"""Buses of python-can, and the simulated rig on one of them."""
 
 from __future__ import annotations
 
 import time
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import can
 import numpy as np
@@ -13,48 +12,18 @@ from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG, Frames, empty
 from triaxcal.rig.simulator import SimulatedRig
-
-WAIT_S = 0.05
-PACE_S = 0.02
-"""Between two reads: each costs the same for one frame as for a hundred, and the smallest queue,
-Debian's 278 frames, holds 31 ms of a full bus."""
-_CAN_DEVICE = "280"  # ARPHRD_CAN
-_NETWORK = Path("/sys/class/net")
+from triaxcal.rig.source import PACE_S, WAIT_S, Watched
 
 Bus = can.BusABC
 """A bus of python-can, which this room alone imports."""
 
 
-class Source(Protocol):
-    """A stream of frames.
-
-    Attributes
-    ----------
-    name : str
-        Channel, for the log and for messages.
-    """
-
-    name: str
-
-    def read(self) -> Frames:
-        """Frames that have come; waits a little when there are none."""
-
-    def notes(self) -> list[str]:
-        """What happened to the connection since last asked, one line each."""
-
-    def close(self) -> None:
-        """Give the channel back."""
-
-
-class BusSource:
+class BusSource(Watched):
     """Any bus that python-can opens."""
 
     def __init__(self, bus: can.BusABC, name: str) -> None:
-        self.name = name
+        super().__init__(name)
         self.bus = bus
-        self._notes: list[str] = []
-        self._heard = time.monotonic()
-        self._silent = False
 
     def read(self) -> Frames:
         """Frames that have come.
@@ -80,21 +49,6 @@ class BusSource:
             ) from error
         self._watch(bool(messages))
         return frames_of(messages)
-
-    def _watch(self, heard: bool) -> None:
-        now = time.monotonic()
-        if heard:
-            if self._silent:
-                self._notes.append(f"{self.name}: frames come again")
-            self._heard, self._silent = now, False
-        elif now - self._heard > 0.9 and not self._silent:
-            self._silent = True
-            self._notes.append(f"{self.name}: no frames; is the rig on, the plug in, the bus up?")
-
-    def notes(self) -> list[str]:
-        """What happened since last asked."""
-        said, self._notes = self._notes, []
-        return said
 
     def close(self) -> None:
         """Shut the bus down."""
@@ -173,16 +127,6 @@ def messages_of(frames: Frames) -> list[can.Message]:
             data=data[:length].tobytes(),
         )
         for t_ns, can_id, length, fd, data in rows
-    ]
-
-
-def can_devices() -> list[str]:
-    """Names of the CAN network devices of this machine."""
-    if not _NETWORK.is_dir():
-        return []
-    types = ((d.name, d / "type") for d in sorted(_NETWORK.iterdir()))
-    return [
-        name for name, kind in types if kind.is_file() and kind.read_text().strip() == _CAN_DEVICE
     ]
 
 

@@ -1,0 +1,63 @@
+"""Frames of a log, as fast as they are read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.rig.source import SourceKind, Wanted
+
+if TYPE_CHECKING:
+    from triaxcal.rig.frames import Frames
+
+_PREFIX = "replay:"
+
+
+class LogSource:
+    """Source of the frames that a log holds."""
+
+    def __init__(self, path: Path) -> None:
+        from triaxcal.rig.candump import read_log  # noqa: PLC0415
+
+        self.name = str(path)
+        self._parts = read_log(path)
+        self._bad_lines = 0
+
+    def read(self) -> Frames:
+        """Frames of the next part of the log.
+
+        Raises
+        ------
+        RefusedError
+            When the log cannot be read, or has ended.
+        """
+        part = next(self._parts, None)
+        if part is None:
+            remedy = "`triaxcal rig replay` makes the records of a whole session from its log"
+            raise RefusedError(self.name, "the log has ended", remedy=remedy)
+        self._bad_lines += part.bad_lines
+        return part.frames
+
+    def notes(self) -> list[str]:
+        """Lines that are no frames."""
+        bad, self._bad_lines = self._bad_lines, 0
+        return [f"{self.name}: {bad} lines are no frames"] if bad else []
+
+    def close(self) -> None:
+        """Close the log."""
+        self._parts.close()
+
+
+def _open(wanted: Wanted) -> LogSource:
+    return LogSource(Path(wanted.bus.removeprefix(_PREFIX)))
+
+
+ENTRY = SourceKind(
+    name="replay",
+    label="replay:LOG",
+    doc="the frames of a log",
+    takes=lambda bus: bus.startswith(_PREFIX),
+    open=_open,
+    rank=20,
+)
