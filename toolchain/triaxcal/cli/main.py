@@ -12,7 +12,7 @@ import click
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
-from triaxcal.cli.options import UnitFolder, example, say, unit_and_build
+from triaxcal.cli.options import UnitFolder, WithKinds, example, say, unit_and_build
 
 if TYPE_CHECKING:
     from triaxcal.codegen.compiler import Compilation
@@ -72,7 +72,10 @@ def main() -> None:
     """
 
 
-@main.command(epilog=example("triaxcal calib AT-SIM", "triaxcal calib units/AT-SIM --build out"))
+@main.command(
+    cls=WithKinds,
+    epilog=example("triaxcal calib AT-SIM", "triaxcal calib units/AT-SIM --build out"),
+)
 @unit_and_build
 def calib(unit: Path, build: Path) -> None:
     """Calibrate a unit and write its C.

@@ -66,6 +66,25 @@ def unit_and_build(command: Callable[..., Any]) -> Callable[..., Any]:
     return _UNIT(_BUILD(command))
 
 
+class WithKinds(click.Command):
+    """A command whose help lists what unit.toml can choose from."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Options, then a section for each registry."""
+        from triaxcal.model.methods.registry import METHODS  # noqa: PLC0415
+        from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS  # noqa: PLC0415
+        from triaxcal.readings.format import FORMATS  # noqa: PLC0415
+
+        super().format_options(ctx, formatter)
+        for title, rows in (
+            ("Thermal functions, [thermal] model", [(e.name, e.doc) for e in THERMAL_FUNCTIONS]),
+            ("Methods, [compensation] method", [(e.name, e.doc) for e in METHODS]),
+            ("Formats of recordings, besides text", [(e.name, e.label) for e in FORMATS]),
+        ):
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
+
 def example(*lines: str) -> str:
     """Epilog of a command's help: command lines that can be copied."""
     return "\b\nExample:\n" + "\n".join(f"  {line}" for line in lines)

@@ -23,7 +23,7 @@ def _correction(K0: FloatArray, dK: FloatArray, dU0: FloatArray) -> tuple[FloatA
 ENTRY = CompensationMethod(
     name="additive",
     label="additive",
-    doc="The constants of T0 plus the correction (5), (6) of P1.",
+    doc="The constants of T0, plus a correction that follows the temperature.",
     short_label="additive",
     colour="#c8553d",
     form=DIRECT,

@@ -21,7 +21,7 @@ def _correction(K0: FloatArray, dK: FloatArray, dU0: FloatArray) -> tuple[FloatA
 ENTRY = CompensationMethod(
     name="additive-first-order",
     label="additive-first-order",
-    doc="The constants of T0 plus the whole first order of (1) in the changes of K and U0.",
+    doc="The constants of T0, plus the whole first order in the changes of K and U0.",
     short_label="add.-first-order",
     colour="#7b4ea3",
     form=DIRECT,

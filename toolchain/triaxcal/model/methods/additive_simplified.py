@@ -20,7 +20,7 @@ def _correction(K0: FloatArray, dK: FloatArray, dU0: FloatArray) -> tuple[FloatA
 ENTRY = CompensationMethod(
     name="additive-simplified",
     label="additive-simplified",
-    doc="The constants of T0 plus the diagonal of that correction: (7), (8) of P1.",
+    doc="The constants of T0, plus the diagonal part of that correction.",
     short_label="add.-simplified",
     colour="#e9a23b",
     form=DIRECT,

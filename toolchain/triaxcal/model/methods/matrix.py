@@ -69,7 +69,7 @@ def _sampled_error_g(
 ENTRY = CompensationMethod(
     name="matrix",
     label="matrix",
-    doc="N(T) = K(T)^-1 and its offset, as polynomials within `model_error_max_micro_g` of it.",
+    doc="K(T)^-1 and its offset as polynomials, within model_error_max_micro_g.",
     short_label="matrix",
     colour="#0a5fb4",
     form=DIRECT,

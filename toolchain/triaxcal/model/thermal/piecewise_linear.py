@@ -51,8 +51,8 @@ def _candidates(temps: FloatArray, t0: float) -> tuple[ThermalShape, ...]:
 ENTRY = ThermalFunction(
     name=PiecewiseLinearShape.name,
     label=PiecewiseLinearShape.title,
-    doc="Straight lines that meet at knots: equation (4) of P1, made continuous.",
-    keys=(knots_key("piecewise-linear: T0, the two segments of (12)"),),
+    doc="Straight lines that meet at knots.",
+    keys=(knots_key("piecewise-linear: T0, two segments"),),
     stated=_stated,
     candidates=_candidates,
     exact=PiecewiseLinearShape.through,

@@ -118,7 +118,7 @@ def _candidates(temps: FloatArray, t0: float) -> tuple[ThermalShape, ...]:
 ENTRY = ThermalFunction(
     name=PolynomialShape.name,
     label="polynomial",
-    doc="One polynomial over all temperatures: equation (3) of P1.",
+    doc="One polynomial over all temperatures.",
     keys=(ORDER,),
     stated=_stated,
     candidates=_candidates,
