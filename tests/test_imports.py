@@ -25,6 +25,7 @@ MAY_IMPORT = {
     "simulation": {"base", "model", "unit", "readings", "dynamic"},
     "design": {"base", "model", "unit", "dynamic", "simulation"},
     "rig": {"base", "model", "unit", "readings", "simulation"},
+    "keytable": {"base", "unit", "dynamic", "simulation", "design", "rig"},
     "delivery": {
         "base", "model", "unit", "readings", "poses", "fitting", "dynamic", "fixedpoint", "codegen",
     },

@@ -402,7 +402,9 @@ def test_the_folder_of_units_is_no_unit(tmp_path: Path) -> None:
 
 
 def test_no_units_at_all_points_at_the_guide(tmp_path: Path) -> None:
-    with pytest.raises(RefusedError, match=r"no such unit; make it as docs/add-a-unit\.md tells"):
+    with pytest.raises(
+        RefusedError, match=r"no such unit; `triaxcal init .*` writes a first unit.toml"
+    ):
         find_unit(tmp_path / "empty" / "units" / "X")
 
 

@@ -205,11 +205,14 @@ class FileKeys:
         What it describes, in a few words.
     tables : tuple of TableKeys
         The first is the top of the file.
+    first : tuple of str
+        Optional keys that a first version of the file states.
     """
 
     name: str
     title: str
     tables: tuple[TableKeys, ...]
+    first: tuple[str, ...] = ()
 
     def read(self, path: Path) -> Mapping[str, Values]:
         """Checked tables of a file by name; absent ones are empty.

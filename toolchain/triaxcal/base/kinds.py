@@ -31,6 +31,8 @@ class Kind(Generic[T_co]):
         What to do about a wrong one.
     choices : tuple of str
         Words that it may be, to hint at a near miss.
+    example : str
+        A good value in TOML.
     """
 
     expected: str
@@ -38,6 +40,7 @@ class Kind(Generic[T_co]):
     schema: Mapping[str, Any]
     remedy: str = ""
     choices: tuple[str, ...] = ()
+    example: str = ""
 
 
 class WrongItemError(ValueError):
@@ -49,7 +52,11 @@ class WrongItemError(ValueError):
 
 
 def checked(
-    good: Callable[[Any], bool], expected: str, schema: Mapping[str, Any], remedy: str = ""
+    good: Callable[[Any], bool],
+    expected: str,
+    schema: Mapping[str, Any],
+    example: str,
+    remedy: str = "",
 ) -> Kind[Any]:
     """Kind whose values are as they stand in the file."""
 
@@ -58,15 +65,20 @@ def checked(
             raise ValueError
         return value
 
-    return Kind(expected, parse, schema, remedy)
+    return Kind(expected, parse, schema, remedy, example=example)
 
 
-TEXT: Kind[str] = checked(lambda v: isinstance(v, str), "text in quotes", {"type": "string"})
-FLAG: Kind[bool] = checked(lambda v: isinstance(v, bool), "true or false", {"type": "boolean"})
+TEXT: Kind[str] = checked(
+    lambda v: isinstance(v, str), "text in quotes", {"type": "string"}, '"name"'
+)
+FLAG: Kind[bool] = checked(
+    lambda v: isinstance(v, bool), "true or false", {"type": "boolean"}, "true"
+)
 DATE: Kind[datetime.date] = checked(
     lambda v: isinstance(v, datetime.date) and not isinstance(v, datetime.datetime),
     "a day without quotes, as 2026-03-30",
     {"type": "string", "format": "date"},
+    "2026-03-30",
 )
 
 
@@ -82,17 +94,17 @@ def line(longest: int | None = None) -> Kind[str]:
 
     size = {"minLength": 1} | ({"maxLength": longest} if longest else {})
     limit = f" of 1 to {longest} characters" if longest else ""
-    return Kind(f"one line of text{limit}", parse, {"type": "string", **size})
+    return Kind(f"one line of text{limit}", parse, {"type": "string", **size}, example='"name"')
 
 
-def pattern(regex: str, expected: str, remedy: str = "") -> Kind[str]:
+def pattern(regex: str, expected: str, example: str) -> Kind[str]:
     """Text that matches a regular expression whole, letters and digits of ASCII."""
     wanted = re.compile(regex, re.ASCII)
     return checked(
         lambda v: isinstance(v, str) and wanted.fullmatch(v) is not None,
         expected,
         {"type": "string", "pattern": f"^(?:{regex})$"},
-        remedy,
+        example,
     )
 
 
@@ -110,15 +122,17 @@ def meaning(words: Mapping[str, T]) -> Kind[T]:
         return words[value]
 
     expected = "one of " + ", ".join(f'"{choice}"' for choice in words)
-    return Kind(expected, parse, {"enum": list(words)}, "", tuple(words))
+    names = tuple(words)
+    return Kind(expected, parse, {"enum": list(names)}, "", names, f'"{names[0]}"')
 
 
 def whole(low: int, high: int) -> Kind[int]:
     """A whole number from `low` to `high`."""
     return checked(
         lambda v: isinstance(v, int) and not isinstance(v, bool) and low <= v <= high,
-        f"a whole number from {low} to {high}",
+        f"a whole number from {low} to {high}" if low < high else f"{low}",
         {"type": "integer", "minimum": low, "maximum": high},
+        f"{low}",
     )
 
 
@@ -136,13 +150,13 @@ def decimal(low: float = -math.inf, high: float = math.inf) -> Kind[Decimal]:
     schema: dict[str, Any] = {"type": "number"}
     if math.isfinite(low):
         schema |= {"minimum": low, "maximum": high}
-    return Kind(f"a number from {low:g} to {high:g}", parse, schema)
+    return Kind(f"a number from {low:g} to {high:g}", parse, schema, example=f"{low:g}")
 
 
 def number(low: float = -math.inf, high: float = math.inf) -> Kind[float]:
     """A finite number from `low` to `high`."""
     exact = decimal(low, high)
-    return Kind(exact.expected, lambda v: float(exact.parse(v)), exact.schema)
+    return Kind(exact.expected, lambda v: float(exact.parse(v)), exact.schema, "", (), f"{low:g}")
 
 
 def listed(
@@ -168,7 +182,8 @@ def listed(
         "maxItems": lengths[-1],
         "uniqueItems": different,
     }
-    return Kind(expected, parse, schema, remedy)
+    example = ", ".join([item.example] * max(1, lengths[0]))
+    return Kind(expected, parse, schema, remedy, example=f"[{example}]")
 
 
 def rising(low: float, high: float, shortest: int, longest: int) -> Kind[tuple[float, ...]]:
@@ -183,7 +198,8 @@ def rising(low: float, high: float, shortest: int, longest: int) -> Kind[tuple[f
             raise ValueError
         return items
 
-    return Kind(expected, parse, numbers.schema)
+    example = ", ".join(f"{low + i:g}" for i in range(max(1, shortest)))
+    return Kind(expected, parse, numbers.schema, example=f"[{example}]")
 
 
 def interval(low: float, high: float) -> Kind[tuple[float, float]]:
@@ -194,7 +210,7 @@ def interval(low: float, high: float) -> Kind[tuple[float, float]]:
         first, last = two.parse(value)
         return first, last
 
-    return Kind(two.expected, parse, two.schema)
+    return Kind(two.expected, parse, two.schema, example=two.example)
 
 
 def three(
@@ -209,4 +225,4 @@ def three(
             raise ValueError
         return x, y, z
 
-    return Kind(expected, parse, items.schema)
+    return Kind(expected, parse, items.schema, example=items.example)

@@ -22,7 +22,7 @@ SECTIONS = {
     "Calibrate": ("calib", "dynamic", "batch"),
     "Look at readings and results": ("poses", "drift", "crosscoupling", "history"),
     "Check the generated C": ("verify", "target"),
-    "Plan, measure, simulate": ("init", "design", "rig", "simulate"),
+    "Plan, measure, simulate": ("init", "design", "rig", "simulate", "schema"),
 }
 """Commands in the order of the help; one that is not named here comes last."""
 
@@ -31,8 +31,8 @@ class _Commands(click.Group):
     """Commands of their own files are imported when they are asked for: `calib` waits for none."""
 
     OTHERS = (
-        "batch", "crosscoupling", "design", "drift", "dynamic", "history", "poses", "rig", "target",
-        "verify",
+        "batch", "crosscoupling", "design", "drift", "dynamic", "history", "init", "poses", "rig",
+        "schema", "target", "verify",
     )  # fmt: skip
 
     def list_commands(self, ctx: click.Context) -> list[str]:

@@ -112,6 +112,7 @@ _THREE = Kind(
     "three different names of columns, of axes x, y, z",
     _three,
     {"type": "array", "items": {"type": "string"}, "minItems": 3, "maxItems": 3},
+    example='["x", "y", "z"]',
 )
 
 
@@ -164,9 +165,7 @@ class DynamicTable:
         "deg/s",
     )
     force_columns: tuple[str, ...] = key(
-        _THREE,
-        "Accelerometers x, y, z, on the axes of the gyros.",
-        example='["ax", "ay", "az"]',
+        _THREE, "Accelerometers x, y, z, on the axes of the gyros.", example='["ax", "ay", "az"]'
     )
     force_unit: str = key(
         word((*_FORCE_UNITS, *_VELOCITY_UNITS)),
@@ -243,6 +242,7 @@ def imu_file() -> FileKeys:
             ),
             DEVICE,
         ),
+        ("time_column",),
     )
 
 

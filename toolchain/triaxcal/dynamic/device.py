@@ -25,10 +25,7 @@ class Device:
     )
     gyro_bits: int = key(whole(8, 32), "Width of the signed raw code.", unit="bit", example="16")
     gyro_full_scale_deg_per_s: float = key(
-        number(1e-3, 1e5),
-        "Reading of the code 2^(gyro_bits - 1).",
-        unit="deg/s",
-        example="500",
+        number(1e-3, 1e5), "Reading of the code 2^(gyro_bits - 1).", unit="deg/s", example="500"
     )
     range_degc: tuple[float, float] = key(
         interval(*PLAUSIBLE_DEGC), "Working range.", unit="degC", example="[-40, 85]"

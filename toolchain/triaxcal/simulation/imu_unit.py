@@ -104,6 +104,7 @@ IMU_TRUTH = FileKeys(
         TableKeys("unit", "The sensors.", (GRADE, SEED, IMU_EFFECTS)),
         TableKeys("motion", "The motion.", (RATE, MINUTES, MOVES, STILL, TABLE, TEMPERATURE)),
     ),
+    ("minutes_per_axis",),
 )
 
 

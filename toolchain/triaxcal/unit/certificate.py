@@ -17,9 +17,8 @@ class CertificateDetails:
     laboratory: str = key(line(), "Who calibrated.", example='"Inertial laboratory"')
     city: str = key(line(), "City of the laboratory.", example='"Kyiv"')
     country: str = key(
-        pattern("[A-Z]{2}", 'two capitals of ISO 3166-1, as "UA"'),
+        pattern("[A-Z]{2}", 'two capitals of ISO 3166-1, as "UA"', '"UA"'),
         "Country of the laboratory.",
-        example='"UA"',
     )
     customer: str = key(line(), "For whom.", example='"Customer"')
     signer: str = key(line(), "Who is responsible for the certificate.", example='"A. Person"')

@@ -29,13 +29,7 @@ from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS, owners, the
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC, Settings
 from triaxcal.unit.certificate import CERTIFICATE, CertificateDetails, certificate_details
 from triaxcal.unit.measured import MEASURED, Measured
-from triaxcal.unit.recording import (
-    DEFAULT_LSB,
-    FILE,
-    RECORDING,
-    RecordingLayout,
-    recording_layout,
-)
+from triaxcal.unit.recording import DEFAULT_LSB, FILE, RECORDING, RecordingLayout, recording_layout
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
 OUTPUT_Q_RANGE = (8, 30)
@@ -55,9 +49,8 @@ _NAME_RULE = "1 to 64 of A-Z a-z 0-9 - _, the first a letter or digit"
 
 SERIAL = Key(
     "serial",
-    pattern(_NAME.pattern, f"text in quotes, {_NAME_RULE}"),
+    pattern(_NAME.pattern, f"text in quotes, {_NAME_RULE}", '"SN-0001"'),
     "Serial number; no two units in one folder may share it.",
-    example='"SN-0001"',
 )
 DESCRIPTION = Key("description", TEXT, "For people; nothing is made of it.", "")
 TOP = TableKeys("", "The unit.", (FORMAT_KEY, SERIAL, DESCRIPTION))
@@ -261,9 +254,9 @@ class PairSource:
             'the axes that A and B are, as ["x", "y"]',
             _axis_pair,
             {"type": "array", "items": {"enum": list(AXES)}, "minItems": 2, "maxItems": 2},
+            example='["x", "y"]',
         ),
         "The unit's axes that A and B are.",
-        example='["x", "y"]',
     )
 
 
@@ -311,13 +304,12 @@ class _Compensation:
 POLARITY = Key(
     "polarity",
     three(
-        checked(lambda v: type(v) is int and abs(v) == 1, "a sign", {"enum": [1, -1]}),
+        checked(lambda v: type(v) is int and abs(v) == 1, "a sign", {"enum": [1, -1]}, "1"),
         "a list of three signs, each 1 or -1",
     ),
     "Signs of Kxx, Kyy, Kzz, where they differ.",
     None,
     default_words="all alike",
-    example="[1, 1, 1]",
 )
 
 
@@ -369,6 +361,7 @@ def recording_file() -> FileKeys:
             LIMITS.but(at_t0_g=limit, over_range_g=limit),
             *_common(),
         ),
+        ("acceleration", "acceleration_unit", "time"),
     )
 
 
@@ -477,7 +470,7 @@ def find_unit(folder: Path) -> Path:
             remedy = f"units in {units_dir}: " + ", ".join(names[:20]) + more
             break
     else:
-        remedy = "make it as docs/add-a-unit.md tells"
+        remedy = f"`triaxcal init {folder}` writes a first unit.toml"
     found = f"no {UNIT_FILE} in it" if folder.is_dir() else "no such unit"
     raise RefusedError(str(folder), found, remedy=remedy)
 

@@ -149,10 +149,14 @@ def _faces(value: object) -> Mapping[str, str]:
 
 
 FILE: Kind[str] = checked(
-    is_in_folder, "a file in the unit's folder", {"type": "string"}, "copy it there"
+    is_in_folder,
+    "a file in the unit's folder",
+    {"type": "string"},
+    '"recording.csv"',
+    "copy it there",
 )
 _SCHEMA = {"anyOf": [{"type": "string", "minLength": 1}, {"type": "integer"}]}
-COLUMN = Kind("the name of a column, or its number from 1", _column, _SCHEMA)
+COLUMN = Kind("the name of a column, or its number from 1", _column, _SCHEMA, example='"column"')
 COLUMNS = listed(
     COLUMN, range(3, 4), "a list of 3 different columns, by name or number", different=True
 )
@@ -160,11 +164,13 @@ SIGNED_COLUMNS = Kind(
     'three different columns, by name or number, as ["ax", "-ay", "az"]',
     _three_signed,
     {"type": "array", "items": _SCHEMA, "minItems": 3, "maxItems": 3},
+    example='["ax", "ay", "az"]',
 )
 LABELLED_FACES = Kind(
     'a label and the axis that points up each, as {top = "+z", bottom = "-z"}',
     _faces,
     {"type": "object", "additionalProperties": {"enum": list(FACES)}},
+    example='{top = "+z", bottom = "-z"}',
 )
 
 
@@ -185,10 +191,10 @@ class RecordingLayout:
         meaning(DELIMITERS),
         'What separates the cells; "space" is any white space.',
         None,
-        default_words="found",
+        default_words="found from the file",
     )
     header: bool | None = key(
-        FLAG, "Whether the first line names the columns.", None, default_words="found"
+        FLAG, "Whether the first line names the columns.", None, default_words="found from the file"
     )
     skip_rows: int = key(
         whole(0, 10**6),
@@ -199,10 +205,7 @@ class RecordingLayout:
     comment: str = key(TEXT, "Lines that begin with it are ignored.", "#")
     decimal: str = key(word((".", ",")), "Decimal sign.", ".")
     variable: str | None = key(
-        TEXT,
-        "Matrix of a MAT-file, for columns by number.",
-        None,
-        default_words="the only matrix",
+        TEXT, "Matrix of a MAT-file, for columns by number.", None, default_words="the only matrix"
     )
     acceleration: tuple[SignedColumn, ...] = key(
         SIGNED_COLUMNS,
@@ -242,10 +245,7 @@ class RecordingLayout:
         "degC",
     )
     section: Column | None = key(
-        COLUMN,
-        'Label of each row; required with `rows = "sections"`.',
-        None,
-        example='"section"',
+        COLUMN, 'Label of each row; required with `rows = "sections"`.', None, example='"section"'
     )
     faces: Mapping[str, str] = key(
         LABELLED_FACES,
@@ -295,7 +295,6 @@ RECORDING = TableKeys(
     "recording",
     "A recording of samples or poses. A unit with it has no measurements.csv.",
     keys_of(RecordingLayout),
-    optional=True,
 )
 
 

@@ -1,0 +1,32 @@
+"""`triaxcal init`: a first, commented file of a unit, a session, or a simulation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from triaxcal.cli.options import example
+from triaxcal.keytable.catalogue import FILES
+from triaxcal.keytable.starter import write_starter
+
+
+@click.command(
+    epilog=example("triaxcal init units/SN-0042", "triaxcal init units/IMU-7 --kind imu")
+)
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "--kind",
+    type=click.Choice(tuple(FILES)),
+    default="tilter",
+    show_default=True,
+    help="What the file describes.",
+)
+def init(folder: Path, kind: str) -> None:
+    """Write a commented TOML file into FOLDER, and a JSON Schema with which editors check it.
+
+    Required keys stand there with an example, the others are commented out with their default.
+    No file is overwritten.
+    """
+    path, schema = write_starter(folder, kind)
+    click.echo(f"{path} written; replace its examples. {schema.name} is for your editor.")
