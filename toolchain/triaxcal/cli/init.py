@@ -23,9 +23,10 @@ from triaxcal.keytable.starter import write_starter
     help="What the file describes.",
 )
 def init(folder: Path, kind: str) -> None:
-    """Write a commented TOML file into FOLDER, and a JSON Schema with which editors check it.
+    """Write a first, commented file of a unit.
 
-    Required keys stand there with an example, the others are commented out with their default.
+    It goes into FOLDER, and beside it a JSON Schema with which editors complete and check it.
+    Required keys stand there with an example. The others are commented out, with their defaults.
     No file is overwritten.
     """
     path, schema = write_starter(folder, kind)

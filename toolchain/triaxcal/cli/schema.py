@@ -11,8 +11,11 @@ from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.schema import json_schema
 
 
-@click.command(epilog=example("triaxcal schema tilter > unit.schema.json"))
+@click.command(epilog=example("triaxcal schema tilter"))
 @click.argument("kind", type=click.Choice(tuple(FILES)))
 def schema(kind: str) -> None:
-    """Print the JSON Schema of a KIND of TOML file, for editors and other programs."""
+    """Print the JSON Schema of a kind of TOML file.
+
+    Editors and other programs complete and check a file with it.
+    """
     click.echo(json.dumps(json_schema(FILES[kind]()), indent=1))
