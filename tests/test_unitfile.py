@@ -402,7 +402,7 @@ def test_the_folder_of_units_is_no_unit(tmp_path: Path) -> None:
 
 
 def test_no_units_at_all_points_at_the_guide(tmp_path: Path) -> None:
-    with pytest.raises(RefusedError, match="no such unit; `triaxcal init .*` writes a first unit"):
+    with pytest.raises(RefusedError, match="no such unit; `triaxcal init "):
         find_unit(tmp_path / "empty" / "units" / "X")
 
 
