@@ -1,3 +1,74 @@
-"""Thermal calibration of triaxial accelerometers, down to verified fixed-point C."""
+"""Calibration of triaxial accelerometers and whole IMUs, from readings to proven integer C.
+
+    import triaxcal
+
+    unit = triaxcal.read_unit("units/AT-SIM")
+    cal = triaxcal.fit(unit)
+    K, U0 = cal.constants(20.0)
+    firmware = triaxcal.firmware(cal)
+    firmware.write("out")
+
+Nothing here prints. What a user can cause is a `RefusedError`. A name is imported when it is first
+used, so that `import triaxcal` alone takes no longer than importing numpy.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from triaxcal.api.calibration import Calibration, Diagnosis, fit, load
+    from triaxcal.api.delivery import Delivered, deliver
+    from triaxcal.api.firmware import CompiledFirmware, Firmware, firmware
+    from triaxcal.api.imu import (
+        Imu,
+        ImuCalibration,
+        ImuConstants,
+        ImuFirmware,
+        ImuState,
+        firmware_imu,
+        fit_imu,
+        load_imu,
+        read_imu,
+    )
+    from triaxcal.api.unit import Unit, read_unit
+    from triaxcal.base.errors import RefusedError, UsageError
+    from triaxcal.delivery.judgement import Tested, Verdict
+    from triaxcal.uncertainty.budget import Budget
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "Firmware", "Imu",
+    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "RefusedError", "Tested", "Unit",
+    "UsageError", "Verdict", "__version__", "deliver", "firmware", "firmware_imu", "fit", "fit_imu",
+    "load", "load_imu", "read_imu", "read_unit",
+]  # fmt: skip
+
+_MODULES = {
+    "triaxcal.api.calibration": ("Calibration", "Diagnosis", "fit", "load"),
+    "triaxcal.api.delivery": ("Delivered", "deliver"),
+    "triaxcal.api.firmware": ("CompiledFirmware", "Firmware", "firmware"),
+    "triaxcal.api.imu": (
+        "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "firmware_imu",
+        "fit_imu", "load_imu", "read_imu",
+    ),
+    "triaxcal.api.unit": ("Unit", "read_unit"),
+    "triaxcal.base.errors": ("RefusedError", "UsageError"),
+    "triaxcal.delivery.judgement": ("Tested", "Verdict"),
+    "triaxcal.uncertainty.budget": ("Budget",),
+}  # fmt: skip
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'triaxcal' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_MODULE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

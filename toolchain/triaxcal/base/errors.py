@@ -8,6 +8,8 @@ Every message says where (file, row, key), what was found, what was expected and
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class RefusedError(Exception):
     """The data or the result was refused.
@@ -43,8 +45,17 @@ class RefusedError(Exception):
             text += f"; {remedy}"
         super().__init__(" ".join(text.split()))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For another process: the parts, which the text alone would lose."""
+        return _again, (type(self), self.place, self.found, self.expected, self.remedy)
+
 
 class UsageError(RefusedError):
     """The command line is wrong in a way that click cannot know."""
 
     exit_code = 2
+
+
+def _again(kind: type[RefusedError], *parts: str) -> RefusedError:
+    place, found, expected, remedy = parts
+    return kind(place, found, expected=expected, remedy=remedy)

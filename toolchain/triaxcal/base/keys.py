@@ -223,11 +223,14 @@ class FileKeys:
             When the file is no TOML or states another format; naming every missing and every
             unexpected key at once; for a key that should be a table.
         """
-        document = read_toml(path)
+        return self.check(str(path), read_toml(path))
+
+    def check(self, source: str, document: Mapping[str, object]) -> Mapping[str, Values]:
+        """Checked tables of a document by name, as `read`; `source` is for messages."""
         found = document.get("format", 1)  # when absent, it is among the missing
         if type(found) is not int or found != 1:
             raise RefusedError(
-                f"{path}, format",
+                f"{source}, format",
                 f"found {shown(found)}",
                 expected="1",
                 remedy="another format needs a triaxcal that knows it",
@@ -238,21 +241,21 @@ class FileKeys:
             values = document.get(table.name, {}) if table.name else _top(document, names)
             if not isinstance(values, dict):
                 raise RefusedError(
-                    f"{path}, {table.name}",
+                    f"{source}, {table.name}",
                     f"found {shown(values)}",
                     expected=f"a table [{table.name}]",
                 )
             given[table.name] = values
-        self._refuse_wrong_keys(path, given, document)
+        self._refuse_wrong_keys(source, given, document)
         return {
             table.name: Values(
-                str(path), table.name, given[table.name], {k.name: k for k in table.keys}
+                source, table.name, given[table.name], {k.name: k for k in table.keys}
             )
             for table in self.tables
         }
 
     def _refuse_wrong_keys(
-        self, path: Path, given: Mapping[str, Mapping[str, object]], document: Mapping[str, object]
+        self, source: str, given: Mapping[str, Mapping[str, object]], document: Mapping[str, object]
     ) -> None:
         missing, unexpected = [], []
         for table in self.tables:
@@ -271,7 +274,7 @@ class FileKeys:
         parts = ["missing: " + ", ".join(missing)] if missing else []
         parts += ["unknown: " + ", ".join(unexpected)] if unexpected else []
         if parts:
-            raise RefusedError(str(path), "; ".join(parts))
+            raise RefusedError(source, "; ".join(parts))
 
     def _near(self, table: TableKeys, name: str) -> str:
         """Hint for an unknown key: the table where it belongs, or a near miss in its own."""

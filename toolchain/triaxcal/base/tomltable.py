@@ -47,7 +47,7 @@ def read_toml(path: Path) -> dict[str, object]:
     RefusedError
         When the file cannot be read, is not UTF-8, or is not TOML.
     """
-    return _document(path, _content(path))
+    return toml_document(str(path), _content(path))
 
 
 def has_table(path: Path, name: str) -> bool:
@@ -60,7 +60,7 @@ def has_table(path: Path, name: str) -> bool:
     """
     # Most files have none of the tables that are asked for: a thousand parses are saved.
     content = _content(path)
-    return name.encode() in content and name in _document(path, content)
+    return name.encode() in content and name in toml_document(str(path), content)
 
 
 def _content(path: Path) -> bytes:
@@ -70,8 +70,14 @@ def _content(path: Path) -> bytes:
         raise RefusedError(str(path), f"cannot be read: {error.strerror}") from error
 
 
-def _document(path: Path, content: bytes) -> dict[str, object]:
-    where = str(path)
+def toml_document(where: str, content: bytes) -> dict[str, object]:
+    """Document of the content of a TOML file, decimals as `Decimal`; `where` is for messages.
+
+    Raises
+    ------
+    RefusedError
+        When it is not UTF-8, or not TOML.
+    """
     try:
         # utf-8-sig: editors that write a byte order mark are common, and it is harmless.
         text = content.decode("utf-8-sig")

@@ -7,12 +7,9 @@ from pathlib import Path
 import click
 
 from triaxcal.cli.options import UnitFolder, example, say
-from triaxcal.delivery.unit import Delivery
-from triaxcal.report.history import contradiction, history_text
+from triaxcal.report.history import history_text
 from triaxcal.uncertainty.history import (
-    Calibrated,
     changes,
-    latest_change,
     read_history,
     repeatability,
 )
@@ -36,16 +33,3 @@ def history(unit: Path) -> None:
             repeatability(description, found),
         )
     )
-
-
-def warning_of_contradiction(folder: Path, delivery: Delivery) -> str:
-    """What to tell when a calibration contradicts the last one in the unit's history; else empty.
-
-    Raises
-    ------
-    RefusedError
-        When the last one cannot be calibrated.
-    """
-    newest = Calibrated("now", None, delivery.measurements, delivery.calibration)
-    change = latest_change(folder, delivery.unit, newest)
-    return contradiction(change) if change is not None and change.contradicts else ""

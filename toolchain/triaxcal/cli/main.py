@@ -6,17 +6,12 @@ import importlib
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
-from triaxcal.cli.options import UnitFolder, WithKinds, example, say, unit_and_build
-
-if TYPE_CHECKING:
-    from triaxcal.codegen.compiler import Compilation
-
+from triaxcal.cli.options import UnitFolder, WithKinds, example, unit_and_build
 
 SECTIONS = {
     "Calibrate": ("calib", "dynamic", "batch"),
@@ -83,40 +78,9 @@ def calib(unit: Path, build: Path) -> None:
     The folder UNIT has unit.toml and the readings that it names, usually measurements.csv. A unit
     whose unit.toml has a table [dynamic] is an IMU: `triaxcal dynamic` does the same.
     """
-    from triaxcal.codegen.compiler import reference_under_way  # noqa: PLC0415
+    from triaxcal.cli.progress import calibrate  # noqa: PLC0415
 
-    with reference_under_way() as reference:  # gcc works while numpy is imported
-        from triaxcal.base.tomltable import has_table  # noqa: PLC0415
-        from triaxcal.unit.description import find_unit  # noqa: PLC0415
-
-        if not has_table(find_unit(unit), "dynamic"):
-            _calibrate_accelerometer(unit, build, reference)
-            return
-    from triaxcal.cli.dynamic import calibrate_imu  # noqa: PLC0415
-
-    calibrate_imu(unit, build)
-
-
-def _calibrate_accelerometer(unit: Path, build: Path, reference: Compilation) -> None:
-    from triaxcal.base.publish import publish  # noqa: PLC0415
-    from triaxcal.delivery.unit import deliver  # noqa: PLC0415  numpy and jinja2 only when needed
-    from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
-    from triaxcal.report.passport.content import passport  # noqa: PLC0415
-    from triaxcal.report.summary import summary  # noqa: PLC0415
-
-    delivery = deliver(unit, reference)
-    warning = ""
-    if (unit / "history").is_dir():
-        from triaxcal.cli.history import warning_of_contradiction  # noqa: PLC0415
-
-        warning = warning_of_contradiction(unit, delivery)
-    made = passport(delivery, {})
-    files = all_files(delivery, made)
-    target = build / delivery.unit.name
-    publish(files, target, SOMETIMES)
-    say(summary(made, files, str(target)))
-    if warning:
-        click.echo(warning, err=True)
+    calibrate(unit, build)
 
 
 @main.command(

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.jsontext import json_bytes
+from triaxcal.base.plaindata import plain
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.pair.cross_coupling import stated_pair
@@ -14,9 +19,10 @@ from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import (
     MEASUREMENTS_FILE,
     MeasurementSet,
+    measurements_of,
     read_measurements,
 )
-from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.description import UNIT_FILE, UnitDescription
 
 
 @dataclass(frozen=True)
@@ -32,12 +38,15 @@ class Fitted:
     inputs_sha256 : str
         Hash of the files, or of the arrays, that went in.
     calibration : Calibration
+    unit_toml : str
+        Text of its unit.toml.
     """
 
     unit: UnitDescription
     measurements: MeasurementSet
     inputs_sha256: str
     calibration: Calibration
+    unit_toml: str
 
 
 def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
@@ -49,6 +58,7 @@ def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
         When the readings cannot be read, do not carry a calibration, or change meanwhile.
     """
     inputs = inputs_sha256(folder, unit)
+    unit_toml = (folder / UNIT_FILE).read_text(encoding="utf-8-sig")
     if unit.recording is not None:
         # SciPy's optimizers take as long to import as a whole tilter's calibration does.
         from triaxcal.fitting.route import calibrate_recording  # noqa: PLC0415
@@ -59,7 +69,44 @@ def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
         calibration = calibrate(unit, measurements, stated_pair(unit, folder))
     if inputs_sha256(folder, unit) != inputs:
         raise RefusedError(str(folder), "changed while it was read", remedy="run it again")
-    return Fitted(unit, measurements, inputs, calibration)
+    return Fitted(unit, measurements, inputs, calibration, unit_toml)
+
+
+def fit_columns(unit: UnitDescription, unit_toml: str, readings: Any) -> Fitted:
+    """Calibration of a unit from columns by name: a mapping, data frame or structured array.
+
+    Raises
+    ------
+    RefusedError
+        When there are no columns, or they do not carry a calibration.
+    """
+    columns = columns_of(readings)
+    if unit.recording is not None or unit.pair is not None:
+        raise RefusedError(
+            f"unit {unit.name}",
+            "has [recording] or [quadratic], whose readings are files",
+            expected="the unit's folder with them",
+            remedy="read the unit with read_unit(folder) and call fit(unit)",
+        )
+    measurements = measurements_of(columns, unit)
+    digest = hashlib.sha256(unit_toml.encode())
+    digest.update(json_bytes(plain(measurements)))
+    calibration = calibrate(unit, measurements, None)
+    return Fitted(unit, measurements, digest.hexdigest(), calibration, unit_toml)
+
+
+def columns_of(readings: Any) -> Mapping[str, Any]:
+    """Columns of a mapping, a data frame or a structured array."""
+    names = getattr(getattr(readings, "dtype", None), "names", None)
+    if names is None:
+        names = getattr(readings, "columns", readings if isinstance(readings, Mapping) else None)
+    if names is None:
+        raise RefusedError(
+            "readings",
+            f"a {type(readings).__name__} has no columns",
+            expected="a mapping of columns by name, a data frame or a structured array",
+        )
+    return {str(name): readings[name] for name in names}
 
 
 def refuse_beyond_limits(fitted: Fitted) -> None:

@@ -128,7 +128,7 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
         source = fitted.measurements.source
         methods = run_on_dwells(unit, calibration.thermal, source, dwells, routines)
         compiler = generated.compiler
-    parts = unit, fitted.measurements, fitted.inputs_sha256, calibration
+    parts = unit, fitted.measurements, fitted.inputs_sha256, calibration, fitted.unit_toml
     delivery = Delivery(*parts, firmware, bound, check, methods, compiler)
     _refuse_beyond_limits(delivery)
     return delivery

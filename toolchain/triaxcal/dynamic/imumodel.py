@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.window import gamma_matrix
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.methods.imu import ImuModel, constants_from_errors
@@ -34,28 +35,41 @@ def left_out(result: DynamicResult) -> tuple[str, ...]:
 
 
 def imu_model(result: DynamicResult, range_degc: tuple[float, float]) -> ImuModel:
+    """Model of both triads of a result, over `range_degc`."""
+    frame = result.frame
+    return model_of_states(result.layout, result.p, frame.reference_degc, frame.gravity, range_degc)
+
+
+def model_of_states(
+    layout: Layout,
+    p: FloatArray,
+    reference_degc: float,
+    gravity_m_per_s2: float,
+    range_degc: tuple[float, float],
+) -> ImuModel:
     """Model of both triads over `range_degc`; constant where no temperature block was on.
+
+    `p`, shape (n,), are the constants of the layout in SI units, at `reference_degc`.
 
     Effects that belong to the table or to the signal's time (lever arms, delay, mounts, elastic
     gyro axes) are not part of it.
     """
-    layout, p = result.layout, result.p
-    reference, g = result.frame.reference_degc, STANDARD_GRAVITY_M_PER_S2
+    g = STANDARD_GRAVITY_M_PER_S2
     accel = _triad(
         layout.part(p, "accelerometer-bias")[:3] / g,
         gamma_matrix(layout.part(p, "accelerometer-matrix")),
         _slopes(layout.part(p, "accelerometer-thermal"), 1 / g),
-        (reference, range_degc),
+        (reference_degc, range_degc),
     )
     theta = layout.part(p, "gyro-matrix").reshape(3, 3)
     gyro = _triad(
         layout.part(p, "gyro-bias")[:3],
         theta,
         _slopes(layout.part(p, "gyro-thermal"), 1.0),
-        (reference, range_degc),
+        (reference_degc, range_degc),
     )
     # D is per local g; the device's unit is the standard one.
-    drift = layout.part(p, "g-drift").reshape(3, 3) * (g / result.frame.gravity)
+    drift = layout.part(p, "g-drift").reshape(3, 3) * (g / gravity_m_per_s2)
     sensitivity: FloatArray = np.linalg.solve(np.eye(3) + theta, drift).astype(np.float64)
     return ImuModel(accel, gyro, sensitivity)
 

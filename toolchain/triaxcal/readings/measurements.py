@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from triaxcal.readings.measurements_csv import (
     Row,
     is_number,
     read_rows,
+    rows_of,
     write_measurements,
 )
 from triaxcal.unit.description import Adc, UnitDescription
@@ -92,11 +93,27 @@ def read_measurements(path: Path, unit: UnitDescription) -> MeasurementSet:
     RefusedError
         When the file breaks a rule of docs/file-formats.md; names row and column.
     """
-    header, rows = read_rows(path)
+    return _measurements(str(path), *read_rows(path), unit)
+
+
+def measurements_of(columns: Mapping[str, Any], unit: UnitDescription) -> MeasurementSet:
+    """Dwells of columns by name, with the names, units and rules of measurements.csv.
+
+    Raises
+    ------
+    RefusedError
+        As `read_measurements`; for columns of different lengths. Rows are counted from 1.
+    """
+    return _measurements("readings", *rows_of(columns), unit)
+
+
+def _measurements(
+    source: str, header: Header, rows: Sequence[Row], unit: UnitDescription
+) -> MeasurementSet:
     peak = _peak(header, rows)
     dwells = tuple(_dwell(row, header, unit, peak) for row in rows)
-    _refuse_wrong_unit(str(path), header, dwells, unit.adc)
-    return MeasurementSet(source=str(path), dwells=dwells)
+    _refuse_wrong_unit(source, header, dwells, unit.adc)
+    return MeasurementSet(source=source, dwells=dwells)
 
 
 def volts(values: RealT, reading_unit: str, adc: Adc) -> RealT:

@@ -6,9 +6,12 @@ import csv
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import did_you_mean, shown
@@ -131,11 +134,44 @@ def read_rows(path: Path) -> tuple[Header, list[Row]]:
     if first is None:
         raise RefusedError(source, "no header and no rows", expected="a header and rows")
     columns = tuple(cell.strip() for cell in first[1])
-    header = _header(source, first[0], columns)
+    header = _header(f"{source}, row {first[0]} (header)", columns)
     rows = [Row(source, line, _cells(source, line, cells, columns)) for line, cells in records]
     if not rows:
         raise RefusedError(source, "a header but no rows", expected="one row for each dwell")
     return header, rows
+
+
+def rows_of(columns: Mapping[str, Any]) -> tuple[Header, list[Row]]:
+    """Header and rows of columns by name, as `read_rows` finds them in a file.
+
+    Raises
+    ------
+    RefusedError
+        For wrong columns, columns of different lengths, or none.
+    """
+    names = tuple(str(name).strip() for name in columns)
+    header = _header("readings, columns", names)
+    cells = {
+        name: [_cell(v) for v in np.asarray(columns[c]).tolist()]
+        for name, c in zip(names, columns, strict=True)
+    }
+    lengths = {name: len(values) for name, values in cells.items()}
+    if len(set(lengths.values())) != 1 or not min(lengths.values()):
+        raise RefusedError(
+            "readings",
+            "columns of " + ", ".join(f"{n} ({name})" for name, n in lengths.items()) + " rows",
+            expected="one length for all, at least 1",
+        )
+    rows = zip(*cells.values(), strict=True)
+    return header, [
+        Row("readings", number, dict(zip(names, row, strict=True)))
+        for number, row in enumerate(rows, start=1)
+    ]
+
+
+def _cell(value: object) -> str:
+    """A value as a file has it: repr of a float reads back to the same float."""
+    return repr(value) if isinstance(value, float) else str(value)
 
 
 def _text(path: Path) -> str:
@@ -194,8 +230,7 @@ def _cells(source: str, line: int, cells: list[str], columns: tuple[str, ...]) -
     )
 
 
-def _header(source: str, line: int, columns: tuple[str, ...]) -> Header:
-    where = f"{source}, row {line} (header)"
+def _header(where: str, columns: tuple[str, ...]) -> Header:
     for separator, name in ((";", "semicolons"), ("\t", "tabs")):
         if len(columns) == 1 and separator in columns[0]:
             raise RefusedError(where, f"cells separated by {name}", expected="commas")

@@ -23,16 +23,17 @@ FORMAT = 1
 def dynamic_files(made: ImuDelivery) -> dict[str, bytes]:
     """Name and content of everything that build/<UNIT>/ receives."""
     return {
-        "calibration.json": _calibration_json(made.done, made.inputs_sha256),
+        "calibration.json": json_bytes(calibration_document(made.done, made.inputs_sha256)),
         "dynamic.html": dynamic_page(made, {}),
         **imu_c_files(made),
     }
 
 
-def _calibration_json(done: DynamicUnit, inputs_sha256: str) -> bytes:
+def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any]:
+    """calibration.json of an IMU; the docs have the layout."""
     unit, result, seen = done.unit, done.result, done.seen
     layout, last = result.layout, result.passes[-1]
-    document: dict[str, Any] = {
+    return {
         "format": FORMAT,
         "kind": "dynamic",
         "triaxcal": __version__,
@@ -88,7 +89,6 @@ def _calibration_json(done: DynamicUnit, inputs_sha256: str) -> bytes:
         ],
         "known_only_together": [list(pair) for pair in seen.together],
     }
-    return json_bytes(document)
 
 
 def axis_up(result: DynamicResult) -> str:

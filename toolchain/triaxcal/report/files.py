@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from triaxcal.delivery.saved import calibration_json
 from triaxcal.delivery.unit import Delivery
 from triaxcal.report.a2l import calib_a2l
 from triaxcal.report.dcc import certificate_xml
@@ -9,7 +10,7 @@ from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.passport.document import passport_json
 from triaxcal.report.passport.page import passport_html
 from triaxcal.report.pictures.residual_plot import residuals_svg
-from triaxcal.report.results import calibration_json, verification_json
+from triaxcal.report.results import verification_json
 
 CERTIFICATE = "certificate.dcc.xml"
 SOMETIMES = (CERTIFICATE,)

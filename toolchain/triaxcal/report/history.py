@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from triaxcal.base.screentext import table
-from triaxcal.uncertainty.history import EN_MAX, Calibrated, Change, Repeatability
+from triaxcal.delivery.unit import Delivery
+from triaxcal.uncertainty.history import (
+    EN_MAX,
+    Calibrated,
+    Change,
+    Repeatability,
+    latest_change,
+)
 
 
 def history_text(
@@ -54,6 +63,19 @@ def contradiction(change: Change) -> str:
         f"{change.en:.1f} times the {_figure(change.expanded)} {unit} (95 %) that their "
         "uncertainties allow; the unit has aged or was damaged, or one of the two is wrong"
     )
+
+
+def contradiction_of(folder: Path, delivery: Delivery) -> tuple[str, ...]:
+    """Warning where a calibration contradicts the last one in the unit's history; else nothing.
+
+    Raises
+    ------
+    RefusedError
+        When the last one cannot be calibrated.
+    """
+    newest = Calibrated("now", None, delivery.measurements, delivery.calibration)
+    change = latest_change(folder, delivery.unit, newest)
+    return (contradiction(change),) if change is not None and change.contradicts else ()
 
 
 def _figure(value: float) -> float:

@@ -22,7 +22,7 @@ from triaxcal.base.kinds import (
     whole,
     word,
 )
-from triaxcal.base.tomltable import has_table, read_toml, shown
+from triaxcal.base.tomltable import read_toml, shown, toml_document
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.positions import AXES
 from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS, owners, thermal_keys
@@ -423,10 +423,26 @@ def read_unit(folder: Path) -> UnitDescription:
         unit beside it has the same serial number.
     """
     path = find_unit(folder)
-    file = recording_file() if has_table(path, "recording") else tilter_file()
-    unit = _unit_of(folder.absolute().name, file.read(path))
+    unit = _unit_of_document(folder.absolute().name, read_toml(path), str(path))
     _refuse_duplicate_serial(folder, unit.serial)
     return unit
+
+
+def unit_of_text(name: str, text: str, source: str) -> UnitDescription:
+    """Description of a unit from the text of a unit.toml; `source` is for messages.
+
+    Raises
+    ------
+    RefusedError
+        When the name is unfit, or the text breaks a rule of unit.toml.
+    """
+    check_unit_name(name, f"unit {shown(name)}")
+    return _unit_of_document(name, toml_document(source, text.encode()), source)
+
+
+def _unit_of_document(name: str, document: Mapping[str, object], source: str) -> UnitDescription:
+    file = recording_file() if "recording" in document else tilter_file()
+    return _unit_of(name, file.check(source, document))
 
 
 def check_unit_name(name: str, where: str = "unit name") -> None:

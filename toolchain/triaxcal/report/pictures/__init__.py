@@ -1,1 +1,1 @@
-"""Every drawing of a report."""
+"""Every drawing: in the passport, on the pages, and as matplotlib figures."""

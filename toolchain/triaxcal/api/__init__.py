@@ -1,0 +1,1 @@
+"""The public Python API: what `import triaxcal` offers. It prints nothing and asks nothing."""

@@ -1,0 +1,193 @@
+"""`firmware`, `Firmware`: the integers that the device computes with, and the C of them."""
+
+from __future__ import annotations
+
+import ctypes
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from triaxcal.api.calibration import Calibration
+from triaxcal.base.arrays import int32
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.publish import publish
+from triaxcal.codegen.routines import Int32Array, UInt32Array, routines_of, start_generated
+from triaxcal.delivery.firmware import make_firmware
+from triaxcal.delivery.fitted import refuse_beyond_limits
+from triaxcal.fixedpoint.integer_model import apply, set_temperature
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.proof import Bound, prove
+from triaxcal.fixedpoint.rate import RATE_Q
+from triaxcal.model.types import FloatArray
+
+Answers = tuple[Int32Array, UInt32Array]
+_BLOCK = 1 << 16
+"""Rows that are computed at a time: the working arrays stay small."""
+
+
+class Firmware:
+    """The fixed-point routine of one calibration, in Python's integers: the bits that the C gives.
+
+    Made by `firmware`.
+
+    Attributes
+    ----------
+    calibration : Calibration
+    plan : Plan
+        Integer functions of temperature, formats and shifts.
+    lsb_g : float
+        One code of the result, in g.
+    model_error_g : float
+        Largest error of the functions that the device evaluates against the fitted model, at any
+        temperature code and any raw code: what `bound` does not hold.
+    files : dict
+        Name and content of the generated C and the image.
+    """
+
+    def __init__(self, calibration: Calibration) -> None:
+        self.calibration = calibration
+        made = make_firmware(calibration.fitted)
+        self.plan: Plan = made.plan
+        self.files = made.files
+        self.model_error_g = made.model_error_g
+        self.lsb_g = 2.0**-made.plan.shape.output_q
+        self._compensation = made.compensation
+
+    def __repr__(self) -> str:
+        return f"<triaxcal.Firmware {self.calibration.serial}, {self._compensation.method}>"
+
+    @cached_property
+    def bound(self) -> Bound:
+        """Proven error of the arithmetic, in codes of the result, for every input in range."""
+        return prove(self.plan)
+
+    def apply(self, raw_codes: Any, temp_codes: Any, rate_codes: Any = None) -> Answers:
+        """What `triax_set_temperature` and `triax_apply` answer.
+
+        Parameters
+        ----------
+        raw_codes : array_like of whole numbers, shape (n, 3)
+            Codes of the converter, any int32.
+        temp_codes : array_like of whole numbers, shape () or (n,)
+            Codes of the thermometer, any int32.
+        rate_codes : array_like of whole numbers, shape () or (n,), or None
+            dT/dt in 2^-RATE_Q codes of the thermometer per second (docs/c-api.md). None is zero; a
+            routine without a term in dT/dt does not look at it.
+
+        Returns
+        -------
+        accel : array of int32, shape (n, 3)
+            In `lsb_g`.
+        status : array of uint32, shape (n,)
+            Bits of docs/c-api.md; 0 is good.
+
+        Raises
+        ------
+        RefusedError
+            For another shape, or a number that int32 does not hold: nothing wraps around.
+        """
+        raw, temp, rate = self.codes(raw_codes, temp_codes, rate_codes)
+        accel = np.empty((len(raw), 3), np.int32)
+        status = np.empty(len(raw), np.uint32)
+        for start in range(0, len(raw), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            wide = [codes[block].astype(np.int64) for codes in (temp, rate, raw)]
+            state, flags = set_temperature(self.plan, wide[0], wide[1])
+            accel[block], more = apply(self.plan, state, wide[2])
+            status[block] = flags | more
+        return accel, status
+
+    def model(self, raw_codes: Any, temp_codes: Any, rate_codes: Any = None) -> FloatArray:
+        """The same functions in floats, shape (n, 3), in g: `bound` is against these.
+
+        Codes out of the unit's range are clamped, as the routine clamps them.
+        """
+        raw, temp, rate = self.codes(raw_codes, temp_codes, rate_codes)
+        plan, unit = self.plan, self.calibration.fitted.unit
+        sensor = unit.temperature_sensor
+        codes = temp.clip(plan.temp_min_code, plan.temp_max_code)
+        temp_degc = codes * sensor.degc_per_code + sensor.degc_at_zero
+        voltage = raw.clip(plan.shape.raw_min, plan.shape.raw_max) * unit.adc.volts_per_code
+        rate_k_per_s = rate.astype(np.float64) * (sensor.degc_per_code * 2.0**-RATE_Q)
+        return self._compensation.evaluate(voltage, temp_degc, rate_k_per_s)
+
+    @contextmanager
+    def compiled(self) -> Iterator[CompiledFirmware]:
+        """The generated C, compiled for this machine, for the time of a `with` block.
+
+        Raises
+        ------
+        RefusedError
+            When there is no C compiler, or it refuses.
+        """
+        with tempfile.TemporaryDirectory(prefix="triaxcal-") as name:
+            folder = Path(name)
+            for file, content in self.files.items():
+                (folder / file).write_bytes(content)
+            yield CompiledFirmware(self, start_generated(folder, folder).load())
+
+    def write(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write the C and the image, all of them or none, into a folder of their own.
+
+        Raises
+        ------
+        RefusedError
+            When the folder holds anything else, or cannot be written.
+        """
+        target = Path(folder)
+        publish(self.files, target)
+        return tuple(target / name for name in self.files)
+
+    def codes(
+        self, raw_codes: Any, temp_codes: Any, rate_codes: Any
+    ) -> tuple[Int32Array, Int32Array, Int32Array]:
+        """Arguments of `apply`, checked: (n, 3), (n,), (n,)."""
+        raw = int32("raw_codes", raw_codes, 3)
+        if raw.ndim != 2:
+            raise RefusedError(
+                "raw_codes", f"found the shape {raw.shape}", expected="(n, 3), one row a reading"
+            )
+        temp = _one_or_all("temp_codes", temp_codes, len(raw))
+        rate = _one_or_all("rate_codes", 0 if rate_codes is None else rate_codes, len(raw))
+        return raw, temp, rate
+
+
+class CompiledFirmware:
+    """The generated C as a shared library of this machine."""
+
+    def __init__(self, firmware: Firmware, library: ctypes.CDLL) -> None:
+        self._firmware, self._library = firmware, library
+
+    def apply(self, raw_codes: Any, temp_codes: Any, rate_codes: Any = None) -> Answers:
+        """As `Firmware.apply`, by the compiled C."""
+        raw, temp, rate = self._firmware.codes(raw_codes, temp_codes, rate_codes)
+        plan = self._firmware.plan
+        return routines_of(plan.rate, self._library, self._library, rate)[0].run(temp, raw)
+
+
+def _one_or_all(name: str, value: Any, count: int) -> Int32Array:
+    codes = int32(name, value)
+    if codes.ndim and codes.shape != (count,):
+        raise RefusedError(
+            name,
+            f"found the shape {codes.shape}",
+            expected=f"one code, or ({count},) as the raw codes have",
+        )
+    return np.ascontiguousarray(np.broadcast_to(codes, (count,)))
+
+
+def firmware(calibration: Calibration) -> Firmware:
+    """Integers of a calibration, by the method and formats that its unit states.
+
+    Raises
+    ------
+    RefusedError
+        When the calibration is beyond its unit's limits, or no integers of the format hold it.
+    """
+    refuse_beyond_limits(calibration.fitted)
+    return Firmware(calibration)

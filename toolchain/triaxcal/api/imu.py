@@ -1,0 +1,316 @@
+"""`read_imu`, `fit_imu`, `ImuCalibration`, `load_imu`, `firmware_imu`: the same for a whole IMU."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from triaxcal.base.arrays import finite, int32
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.publish import publish, renew
+from triaxcal.codegen.imu import ImuBuild, imu_answers
+from triaxcal.codegen.routines import Int32Array, UInt32Array
+from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
+from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
+from triaxcal.dynamic.description import DynamicDescription, read_dynamic
+from triaxcal.dynamic.imumodel import model_of_states
+from triaxcal.dynamic.layout import Layout
+from triaxcal.model.methods.imu import ImuModel
+from triaxcal.model.metrological import force_from_voltage, unpack_constants
+from triaxcal.model.types import FloatArray
+from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Imu:
+    """One IMU: the description of its unit.toml, and the folder it was read from."""
+
+    description: DynamicDescription
+    folder: Path
+
+    @property
+    def name(self) -> str:
+        """Name of its folder."""
+        return self.description.name
+
+    @property
+    def serial(self) -> str:
+        """Serial number."""
+        return self.description.serial
+
+
+@dataclass(frozen=True)
+class ImuState:
+    """One estimated constant: value and standard deviation in `unit`."""
+
+    value: float
+    sd: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class ImuConstants:
+    """Constants of both triads at temperatures of shape (...).
+
+    Attributes
+    ----------
+    accel_matrix, gyro_matrix : arrays, shape (..., 3, 3)
+        K of a reading U = K a + U0: output of axis i for 1 unit along axis j.
+    accel_bias_m_per_s2, gyro_bias_rad_per_s : arrays, shape (..., 3)
+    g_sensitivity_rad_per_s_per_g : array, shape (3, 3)
+        What specific force adds to the compensated rate.
+    """
+
+    accel_matrix: FloatArray
+    accel_bias_m_per_s2: FloatArray
+    gyro_matrix: FloatArray
+    gyro_bias_rad_per_s: FloatArray
+    g_sensitivity_rad_per_s_per_g: FloatArray
+
+
+class ImuCalibration:
+    """The constants of both triads of an IMU, from one recording.
+
+    Made by `fit_imu` or `load_imu`.
+
+    Attributes
+    ----------
+    serial : str
+    states : dict
+        `ImuState` by name, in the order of the filter.
+    covariance : array, shape (n, n)
+        Of the states, in SI units.
+    reference_degc : float
+        Temperature of the biases and scales; the others follow the temperature blocks.
+    document : dict
+        calibration.json.
+    """
+
+    def __init__(self, document: dict[str, Any], delivery: ImuDelivery | None = None) -> None:
+        self.document = document
+        self.serial: str = document["serial"]
+        self.reference_degc = float(document["reference_degc"])
+        self.covariance: FloatArray = np.array(document["covariance"], dtype=np.float64)
+        rows = document["states"]
+        self.states = {
+            s["name"]: ImuState(
+                s["value"] / s["si_per_unit"], s["sd"] / s["si_per_unit"], s["unit"]
+            )
+            for s in rows
+        }
+        self._p: FloatArray = np.array([s["value"] for s in rows], dtype=np.float64)
+        self._delivery = delivery
+
+    @classmethod
+    def of(cls, delivery: ImuDelivery) -> ImuCalibration:
+        """Calibration of a delivery."""
+        from triaxcal.report.dynamic import calibration_document  # noqa: PLC0415
+
+        return cls(calibration_document(delivery.done, delivery.inputs_sha256), delivery)
+
+    def __repr__(self) -> str:
+        return f"<triaxcal.ImuCalibration {self.serial}, {len(self.states)} states>"
+
+    @cached_property
+    def _model(self) -> ImuModel:
+        blocks = (b for name in self.document["blocks"] for b in EXTENSIONS[name].blocks)
+        gravity = float(self.document["local_gravity_m_per_s2"])
+        anywhere = (self.reference_degc - 1.0, self.reference_degc + 1.0)
+        layout = Layout((*BASE, *blocks))
+        return model_of_states(layout, self._p, self.reference_degc, gravity, anywhere)
+
+    @property
+    def verdict(self) -> str:
+        """What the innovations say of the recording and the model, in words."""
+        return str(self.document["innovations"]["verdict"])
+
+    def constants(self, temp_degc: Any = None) -> ImuConstants:
+        """Constants at temperatures; None is `reference_degc`.
+
+        Raises
+        ------
+        RefusedError
+            For a temperature that is no number.
+        """
+        temp = self._temperature(temp_degc)
+        (K, U0), (L, W0) = (
+            unpack_constants(triad.constants_at(temp))
+            for triad in (self._model.accel, self._model.gyro)
+        )
+        return ImuConstants(K, U0 * STANDARD_GRAVITY_M_PER_S2, L, W0, self._model.g_sensitivity)
+
+    def apply(
+        self, force_m_per_s2: Any, rate_rad_per_s: Any, temp_degc: Any = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Compensated specific force in m/s^2 and rate in rad/s, by the fitted model, in floats.
+
+        Parameters
+        ----------
+        force_m_per_s2, rate_rad_per_s : array_like, shape (3,) or (n, 3)
+            Readings, axes x, y, z.
+        temp_degc : array_like, shape () or (n,), or None
+            None is `reference_degc`.
+
+        Raises
+        ------
+        RefusedError
+            For another shape, or a number that is not finite.
+        """
+        force = finite("force_m_per_s2", force_m_per_s2, 3)
+        rate = finite("rate_rad_per_s", rate_rad_per_s, 3)
+        if force.shape != rate.shape:
+            raise RefusedError(
+                "rate_rad_per_s", f"found the shape {rate.shape}", expected=f"{force.shape}"
+            )
+        temp, model = self._temperature(temp_degc), self._model
+        a = force_from_voltage(model.accel.constants_at(temp), force / STANDARD_GRAVITY_M_PER_S2)
+        w = force_from_voltage(model.gyro.constants_at(temp), rate) - a @ model.g_sensitivity.T
+        return a * STANDARD_GRAVITY_M_PER_S2, w
+
+    def save(self, path: str | Path) -> Path:
+        """Write calibration.json, whole or not at all; `load_imu` reads it."""
+        from triaxcal.base.jsontext import json_bytes  # noqa: PLC0415
+
+        target = Path(path)
+        renew({target.name: json_bytes(self.document)}, target.parent)
+        return target
+
+    def _temperature(self, temp_degc: Any) -> FloatArray:
+        return finite("temp_degc", self.reference_degc if temp_degc is None else temp_degc)
+
+    @property
+    def c(self) -> ImuC:
+        """The C of both triads, where the unit has [device].
+
+        Raises
+        ------
+        RefusedError
+            Where it has none, or the calibration was loaded.
+        """
+        if self._delivery is None or self._delivery.c is None:
+            raise RefusedError(
+                f"IMU {self.serial}",
+                "has no C: its unit.toml has no [device], or the calibration was loaded",
+                expected="a calibration by fit_imu of a unit with [device]",
+            )
+        return self._delivery.c
+
+
+class ImuFirmware:
+    """The fixed-point routines of both triads, in Python's integers: the bits that the C gives.
+
+    Attributes
+    ----------
+    build : ImuBuild
+        Plans, proven bounds and what was cross-checked.
+    files : dict
+        Name and content of the C and the image.
+    """
+
+    def __init__(self, build: ImuBuild) -> None:
+        self.build = build
+        self.files = build.files
+
+    def apply(
+        self, raw_accel: Any, raw_gyro: Any, temp_codes: Any
+    ) -> tuple[Int32Array, Int32Array, UInt32Array]:
+        """What `triax_imu_apply` answers.
+
+        Parameters
+        ----------
+        raw_accel, raw_gyro : array_like of whole numbers, shape (n, 3)
+        temp_codes : array_like of whole numbers, shape () or (n,)
+
+        Returns
+        -------
+        accel, rate : arrays of int32, shape (n, 3)
+            In 2^-output_q g and deg/s.
+        status : array of uint32, shape (n,)
+
+        Raises
+        ------
+        RefusedError
+            For another shape, or a number that int32 does not hold.
+        """
+        accel, gyro = int32("raw_accel", raw_accel, 3), int32("raw_gyro", raw_gyro, 3)
+        temp = int32("temp_codes", temp_codes)
+        if accel.ndim != 2 or gyro.shape != accel.shape or temp.shape not in ((), (len(accel),)):
+            raise RefusedError(
+                "raw_accel, raw_gyro, temp_codes",
+                f"found the shapes {accel.shape}, {gyro.shape}, {temp.shape}",
+                expected="(n, 3), (n, 3), (n,)",
+            )
+        temp = np.ascontiguousarray(np.broadcast_to(temp, (len(accel),)))
+        return imu_answers(self.build.accel, self.build.gyro, temp, accel, gyro)
+
+    def write(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write the C and the image, all of them or none, into a folder of their own."""
+        publish(self.files, Path(folder))
+        return tuple(Path(folder) / name for name in self.files)
+
+
+def read_imu(folder: str | Path) -> Imu:
+    """IMU in a folder, from its unit.toml with [dynamic].
+
+    Raises
+    ------
+    RefusedError
+        When there is no such unit, or its file breaks a rule.
+    """
+    return Imu(read_dynamic(Path(folder)), Path(folder))
+
+
+def fit_imu(imu: Imu, progress: Progress | None = None) -> ImuCalibration:
+    """Calibrate an IMU from its recording; with [device], its C is made and checked as well.
+
+    Raises
+    ------
+    RefusedError
+        When the recording cannot be read, or carries no calibration.
+    """
+    return ImuCalibration.of(deliver_imu(imu.folder, progress))
+
+
+def firmware_imu(calibration: ImuCalibration) -> ImuFirmware:
+    """Firmware of an IMU whose unit has [device].
+
+    Raises
+    ------
+    RefusedError
+        Where there is none.
+    """
+    return ImuFirmware(calibration.c.build)
+
+
+def load_imu(path: str | Path) -> ImuCalibration:
+    """Calibration from the calibration.json of an IMU.
+
+    Raises
+    ------
+    RefusedError
+        When the file cannot be read, or is none of an IMU.
+    """
+    try:
+        document = json.loads(Path(path).read_bytes())
+        if document["kind"] != "dynamic":
+            raise KeyError("kind")
+        return ImuCalibration(document)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise RefusedError(str(path), f"cannot be read: {reason}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise RefusedError(
+            str(path),
+            f"no calibration.json of an IMU: {type(error).__name__} {error}",
+            expected="the file that `triaxcal calib` wrote for an IMU",
+            remedy="load a triad's calibration with load(path)",
+        ) from error

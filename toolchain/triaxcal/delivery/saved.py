@@ -1,0 +1,238 @@
+"""calibration.json: a calibration for machines, and back again. docs has the layout.
+
+The keys of format 1 are for anybody. `fit` is what triaxcal itself needs besides to go on where the
+fit ended: the unit's description, the readings, and the rest of the calibration.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from triaxcal import __version__
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.jsontext import json_bytes
+from triaxcal.base.plaindata import Custom, plain, rebuilt
+from triaxcal.delivery.fitted import Fitted
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.model.curves import PiecewisePolynomial, ThermalModel, relative_coefficients
+from triaxcal.model.metrological import CONSTANT_NAMES
+from triaxcal.model.terms import NO_TERMS, PRODUCT_NAMES, RateTerm, Terms
+from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
+from triaxcal.model.thermal.shape import ThermalShape
+from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.unit.description import Adc, unit_of_text
+
+FORMAT = 1
+_ELSEWHERE = ("points", "parameter_covariance", "candidates")
+"""Parts of a `Calibration` that keys of format 1 hold."""
+
+
+def _shape_data(shape: ThermalShape) -> dict[str, Any]:
+    rest = {"t0_degc": shape.t0_degc, "ends_degc": shape.ends_degc, **shape.settings}
+    return {"function": shape.name, **plain(rest)}
+
+
+def _shape(data: Mapping[str, Any]) -> ThermalShape:
+    ends = np.unique(np.array(data["ends_degc"], dtype=np.float64))
+    function = THERMAL_FUNCTIONS[data["function"]]
+    settings = {key.name: data[key.name] for key in function.keys if key.name in data}
+    (shape,) = function.stated(settings, ends, float(data["t0_degc"]))
+    return shape
+
+
+_CUSTOM: Custom = {ThermalShape: (_shape_data, _shape)}
+
+
+@dataclass(frozen=True)
+class Saved:
+    """What a calibration.json says.
+
+    Attributes
+    ----------
+    source : str
+        The file, for messages.
+    fitted : Fitted or None
+        None in a file of triaxcal 0.1.0, which has the curves alone.
+    """
+
+    source: str
+    serial: str
+    thermal: ThermalModel
+    terms: Terms
+    range_degc: tuple[float, float]
+    reading_unit: str
+    fitted: Fitted | None
+
+    @staticmethod
+    def of(fitted: Fitted, source: str = "") -> Saved:
+        """A fit as it would be read from its file."""
+        c = fitted.calibration
+        return Saved(source, c.serial, c.thermal, c.terms, c.range_degc, c.reading_unit, fitted)
+
+
+def calibration_json(fitted: Fitted) -> bytes:
+    """Constants, curves, covariance and provenance; docs/file-formats.md has the layout."""
+    calibration = fitted.calibration
+    curves = calibration.thermal.curves
+    document = {
+        **header(fitted),
+        "constants": list(CONSTANT_NAMES),
+        "units": [calibration.gain_unit] * 9 + [calibration.reading_unit] * 3,
+        "estimator": calibration.estimator,
+        "thermal_model": {
+            "kind": calibration.shape.name,
+            "label": calibration.shape.label,
+            "t0_degc": calibration.thermal.t0_degc,
+            "breaks_degc": list(curves.breaks_degc),
+            "origins_degc": list(curves.origins_degc),
+            "coefficients": curves.coefficients.tolist(),
+        },
+        "temperature_coefficients": plain(relative_coefficients(calibration.thermal)),
+        "range_degc": list(calibration.range_degc),
+        "at_t0": calibration.thermal.constants_at(calibration.thermal.t0_degc).tolist(),
+        "points": plain(calibration.points),
+        "parameter_covariance": plain(calibration.parameter_covariance),
+        "covariance_source": calibration.covariance_source,
+        "covariance_contains": "the noise of the calibration readings alone; rig, gravity, "
+        "thermometer and thermal model are in passport.json",
+        "candidates": plain(calibration.candidates, _CUSTOM),
+        "selection_reason": calibration.selection_reason,
+        **_beyond_the_tilter(calibration),
+        "fit": _state(fitted),
+    }
+    return json_bytes(document)
+
+
+def _beyond_the_tilter(calibration: Calibration) -> dict[str, Any]:
+    """Quadratic terms, and what a recording's poses say; nothing where there are none."""
+    found: dict[str, Any] = {}
+    if calibration.terms.quadratic_per_g is not None:
+        found["quadratic_terms"] = {
+            "products": list(PRODUCT_NAMES),
+            "per_g": calibration.terms.quadratic_per_g.tolist(),
+        }
+    rate = calibration.terms.rate
+    if rate is not None:
+        found["rate_term"] = {
+            "offset_g_s_per_k": rate.offset_g_s_per_k.tolist(),
+            "range_k_per_s": list(rate.range_k_per_s),
+        }
+    recording = calibration.recording
+    if calibration.notes:
+        found["findings"] = list(calibration.notes)
+    if recording is not None:
+        found["recording"] = {
+            "poses": len(recording.poses.poses),
+            "refused": [{"line": r.line, "reason": r.reason} for r in recording.poses.refused],
+            "route": recording.route,
+            "rms_g": recording.rms_g,
+            "rms_per_degree_of_freedom_g": recording.rms_free_g if recording.checked else None,
+            "held_out_g": recording.held_out_g,
+            "left_out_length_g": recording.left_out_length_g,
+            "condition_number": recording.condition,
+            "findings": list(recording.findings),
+        }
+    return found
+
+
+def header(fitted: Fitted) -> dict[str, Any]:
+    """What every JSON file of a unit begins with."""
+    return {
+        "format": FORMAT,
+        "triaxcal": __version__,
+        "unit": fitted.unit.name,
+        "serial": fitted.unit.serial,
+        "inputs_sha256": fitted.inputs_sha256,
+    }
+
+
+def _state(fitted: Fitted) -> dict[str, Any]:
+    found = fitted.calibration
+    if found.recording is not None:
+        # Where samples were still is of no use without the samples.
+        poses = replace(found.recording.poses, stillness=None)
+        found = replace(found, recording=replace(found.recording, poses=poses))
+    rest = {key: value for key, value in plain(found, _CUSTOM).items() if key not in _ELSEWHERE}
+    return {
+        "unit_toml": fitted.unit_toml,
+        "adc": plain(fitted.unit.adc),
+        "measurements": plain(fitted.measurements),
+        "calibration": rest,
+    }
+
+
+def read_saved(path: Path) -> Saved:
+    """What a calibration.json says.
+
+    Raises
+    ------
+    RefusedError
+        When the file cannot be read, is no calibration.json, or is of a later format.
+    """
+    try:
+        document = json.loads(path.read_bytes())
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise RefusedError(
+            str(path), f"cannot be read: {reason}", expected="a calibration.json"
+        ) from error
+    except (ValueError, RecursionError) as error:
+        raise RefusedError(
+            str(path), f"not JSON: {error}", expected="a calibration.json"
+        ) from error
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        found = document.get("format") if isinstance(document, dict) else None
+        raise RefusedError(
+            f"{path}, format",
+            "missing" if found is None else f"found {found!r}",
+            expected=f"{FORMAT}",
+            remedy="give a calibration.json of a tilter's or a recording's calibration; another "
+            "format needs a triaxcal that knows it",
+        )
+    try:
+        return _saved(str(path), document)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        raise RefusedError(
+            str(path),
+            f"damaged, or no calibration.json: {type(error).__name__} {error}",
+            expected="the file as `triaxcal calib` wrote it",
+        ) from error
+
+
+def _saved(source: str, document: Mapping[str, Any]) -> Saved:
+    state = document.get("fit")
+    if state is None:
+        return _of_0_1_0(source, document)
+    whole = {**state["calibration"], **{key: document[key] for key in _ELSEWHERE}}
+    unit = unit_of_text(document["unit"], state["unit_toml"], f"{source}, unit_toml")
+    unit = replace(unit, adc=rebuilt(Adc, state["adc"]))
+    measurements = rebuilt(MeasurementSet, state["measurements"])
+    inputs, calibration = str(document["inputs_sha256"]), rebuilt(Calibration, whole, _CUSTOM)
+    fitted = Fitted(unit, measurements, inputs, calibration, state["unit_toml"])
+    return Saved.of(fitted, source)
+
+
+def _of_0_1_0(source: str, document: Mapping[str, Any]) -> Saved:
+    model = document["thermal_model"]
+    curves = PiecewisePolynomial(
+        tuple(map(float, model["breaks_degc"])),
+        tuple(map(float, model["origins_degc"])),
+        np.array(model["coefficients"], dtype=np.float64),
+    )
+    terms = NO_TERMS
+    if quadratic := document.get("quadratic_terms"):
+        terms = replace(terms, quadratic_per_g=np.array(quadratic["per_g"], dtype=np.float64))
+    if rate := document.get("rate_term"):
+        offset = np.array(rate["offset_g_s_per_k"], dtype=np.float64)
+        low, high = map(float, rate["range_k_per_s"])
+        terms = replace(terms, rate=RateTerm(offset, (low, high)))
+    low, high = map(float, document["range_degc"])
+    thermal = ThermalModel(float(model["t0_degc"]), curves)
+    unit = document["units"][-1]
+    return Saved(source, document["serial"], thermal, terms, (low, high), unit, None)
