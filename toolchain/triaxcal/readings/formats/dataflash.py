@@ -13,7 +13,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import IntArray
 from triaxcal.readings.arrays import ArraySource
-from triaxcal.readings.format import Format, Source, starts_with
+from triaxcal.readings.format import PIECE, Format, Source, starts_with
 from triaxcal.unit.recordingfile import FileLayout
 
 _HEAD = 3
@@ -60,6 +60,9 @@ def _open(path: Path, layout: FileLayout) -> Source:
             """The indexer in C prints what it finds wrong, and nothing can stop it."""
             self.init_arrays(progress_callback)
 
+        def init_clock(self) -> None:
+            """Time of day is not needed; without GPS it costs a pass through the log."""
+
     quiet = redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO())
     with quiet[0], quiet[1], Log(str(path)) as log:
         kinds = [(kind, log.formats[kind]) for kind in range(256) if log.counts[kind] > 0]
@@ -75,7 +78,8 @@ def _open(path: Path, layout: FileLayout) -> Source:
         if form.instance_field is None or not len(offsets):
             arrays[form.name] = messages
             continue
-        instance = messages[:][form.instance_field]
+        parts = range(0, len(offsets), PIECE)
+        instance = np.concatenate([messages[k : k + PIECE][form.instance_field] for k in parts])
         for number in np.unique(instance).tolist():
             table = form.name + f"[{number}]" * (number != 0)
             arrays[table] = _Messages(data, offsets[instance == number], fields)
@@ -101,21 +105,19 @@ def _whole(
     path: Path, starts: Mapping[int, IntArray], lengths: Mapping[int, int], size: int
 ) -> tuple[str, ...]:
     """Refuse a log with bytes between its messages that are none; tell of a cut one."""
-    begin = np.concatenate(list(starts.values()))
-    end = np.concatenate([found + lengths[kind] for kind, found in starts.items()])
-    order = np.argsort(begin)
-    begin, end = begin[order], end[order]
-    after = np.append(begin[1:], size if size > end[-1] + _PAGE else end[-1])
-    lost = np.flatnonzero(after != end)
-    if len(lost):
+    last = max(int(found[-1]) + lengths[kind] for kind, found in starts.items())
+    rest = size - last if size > last + _PAGE else 0
+    if rest or sum(len(found) * lengths[kind] for kind, found in starts.items()) != last:
+        begin = np.sort(np.concatenate([*starts.values(), [last + rest]]))
+        end = np.sort(np.concatenate([found + lengths[kind] for kind, found in starts.items()]))
+        lost = int(np.argmax(begin[1:] != end))
         raise RefusedError(
             str(path),
-            f"damaged: {after[lost[0]] - end[lost[0]]} bytes from byte {end[lost[0]]} on are no "
-            "message",
+            f"damaged: {begin[lost + 1] - end[lost]} bytes from byte {end[lost]} on are no message",
             expected="a whole DataFlash log",
             remedy="download it again",
         )
-    if end[-1] > size:
+    if last > size:
         return ("the log ends within a message: it was cut, and is read to there",)
     return ()
 

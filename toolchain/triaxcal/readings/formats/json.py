@@ -16,6 +16,7 @@ from triaxcal.readings.arrays import ArraySource, Pieces, column_of
 from triaxcal.readings.format import PIECE, Block, Format, Source
 from triaxcal.unit.recordingfile import FileLayout
 
+_Path = tuple[str | int, ...]
 _NAMES_WITHIN = 1000
 """Lines in which all names are looked for."""
 
@@ -37,25 +38,27 @@ class _Lines(Source):
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        records = islice(self._records(), _NAMES_WITHIN)
-        self.names = tuple(dict.fromkeys(name for _, record in records for name in record))
+        records = islice(self._records(object_pairs_hook=_object), _NAMES_WITHIN)
+        self._paths = {name: way for _, record in records for name, way in _paths(record).items()}
+        self.names = tuple(self._paths)
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
         """As `Source.blocks`."""
         pieces = Pieces(str(self._path), self.names, numbers, texts)
+        ways = {k: self._paths[self.names[k]] for k in pieces.wanted}
         records = self._records()
         while part := list(islice(records, PIECE)):
             yield pieces.block(
-                {k: column_of([r.get(self.names[k]) for _, r in part]) for k in pieces.wanted},
+                {k: column_of([_at(r, way) for _, r in part]) for k, way in ways.items()},
                 np.array([line for line, _ in part]),
             )
 
-    def _records(self) -> Iterator[tuple[int, dict[str, Any]]]:
+    def _records(self, **options: Any) -> Iterator[tuple[int, Any]]:
         with self._path.open(encoding="utf-8-sig") as file:
             for line, text in enumerate(file, 1):
                 if text.strip():
                     try:
-                        yield line, _leaves(json.loads(text, object_pairs_hook=_object))
+                        yield line, json.loads(text, **options)
                     except ValueError as error:
                         raise RefusedError(
                             f"{self._path}, line {line}",
@@ -83,23 +86,32 @@ def _columns(value: Any, prefix: str = "") -> dict[str, Any]:
     if not isinstance(value, list) or not value:
         return {}
     if all(isinstance(item, Mapping) for item in value):
-        records = [_leaves(item, prefix) for item in value]
-        names = dict.fromkeys(name for record in records for name in record)
-        return {name: column_of([record.get(name) for record in records]) for name in names}
+        ways = {n: way for item in value for n, way in _paths(item, prefix).items()}
+        return {name: column_of([_at(item, way) for item in value]) for name, way in ways.items()}
     if all(isinstance(item, list) and len(item) == len(value[0]) for item in value):
         return {prefix: np.array(value)}
     return {prefix: column_of(value)}
 
 
-def _leaves(value: Any, prefix: str = "") -> dict[str, Any]:
-    """Values of one record: name.field, name[0]."""
+def _paths(value: Any, name: str = "", way: _Path = ()) -> dict[str, _Path]:
+    """Ways to the values of one record by their names: name.field, name[0]."""
     if isinstance(value, Mapping):
-        parts = [_leaves(v, f"{prefix}.{k}" if prefix else k) for k, v in value.items()]
+        parts = [_paths(v, f"{name}.{k}" if name else k, (*way, k)) for k, v in value.items()]
     elif isinstance(value, list):
-        parts = [_leaves(v, f"{prefix}[{k}]") for k, v in enumerate(value)]
+        parts = [_paths(v, f"{name}[{k}]", (*way, k)) for k, v in enumerate(value)]
     else:
-        return {prefix: value}
-    return {name: leaf for part in parts for name, leaf in part.items()}
+        return {name: way}
+    return {leaf: found for part in parts for leaf, found in part.items()}
+
+
+def _at(record: Any, way: _Path) -> Any:
+    """Value of a record; None where it has none there."""
+    try:
+        for step in way:
+            record = record[step]
+    except (KeyError, IndexError, TypeError):
+        return None
+    return record
 
 
 ENTRY = Format(
