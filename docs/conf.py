@@ -20,6 +20,7 @@ extensions = [
     "numpydoc",
     "sphinx_click",
     "external_links",
+    "lengths",
 ]
 exclude_patterns = ["_build", "_ext"]
 source_suffix = {".md": "markdown"}
@@ -27,6 +28,7 @@ source_suffix = {".md": "markdown"}
 myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 4
 
+default_role = "code"  # of docstrings
 nitpicky = True
 autosummary_generate = False
 numpydoc_show_class_members = False
