@@ -1,4 +1,4 @@
-"""Docstrings write the length of a vector as |a|, which reStructuredText takes for a substitution."""
+"""Docstrings write a length as |a|, which reStructuredText takes for a substitution."""
 
 from __future__ import annotations
 
