@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.base.shipped import shipped
-from triaxcal.codegen.compiler import FLAGS
+from triaxcal.codegen.compiler import WARNINGS
 from triaxcal.targets.cores import Core
 
-WARNINGS = tuple(f for f in FLAGS if not f.startswith("-O"))
 RUN_SECONDS = 600.0
 """A program that runs longer hangs; the slowest of the matrix takes about 20 s."""
 
