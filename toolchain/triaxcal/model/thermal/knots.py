@@ -89,7 +89,7 @@ class KnottedShape(ThermalShape):
 
     @property
     def short_label(self) -> str:
-        return self.label if len(self.knots_degc) <= 3 else f"{self.title}, {self.detail}"
+        return f"{self.title}, {self.detail}"
 
     @property
     def settings(self) -> Settings:
