@@ -9,13 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.dynamic.noise import DataSheet
-from triaxcal.dynamic.recording import ImuRecording, ImuSamples, recording_of
+from triaxcal.dynamic.recording import ImuRecording, ImuSamples
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import GRADES, draw_truth
 from triaxcal.simulation.imu_motion import ImuMotion, Mounting, Move, three_axes
-from triaxcal.simulation.imu_truth import ImuTruth
+from triaxcal.simulation.imu_truth import ImuNoise, ImuTruth
 
 SHORT_MOVES = (Move(360.0, 60.0, 3.0), Move(-450.0, 45.0, 3.0), Move(270.0, 30.0, 3.0))
+
+
+def perfect(truth: ImuTruth) -> ImuTruth:
+    """The same without anything random."""
+    return replace(truth, noise=ImuNoise())
 
 
 def short_motion(axes: int = 3) -> ImuMotion:
@@ -55,6 +60,11 @@ def changed(recording: ImuRecording, **columns: np.ndarray) -> ImuRecording:
     """Recording with other columns."""
     samples = replace(recording.all(), **columns)
     return replace(recording, pieces=lambda: (samples,))
+
+
+def recording_of(samples: ImuSamples, name: str, **about: float | str) -> ImuRecording:
+    """Recording held in memory; `about` are the remaining attributes of `ImuRecording`."""
+    return ImuRecording(name, lambda: (samples,), **about)
 
 
 def part(recording: ImuRecording, keep: np.ndarray) -> ImuRecording:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dynamic_cases import recording_of
 from recordings import recording
 from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.noise import DataSheet
-from triaxcal.dynamic.recording import ImuSamples, recording_of
+from triaxcal.dynamic.recording import ImuSamples
 
 RATE_HZ = 100.0
 GYRO_SCALE_PERCENT = (

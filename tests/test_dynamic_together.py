@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynamic_cases import aviation, changed, held, sheet
+from dynamic_cases import aviation, changed, held, perfect, sheet
 from dynamic_judge import data_sheet, judge
 from test_dynamic_judge import ALL, CENTRES, motion
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
@@ -32,7 +32,7 @@ def test_a_delay_beside_lever_arms_leaves_no_bias(convention: str) -> None:
     With the rate of an interval's middle for that half an interval later, instants at 50 Hz put the
     gyros' scale factors 1.7 sd off, and the positions 7; now the positions 1.04 there.
     """
-    truth = draw_truth(AVIATION, 6, ("delay", "accel-positions")).perfect()
+    truth = perfect(draw_truth(AVIATION, 6, ("delay", "accel-positions")))
     truth = replace(truth, rate_convention=convention, force_convention=convention)
     recorded = three_axes(MINUTES, still_s=30.0, centre_mm=CENTRES)
     blocks = ("delay", "lever-arm", "accelerometer-positions")
@@ -46,7 +46,7 @@ def test_a_delay_beside_lever_arms_leaves_no_bias(convention: str) -> None:
 @pytest.mark.parametrize(("convention", "rate_hz"), [(INCREMENT, 200.0), (INSTANT, 50.0)])
 def test_all_together_leave_no_bias(convention: str, rate_hz: float) -> None:
     """All 85 states. At 200 Hz a table creeping to a stop once cost 8 sd of both delays."""
-    truth = draw_truth(AVIATION, 6, tuple(EFFECTS)).perfect()
+    truth = perfect(draw_truth(AVIATION, 6, tuple(EFFECTS)))
     truth = replace(truth, rate_convention=convention, force_convention=convention)
     verdict = judge(truth, motion(MINUTES, "all"), rate_hz, 6, ALL, noise=AVIATION.noise)
     assert np.abs(verdict.z).max() < LIMIT

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynamic_cases import perfect
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuSamples
 from triaxcal.model.types import FloatArray
@@ -243,7 +244,7 @@ def test_increments_add_up_and_converge(grade: str) -> None:
     is 8e-9 of the rippling rate of 4e-3 rad/s and of the force's changes; within a piece. No
     border is inside an interval: all are at multiples of 40 ms, as is the delay.
     """
-    truth = draw_truth(GRADES[grade], 3, tuple(EFFECTS)).perfect()
+    truth = perfect(draw_truth(GRADES[grade], 3, tuple(EFFECTS)))
     assert truth.second is not None
     truth = replace(truth, accel_delay_ms=40.0, second=replace(truth.second, delay_ms=-40.0))
     truth = replace(truth, rate_convention=INCREMENT, force_convention=INCREMENT)
@@ -260,7 +261,7 @@ def test_increments_are_the_integral_of_instants() -> None:
     It errs by (h w)^4 / 2880: of the ripple's 4e-3 rad/s * 10 ms with w = 11.9 * 1.05 rad/s, and of
     9.8 m/s^2 * 10 ms with w = 1.05 rad/s. Without a delay no border is inside an interval.
     """
-    truth = replace(draw_truth(AVIATION, 4, tuple(EFFECTS)).perfect(), accel_delay_ms=0.0)
+    truth = replace(perfect(draw_truth(AVIATION, 4, tuple(EFFECTS))), accel_delay_ms=0.0)
     instants = replace(truth, rate_convention=INSTANT, force_convention=INSTANT)
     whole = simulate_imu(truth, SHORT, 100.0, 0).all()
     points = simulate_imu(instants, SHORT, 200.0, 0).all()
@@ -288,7 +289,7 @@ def test_a_half_sample_matters_and_is_right() -> None:
 def test_a_delay_is_a_shift_of_the_accelerometers() -> None:
     """10 ms at 200 Hz are two samples; each triad has its own, and the gyros do not wait."""
     second = SecondTriad(delay_ms=-5.0)
-    truth = replace(draw_truth(MEMS, 5).perfect(), second=second, accel_delay_ms=10.0)
+    truth = replace(perfect(draw_truth(MEMS, 5)), second=second, accel_delay_ms=10.0)
     late = simulate_imu(truth, SHORT, 200.0, 0).all()
     truth = replace(truth, second=SecondTriad(), accel_delay_ms=0.0)
     prompt = simulate_imu(truth, SHORT, 200.0, 0).all()
@@ -434,13 +435,13 @@ def test_noise_is_what_the_data_sheet_says() -> None:
     for convention in (INCREMENT, INSTANT):
         truth = ImuTruth(noise=noise, rate_convention=convention, force_convention=convention)
         samples = simulate_imu(truth, still(200.0), 100.0, 7).all()
-        perfect = simulate_imu(truth.perfect(), still(200.0), 100.0, 7).all()
+        exact = simulate_imu(perfect(truth), still(200.0), 100.0, 7).all()
         step = 0.01 if convention == INCREMENT else 1.0
         # The angle wanders by 0.3 deg in an hour: 0.3 / 60 deg in a second; a reading is 10 ms.
         expected = step * math.radians(0.3 / 60.0) / math.sqrt(0.01)
-        assert _rms(samples.rate - perfect.rate) == pytest.approx(expected, rel=0.03)
+        assert _rms(samples.rate - exact.rate) == pytest.approx(expected, rel=0.03)
         expected = step * 50e-6 * 9.80665 / math.sqrt(0.01)
-        assert _rms(samples.force - perfect.force) == pytest.approx(expected, rel=0.03)
+        assert _rms(samples.force - exact.force) == pytest.approx(expected, rel=0.03)
         assert samples.temp_degc is not None
         # One column: 1 %, five of it.
         assert _rms(samples.temp_degc - 20.0) == pytest.approx(0.1, rel=0.05)
@@ -454,11 +455,11 @@ def test_biases_walk_as_the_data_sheet_says() -> None:
     """After 50 s the walk is K sqrt(50 s); over 200 seeds and 3 axes the rms scatters by 3 %."""
     noise = ImuNoise(gyro_walk_deg_per_h_per_sqrt_h=2.0, accel_walk_ug_per_sqrt_h=30.0)
     truth = ImuTruth(noise=noise, rate_convention=INSTANT, force_convention=INSTANT)
-    perfect = simulate_imu(truth.perfect(), still(50.0), 10.0, 0).all()
+    exact = simulate_imu(perfect(truth), still(50.0), 10.0, 0).all()
     ends = []
     for seed in range(200):
         samples = simulate_imu(truth, still(50.0), 10.0, seed).all()
-        ends.append((samples.rate[-1] - perfect.rate[-1], samples.force[-1] - perfect.force[-1]))
+        ends.append((samples.rate[-1] - exact.rate[-1], samples.force[-1] - exact.force[-1]))
     gyro, accel = (np.array(values) for values in zip(*ends, strict=True))
     hours = 50.0 / 3600.0
     assert _rms(gyro) == pytest.approx(2.0 * DEG_PER_H * math.sqrt(hours), rel=0.15)
@@ -468,11 +469,11 @@ def test_biases_walk_as_the_data_sheet_says() -> None:
 def test_counts_lose_nothing_of_the_sum() -> None:
     truth = ImuTruth(noise=ImuNoise(gyro_lsb=1.0, accel_lsb=0.5))
     samples = simulate_imu(truth, SHORT, 100.0, 1).all()
-    perfect = simulate_imu(truth.perfect(), SHORT, 100.0, 1).all()
+    exact = simulate_imu(perfect(truth), SHORT, 100.0, 1).all()
     for name, lsb in (("rate", ARCSEC), ("force", 0.5e-3)):
         counts = getattr(samples, name) / lsb
         assert np.abs(counts - np.rint(counts)).max() < 1e-9
-        sums = np.cumsum(getattr(samples, name) - getattr(perfect, name), axis=0)
+        sums = np.cumsum(getattr(samples, name) - getattr(exact, name), axis=0)
         # Half a count, and the rounding of a sum of 30 000.
         assert np.abs(sums).max() < 0.5 * lsb * (1 + 1e-6)
 
@@ -481,9 +482,9 @@ def test_counts_of_instants_round_each_reading() -> None:
     noise = ImuNoise(gyro_lsb=36.0, accel_lsb=100.0)
     truth = ImuTruth(noise=noise, rate_convention=INSTANT, force_convention=INSTANT)
     samples = simulate_imu(truth, SHORT, 50.0, 1).all()
-    perfect = simulate_imu(truth.perfect(), SHORT, 50.0, 1).all()
+    exact = simulate_imu(perfect(truth), SHORT, 50.0, 1).all()
     for name, lsb in (("rate", 36.0 * DEG_PER_H), ("force", 100e-6 * 9.80665)):
-        error = getattr(samples, name) - getattr(perfect, name)
+        error = getattr(samples, name) - getattr(exact, name)
         assert 0.49 * lsb < np.abs(error).max() < 0.5 * lsb * (1 + 1e-9)
 
 

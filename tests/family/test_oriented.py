@@ -12,7 +12,6 @@ from triaxcal.fitting.table.oriented import (
     SerialGrid,
     inverse_linear,
     inverse_quadratic,
-    solve_serial,
     table_error_g,
 )
 from triaxcal.model.orientation import (
@@ -37,6 +36,21 @@ D = np.array(
 D0 = np.array([-0.166049, 0.047870, 0.738719])
 ARCSEC = np.pi / 180.0 / 3600.0
 KINDS = (AIRCRAFT, INCLINOMETER)
+
+
+def solve_serial(unknowns, readings, *, shortcut: bool):
+    """Forces (n, 3) of readings (n, 3) by P0 (36), (37), or by the shortcut (38).
+
+    The shortcut takes D^T for D^-1: right to first order where D is near a rotation, so where
+    scale factors are near 1 and the readings in g.
+    """
+    d0, D = unknowns[:, 0], unknowns[:, 1:4]
+    inverse = D.T if shortcut else np.linalg.inv(D)
+    force = (readings - d0) @ inverse.T
+    if unknowns.shape[1] > 4:
+        D2 = unknowns[:, 4:] @ TRACELESS
+        force = (readings - d0 - products(force) @ D2.T) @ inverse.T
+    return force
 
 
 def grid() -> FloatArray:

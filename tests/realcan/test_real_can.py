@@ -35,7 +35,7 @@ def vcan():
 
 
 def some_frames(seconds=2, layout="classic", rate=100):
-    maker = FrameMaker(read_dbc(default_dbc()), layout, rate, 1, 0)
+    maker = FrameMaker(read_dbc(default_dbc()), layout, rate, 0)
     rng = np.random.default_rng(1)
     parts = []
     for second in range(seconds):

@@ -167,8 +167,3 @@ class ImuRecording:
     def all(self) -> ImuSamples:
         """Everything in one piece, for short recordings."""
         return joined(self.pieces())
-
-
-def recording_of(samples: ImuSamples, name: str, **about: float | str) -> ImuRecording:
-    """Recording held in memory; `about` are the remaining attributes of `ImuRecording`."""
-    return ImuRecording(name, lambda: (samples,), **about)  # type: ignore[arg-type]

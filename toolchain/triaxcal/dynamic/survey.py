@@ -92,8 +92,6 @@ class Survey:
     still : array, shape (w,), bool
     rate_max : float
         Largest mean rate in a window, rad/s.
-    temp_mean_degc : float
-        nan where there is no temperature.
     """
 
     windows: Windows
@@ -102,7 +100,6 @@ class Survey:
     use: BoolArray
     still: BoolArray
     rate_max: float
-    temp_mean_degc: float
 
 
 def survey(recording: ImuRecording) -> Survey:
@@ -114,7 +111,7 @@ def survey(recording: ImuRecording) -> Survey:
         As `read_windows` and `refuse_wrong_units`; when a section does not begin with a stand-still
         of `STILL_MIN_S`; when an axis was never rotated.
     """
-    windows, edges, temp_mean = read_windows(recording)
+    windows, edges = read_windows(recording)
     refuse_wrong_units(recording, windows)
     sections, still = [], np.zeros(len(windows.first), dtype=bool)
     for number, (first, last) in enumerate(edges):
@@ -126,7 +123,7 @@ def survey(recording: ImuRecording) -> Survey:
     _refuse_missing_axis(recording.name, windows, still, sections)
     speed = np.linalg.norm(windows.rate, axis=1)
     rate_max = float(speed.max())
-    return Survey(windows, tuple(sections), stages, use, still, rate_max, temp_mean)
+    return Survey(windows, tuple(sections), stages, use, still, rate_max)
 
 
 def _section(

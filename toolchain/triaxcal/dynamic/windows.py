@@ -44,7 +44,7 @@ class Windows:
     section: IntArray
 
 
-def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]], float]:
+def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]]]:
     """Read a recording once.
 
     Returns
@@ -52,8 +52,6 @@ def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]
     windows : Windows
     sections : list of (first, last)
         Numbers of the samples of each section.
-    temp_mean_degc : float
-        nan where there is no temperature.
 
     Raises
     ------
@@ -65,17 +63,14 @@ def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]
     rows: list[tuple[Any, ...]] = []
     edges: list[tuple[int, int]] = [(0, -1)]
     previous_s, count = None, 0
-    temps = []
     for chunk in recording.chunks(CHUNK // length * length):
         step = np.diff(chunk.time_s, prepend=chunk.time_s[0] - interval)
         if previous_s is not None:
             step[0] = chunk.time_s[0] - previous_s
         cuts = [0, *np.flatnonzero(step > GAP_INTERVALS * interval), len(chunk)]
-        rate = chunk.rate / step[:, None] if recording.rate_convention == INCREMENT else chunk.rate
+        rate = _per_second(chunk.rate, step, recording.rate_convention)
+        force = _per_second(chunk.force, step, recording.force_convention)
         _refuse_saturation(recording, chunk.time_s, chunk.rate, rate)
-        force = chunk.force
-        if recording.force_convention == INCREMENT:
-            force = force / step[:, None]
         for number, (a, b) in enumerate(pairwise(cuts)):
             if number > 0:
                 edges[-1] = (edges[-1][0], count + int(a) - 1)
@@ -95,13 +90,15 @@ def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]
                     np.full(len(starts), len(edges) - 1),
                 )
             )
-        if chunk.temp_degc is not None:
-            temps.append(float(chunk.temp_degc.mean()))
         count += len(chunk)
         previous_s = float(chunk.time_s[-1])
     edges[-1] = (edges[-1][0], count - 1)
     columns = [np.concatenate(column) for column in zip(*rows, strict=True)]
-    return Windows(*columns), edges, float(np.mean(temps)) if temps else float("nan")
+    return Windows(*columns), edges
+
+
+def _per_second(values: FloatArray, step_s: FloatArray, convention: str) -> FloatArray:
+    return values / step_s[:, None] if convention == INCREMENT else values
 
 
 def _refuse_saturation(

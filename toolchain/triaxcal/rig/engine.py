@@ -43,7 +43,6 @@ class Engine:
         self.setup = setup
         self.where = where
         self.session = Session(setup.plan, setup.unit, history)
-        self.identified = False
         self._start()
 
     def _start(self) -> None:
@@ -74,7 +73,6 @@ class Engine:
         return self.session.on_command(command, t_ns)
 
     def _check_identity(self, serial: int, rate_hz: int) -> None:
-        self.identified = True
         unit, plan = self.setup.unit, self.setup.plan
         if serial != serial_crc(unit.serial):
             other = _unit_of_serial(self.setup.folder, serial)

@@ -16,13 +16,10 @@ _AFTER_NS = {"RIG_XY": 0, "RIG_Z": 150_000, "RIG_FD": 0, "RIG_TEMP": 300_000, "R
 class FrameMaker:
     """Packs the samples of one rig, with its counters."""
 
-    def __init__(
-        self, dbc: RigDbc, layout: str, rate_hz: int, serial_crc: int, epoch_ns: int
-    ) -> None:
+    def __init__(self, dbc: RigDbc, layout: str, rate_hz: int, epoch_ns: int) -> None:
         self._messages = dbc.messages
         self._fd = layout == "fd"
         self._rate = rate_hz
-        self._serial_crc = serial_crc
         self._epoch_ns = epoch_ns
         self._sequence = self._time_us = 0
         self._temp_sequence = self._ident_sequence = 0

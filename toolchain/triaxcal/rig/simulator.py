@@ -85,8 +85,8 @@ class SimulatedRig:
         self._turn_at: float | None = None
         self._rested_since = -math.inf
         self._flicker_g = np.zeros((3, len(_FLICKER_TAU_S)))
-        self._maker = FrameMaker(dbc, plan.layout, self._rate, serial_crc(unit.serial), EPOCH_NS)
-        self._second = FrameMaker(dbc, plan.layout, self._rate, serial_crc(unit.serial), EPOCH_NS)
+        self._maker = FrameMaker(dbc, plan.layout, self._rate, EPOCH_NS)
+        self._second = FrameMaker(dbc, plan.layout, self._rate, EPOCH_NS)
         self._second.restart(97, 12345)
         self._temp_id = dbc.messages["RIG_TEMP"].frame_id
 

@@ -17,7 +17,7 @@ Signs and conventions, each of them physics and none of them a filter's:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -165,10 +165,6 @@ class ImuTruth:
     def gyro_elasticity_rad(self) -> FloatArray:
         """kappa_ij of (20), shape (3, 2): row the gyro's own force axis, column its axis 2 or 3."""
         return ARCSEC * np.array(self.gyro_elasticity_arcsec_per_g).reshape(3, 2)
-
-    def perfect(self) -> ImuTruth:
-        """The same without anything random."""
-        return replace(self, noise=ImuNoise())
 
 
 def _matrix(

@@ -134,21 +134,6 @@ class SerialGrid:
         return OrientedFit(D, d0, -np.linalg.solve(D, D2), self.condition)
 
 
-def solve_serial(unknowns: FloatArray, readings: FloatArray, *, shortcut: bool) -> FloatArray:
-    """Forces (n, 3) of readings (n, 3) by P0 (36), (37), or by the shortcut (38).
-
-    The shortcut takes D^T for D^-1: right to first order where D is near a rotation, so where
-    scale factors are near 1 and the readings in g.
-    """
-    d0, D = unknowns[:, 0], unknowns[:, 1:4]
-    inverse = D.T if shortcut else np.linalg.inv(D)
-    force = (readings - d0) @ inverse.T
-    if unknowns.shape[1] > 4:
-        D2 = unknowns[:, 4:] @ TRACELESS
-        force = (readings - d0 - products(force) @ D2.T) @ inverse.T
-    return force
-
-
 def table_error_g(
     kind: str, angles_rad: FloatArray, angle_sd_rad: float, level_sd_rad: float, gravity_g: float
 ) -> FloatArray:
