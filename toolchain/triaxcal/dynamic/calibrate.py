@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -89,20 +90,8 @@ def calibrate_dynamic(
     part_of_step, step = 1.0, np.zeros(0)
     for number in range(PASSES_MAX):
         layout = searching if start.heading_rad is None else wanted
-        frame = Frame(
-            layout,
-            recording.rate_convention,
-            recording.force_convention,
-            recording.gravity_m_per_s2,
-            size,
-            1 / recording.rate_hz,
-            reference_degc,
-        )
-
-        def report(part: float, number: int = number) -> None:
-            if progress is not None:
-                progress(number, part)
-
+        frame = _frame(layout, recording, size, reference_degc)
+        report = partial(progress, number) if progress is not None else _no_report
         task = Task(recording, found, frame, noise)
         done = run_pass(task, start, first=number == 0, progress=report)
         passes.append(done)
@@ -116,23 +105,25 @@ def calibrate_dynamic(
         start = _next_reference(start, done, n, recording, part_of_step)
         same_kind = (before is None) == (start.heading_rad is None)
         if number >= 2 and moved < SETTLED_SD and same_kind:
-            return DynamicResult(
-                layout,
-                done.p,
-                sd,
-                done.root @ done.root.T,
-                done.stage_p,
-                start.heading_rad,
-                found,
-                frame,
-                tuple(passes),
-            )
+            covariance = done.root @ done.root.T
+            shown = (done.p, sd, covariance, done.stage_p, start.heading_rad)
+            return DynamicResult(layout, *shown, found, frame, tuple(passes))
     raise RefusedError(
         recording.name,
         f"after {PASSES_MAX} passes the constants still move by {moved:.1f} standard deviations",
         expected="a recording that the model describes",
         remedy="look at units, axes, conventions and the noise that unit.toml states",
     )
+
+
+def _no_report(part: float) -> None:
+    """Nobody wants to see the progress."""
+
+
+def _frame(layout: Layout, recording: ImuRecording, size: int, reference_degc: float) -> Frame:
+    conventions = recording.rate_convention, recording.force_convention
+    gravity, interval_s = recording.gravity_m_per_s2, 1 / recording.rate_hz
+    return Frame(layout, *conventions, gravity, size, interval_s, reference_degc)
 
 
 def _block_size(recording: ImuRecording, found: Survey) -> int:

@@ -80,16 +80,10 @@ def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]
             if len(starts) == 0:
                 continue
             sizes = np.diff(starts, append=int(b))
-            rows.append(
-                (
-                    chunk.time_s[starts],
-                    sizes * interval,
-                    count + starts,
-                    np.add.reduceat(rate[: int(b)], starts) / sizes[:, None],
-                    np.add.reduceat(force[: int(b)], starts) / sizes[:, None],
-                    np.full(len(starts), len(edges) - 1),
-                )
-            )
+            means = [np.add.reduceat(v[: int(b)], starts) / sizes[:, None] for v in (rate, force)]
+            section = np.full(len(starts), len(edges) - 1)
+            at_s, duration_s = chunk.time_s[starts], sizes * interval
+            rows.append((at_s, duration_s, count + starts, *means, section))
         count += len(chunk)
         previous_s = float(chunk.time_s[-1])
     edges[-1] = (edges[-1][0], count - 1)

@@ -154,26 +154,9 @@ def choose_inverse(
         When K is so badly conditioned, or the output so fine, that nothing fits.
     """
     output_q = shape.output_q
-    K = functions[:, :, :3]
-    exact = adjugate(K)
-    adjugate_shift = max(0, int(np.abs(exact).max()).bit_length() - 31)
-    word = saturate_int32(exact >> adjugate_shift)
-    quarter = quarter_determinant(K, word)
-    determinant_shift = max(0, int(np.abs(quarter).max()).bit_length() - 31)
-    least = int(np.abs(quarter >> determinant_shift).min())
-    if least < 2**16:
-        raise RefusedError(
-            where,
-            "K(T) is so near to singular that its inverse has fewer than 16 significant bits",
-            remedy="look for axes that are not orthogonal, or for exchanged positions",
-        )
-    log2 = 62
-    while (1 << log2) // least > INT32_MAX:
-        log2 -= 1
-    shifts = InverseShifts(adjugate_shift, determinant_shift, log2, 0)
-    inverse = reciprocal(saturate_int32(quarter >> determinant_shift), shifts)
-    product_max = int(np.abs(word * inverse[:, None, None]).max())
+    shifts, product_max = _shifts_of(functions[:, :, :3], where)
     for spare in range(MAX_SPARE_BITS, -40, -1):
+        log2, determinant_shift = shifts.reciprocal_log2, shifts.determinant_shift
         gain_shift = log2 + 2 + determinant_shift - k_bits - (output_q + 32 + spare)
         if gain_shift < 1 or product_max >> gain_shift >= INT32_MAX:
             continue
@@ -192,3 +175,26 @@ def choose_inverse(
         culprit = f"the declared raw range stands for {largest:.4g} {shape.unit}"
         raise _does_not_fit(culprit, output_q, spare, where)
     raise _does_not_fit("the declared raw range", output_q, None, where)
+
+
+def _shifts_of(K: IntArray, where: str) -> tuple[InverseShifts, int]:
+    """Shifts of the inversion but for that of the gains; the largest gain before that shift."""
+    exact = adjugate(K)
+    adjugate_shift = max(0, int(np.abs(exact).max()).bit_length() - 31)
+    word = saturate_int32(exact >> adjugate_shift)
+    quarter = quarter_determinant(K, word)
+    determinant_shift = max(0, int(np.abs(quarter).max()).bit_length() - 31)
+    least = int(np.abs(quarter >> determinant_shift).min())
+    if least < 2**16:
+        raise RefusedError(
+            where,
+            "K(T) is so near to singular that its inverse has fewer than 16 significant bits",
+            remedy="look for axes that are not orthogonal, or for exchanged positions",
+        )
+    log2 = 62
+    while (1 << log2) // least > INT32_MAX:
+        log2 -= 1
+    shifts = InverseShifts(adjugate_shift, determinant_shift, log2, 0)
+    inverse = reciprocal(saturate_int32(quarter >> determinant_shift), shifts)
+    product_max = int(np.abs(word * inverse[:, None, None]).max())
+    return shifts, product_max

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -45,32 +46,14 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
         "local_gravity_m_per_s2": unit.gravity_m_per_s2,
         "latitude_deg": unit.latitude_deg,
         "blocks": list(unit.blocks),
-        "states": [
-            {
-                "name": state.name,
-                "unit": state.unit,
-                "si_per_unit": state.per_unit,
-                "value": float(result.p[i]),
-                "sd": float(result.sd[i]),
-                "prior_sd": state.prior_sd * state.per_unit,
-            }
-            for i, state in enumerate(layout.states)
-        ],
+        "states": _states(result),
         "covariance": result.covariance.tolist(),
         "each_mounting": {
             "states": [layout.states[int(i)].name for i in layout.reset_columns()],
             "values": result.stage_p.tolist(),
         },
         "heading_rad": None if result.heading_rad is None else result.heading_rad.tolist(),
-        "stages": [
-            {
-                "axis": "xyz"[stage.axis],
-                "start_s": stage.start_s,
-                "end_s": stage.end_s,
-                "turned_rad": stage.turned_rad,
-            }
-            for stage in result.survey.stages
-        ],
+        "stages": [asdict(stage) | {"axis": "xyz"[stage.axis]} for stage in result.survey.stages],
         "passes": len(result.passes),
         "innovations": {
             "chi_square": last.chi_square,
@@ -89,6 +72,20 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
         ],
         "known_only_together": [list(pair) for pair in seen.together],
     }
+
+
+def _states(result: DynamicResult) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": state.name,
+            "unit": state.unit,
+            "si_per_unit": state.per_unit,
+            "value": float(value),
+            "sd": float(sd),
+            "prior_sd": state.prior_sd * state.per_unit,
+        }
+        for state, value, sd in zip(result.layout.states, result.p, result.sd, strict=True)
+    ]
 
 
 def axis_up(result: DynamicResult) -> str:

@@ -52,46 +52,41 @@ def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Itera
     description = read_unit(template)
     truth, plan = read_truth(template)
     spread = read_spread(template)
-    text = (template / UNIT_FILE).read_text(encoding="utf-8")
     if description.measured.run is not None:
         raise RefusedError(
             f"{template / UNIT_FILE}, [measured]",
             "given",
             remedy="remove it: each unit gets its own",
         )
-    names = [f"{template.absolute().name}-{k:04d}" for k in range(1, count + 1)]
-    there = [name for name in names if (into / name).exists()]
-    if there:
-        raise RefusedError(
-            str(into / there[0]), "exists already", remedy="remove it, or name another folder"
-        )
-    for k, name in enumerate(names):
+    text = (template / UNIT_FILE).read_text(encoding="utf-8")
+    for k, folder in enumerate(_new_folders(into, template.absolute().name, count)):
         run = k // spread.units_per_run
         day = FIRST_DAY + datetime.timedelta(days=run)
         rng = np.random.Generator(np.random.PCG64([seed, _STREAM, k]))
         coefficients = drawn(truth.constants.curves.coefficients[0], spread, rng)
-        own = _SERIAL.sub(f'serial = "{name}"', text, count=1)
+        own = _SERIAL.sub(f'serial = "{folder.name}"', text, count=1)
         own += f'\n[measured]\nrig = "simulated"\ndate = {day.isoformat()}\n'
-        folder = into / name
+        seeds = seed * (COUNT_MAX + 1) + k, seed + run // spread.runs_between_moves
         try:
             folder.mkdir(parents=True)
             (folder / UNIT_FILE).write_text(own, encoding="utf-8")
-            (folder / TRUTH_FILE).write_text(
-                truth_text(
-                    truth,
-                    plan,
-                    coefficients,
-                    seed * (COUNT_MAX + 1) + k,
-                    seed + run // spread.runs_between_moves,
-                ),
-                encoding="utf-8",
-            )
+            own_truth = truth_text(truth, plan, coefficients, *seeds)
+            (folder / TRUTH_FILE).write_text(own_truth, encoding="utf-8")
         except OSError as error:
             raise RefusedError(
                 str(folder), f"cannot be written: {(error.strerror or str(error)).lower()}"
             ) from error
         write_simulated_unit(folder)
         yield folder
+
+
+def _new_folders(into: Path, name: str, count: int) -> list[Path]:
+    """Folders of the units; refuses when one of them exists."""
+    folders = [into / f"{name}-{k:04d}" for k in range(1, count + 1)]
+    there = next(filter(Path.exists, folders), None)
+    if there is not None:
+        raise RefusedError(str(there), "exists already", remedy="remove it, or name another folder")
+    return folders
 
 
 def drawn(coefficients: FloatArray, spread: Spread, rng: np.random.Generator) -> FloatArray:
