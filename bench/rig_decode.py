@@ -19,7 +19,7 @@ from at_sim_bench import setup_at
 from triaxcal.rig.candump import format_frames, parse
 from triaxcal.rig.dbc import default_dbc, load_database, read_dbc
 from triaxcal.rig.engine import Setup
-from triaxcal.rig.recording import replay
+from triaxcal.rig.replay import replay
 from triaxcal.rig.samples import SampleDecoder
 from triaxcal.rig.simulator import RigSettings, SimulatedRig
 from triaxcal.simulation.truth import read_truth

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from family_cases import U0, K, directions, write_unit
 
-from triaxcal.fitting.recorded.magnitude import VISIBLE
+from triaxcal.fitting.recorded.scalar import VISIBLE
 from triaxcal.fitting.route import calibrate_recording
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import products

@@ -23,7 +23,8 @@ from triaxcal.rig.canbus import SimulatedSource
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.frames import concatenate
 from triaxcal.rig.journal import read_journal
-from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, Recording, durable_events, replay
+from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, Recording, durable_events
+from triaxcal.rig.replay import replay
 from triaxcal.rig.runner import live
 from triaxcal.rig.socketcan import SocketSource, packed
 from triaxcal.simulation.tilts import truth_force_g

@@ -15,7 +15,8 @@ from rig_cases import BENCH, REPO, rig_of, short_setup
 
 from triaxcal.rig.candump import format_frames, read_log
 from triaxcal.rig.journal import read_journal
-from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, durable_events, replay
+from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, durable_events
+from triaxcal.rig.replay import replay
 from triaxcal.rig.simulator import EPOCH_NS
 
 

@@ -15,7 +15,8 @@ from rig_cases import short_setup
 from test_cli_rig import bench_copy, triaxcal
 
 from triaxcal.rig.journal import read_journal
-from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, durable_events, replay
+from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, durable_events
+from triaxcal.rig.replay import replay
 
 HERE = Path(__file__).parent
 

@@ -19,7 +19,8 @@ from triaxcal.rig.events import Redo
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.journal import Journal, read_journal
 from triaxcal.rig.rawlog import RawLog
-from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, Recording, durable_events, replay
+from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, Recording, durable_events
+from triaxcal.rig.replay import replay
 from triaxcal.rig.runner import Robot
 from triaxcal.rig.store import write_records
 

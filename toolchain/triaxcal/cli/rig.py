@@ -91,10 +91,10 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
 
     LOG has the frames of the session; the journal lies beside it.
     """
-    from triaxcal.rig import recording, store  # noqa: PLC0415
+    from triaxcal.rig import recording, replay, store  # noqa: PLC0415
 
     journal = log.with_name(recording.JOURNAL_FILE)
-    played = recording.replay(setup, log, journal if journal.exists() else None)
+    played = replay.replay(setup, log, journal if journal.exists() else None)
     for event in played.events:
         if event.kind != "trouble":
             click.echo(event.text)

@@ -20,7 +20,7 @@ from rich.live import Live
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import TEST_POSITIONS
-from triaxcal.rig import recording, runner, store
+from triaxcal.rig import recording, replay, runner, store
 from triaxcal.rig.canbus import Bus, SimulatedSource, messages_of
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.events import Agree, Command, Redo
@@ -115,7 +115,7 @@ def _write(setup: Setup, taken: recording.Recording, log: LogState) -> None:
     session = taken.engine.session
     if taken.resumed:
         path = taken.folder / recording.LOG_FILE
-        played = recording.replay(setup, path, taken.folder / recording.JOURNAL_FILE)
+        played = replay.replay(setup, path, taken.folder / recording.JOURNAL_FILE)
         if played.engine.session.accepted != session.accepted:
             raise RefusedError(
                 str(path), "gives other dwells than the journal", remedy="report this session"

@@ -20,7 +20,8 @@ import numpy as np
 
 from triaxcal.fitting.core.calibration import Candidate
 from triaxcal.fitting.recorded.checks import CONDITION_MAX
-from triaxcal.fitting.recorded.magnitude import ScalarData, ScalarFit, ScalarModel, fit_scalar
+from triaxcal.fitting.recorded.magnitude import ScalarFit, fit_scalar
+from triaxcal.fitting.recorded.scalar import ScalarData, ScalarModel
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
 

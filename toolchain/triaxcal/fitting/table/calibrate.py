@@ -10,12 +10,9 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint
 from triaxcal.fitting.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
-from triaxcal.fitting.recorded.calibrate import (
-    BEYOND_1_G,
-    covariance_blocks,
-    pose_dwells,
-)
+from triaxcal.fitting.recorded.calibrate import BEYOND_1_G, pose_dwells
 from triaxcal.fitting.recorded.checks import CONDITION_MAX, refuse_wrong_unit
+from triaxcal.fitting.recorded.made import covariance_blocks
 from triaxcal.fitting.recorded.temperatures import (
     recording_range,
     temperature_findings,

@@ -15,7 +15,8 @@ import numpy as np
 from triaxcal.fitting.core.calibration import Candidate
 from triaxcal.fitting.recorded.checks import CONDITION_MAX
 from triaxcal.fitting.recorded.frame import rotation_to, turned_constants
-from triaxcal.fitting.recorded.magnitude import NINE, fit_scalar, scalar_data
+from triaxcal.fitting.recorded.magnitude import fit_scalar
+from triaxcal.fitting.recorded.scalar import NINE, scalar_data
 from triaxcal.fitting.recorded.temperatures import gain_functions
 from triaxcal.fitting.recorded.trials import detail
 from triaxcal.fitting.table.oriented import (

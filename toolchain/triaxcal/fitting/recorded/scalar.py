@@ -1,0 +1,216 @@
+"""The scalar model: only |a| = g is known of each pose.
+
+The model is that of P1 (1), a = K(T)^-1 (U - U0(T)), with optional quadratic terms in products of
+the linear result, a + Q p(a), p the six products of P0 (13)
+(`model.terms`). Minimised is
+
+    r_p = |a_p| - g,    weighted by the pose.
+
+A rotation of a changes no |a|, so K is sought among the symmetric matrices: of all frames the one
+that turns the outputs' own axes least. Six entries of K and three biases are the nine constants.
+On a sphere |a + Q p(a)| changes by the cubic form a.Q p(a) / |a|; its parts of degree one act as a
+bias, and only seven of the eighteen terms are left that |a| can see (`VISIBLE`).
+
+Readings are scaled by a sphere through them before anything is solved, so that K is about 1 and a
+singular value of the Jacobian means the same in counts and in m/s^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from triaxcal.model.terms import PRODUCT_AXES, products
+from triaxcal.model.types import BoolArray, FloatArray
+
+_RADIUS_MAX = 4.0
+"""Of the poses' spread: a cap of 20 deg about one direction has 4.2, poses all round have 1."""
+_NINE = (("Kxx", 0, 0), ("Kyy", 1, 1), ("Kzz", 2, 2), ("Kxy", 0, 1), ("Kxz", 0, 2), ("Kyz", 1, 2))
+
+
+def _visible() -> FloatArray:
+    """The seven directions of Q, (7, 3, 6), that change |a| on a sphere otherwise than a bias."""
+    directions = np.random.default_rng(0).standard_normal((200, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    effect = np.einsum("ni,nk->nik", directions, products(directions)).reshape(-1, 18)
+    bias = np.linalg.qr(directions)[0]
+    _, singular, vt = np.linalg.svd(effect - bias @ (bias.T @ effect))
+    seen = vt[: int((singular > 1e-9 * singular[0]).sum())]
+    result: FloatArray = seen.reshape(-1, 3, 6)
+    return result
+
+
+VISIBLE = _visible()
+
+
+def _symmetric(i: int, j: int) -> FloatArray:
+    matrix = np.zeros((3, 3))
+    matrix[i, j] = matrix[j, i] = 1.0
+    return matrix
+
+
+def _square(i: int) -> FloatArray:
+    matrix = np.zeros((3, 6))
+    matrix[i, PRODUCT_AXES.index((i, i))] = 1.0
+    return matrix
+
+
+@dataclass(frozen=True)
+class ScalarModel:
+    """Which constants are free.
+
+    Attributes
+    ----------
+    label : str
+        Words for tables.
+    gain_names : tuple of str
+    gain : array, shape (m, 3, 3)
+        K is the sum of these, each with its parameter.
+    quadratic : array, shape (q, 3, 6)
+        Q likewise.
+    known : array, shape (3, 6)
+        Part of Q that is known beforehand.
+    """
+
+    label: str
+    gain_names: tuple[str, ...]
+    gain: FloatArray
+    quadratic: FloatArray
+    known: FloatArray = field(default_factory=lambda: np.zeros((3, 6)))
+
+    @property
+    def parameters(self) -> int:
+        """Free constants at one temperature."""
+        return len(self.gain) + 3 + len(self.quadratic)
+
+
+_NONE = np.zeros((0, 3, 6))
+_GAINS = np.array([_symmetric(i, j) for _, i, j in _NINE])
+_NAMES = tuple(name for name, _, _ in _NINE)
+NINE = ScalarModel("linear, nine constants", _NAMES, _GAINS, _NONE)
+MODELS = (
+    ScalarModel("bias and one scale factor", ("K",), np.eye(3)[None], _NONE),
+    ScalarModel("bias and scale factors", _NAMES[:3], _GAINS[:3], _NONE),
+    NINE,
+    ScalarModel(
+        "nine constants and squares", _NAMES, _GAINS, np.array([_square(i) for i in range(3)])
+    ),
+    ScalarModel("nine constants and all quadratic terms", _NAMES, _GAINS, VISIBLE),
+)
+
+
+@dataclass(frozen=True)
+class ScalarData:
+    """Poses, scaled.
+
+    Attributes
+    ----------
+    reading : array, shape (n, 3)
+        (U - centre) / radius.
+    basis : array, shape (n, P)
+        Functions of temperature at the poses.
+    weight : array, shape (n,)
+        Square roots of the weights, rms 1.
+    gravity_g : float
+    """
+
+    reading: FloatArray
+    basis: FloatArray
+    weight: FloatArray
+    gravity_g: float
+    centre: FloatArray
+    radius: float
+
+    def select(self, kept: BoolArray) -> ScalarData:
+        """Only the poses of a mask."""
+        return ScalarData(
+            self.reading[kept],
+            self.basis[kept],
+            self.weight[kept],
+            self.gravity_g,
+            self.centre,
+            self.radius,
+        )
+
+    def with_basis(self, basis: FloatArray) -> ScalarData:
+        """The same poses with other functions of temperature."""
+        return ScalarData(
+            self.reading, basis, self.weight, self.gravity_g, self.centre, self.radius
+        )
+
+
+def scalar_data(
+    readings: FloatArray, basis: FloatArray, weight: FloatArray, gravity_g: float
+) -> ScalarData:
+    """Scale readings, shape (n, 3), by the sphere through them, a linear least-squares problem."""
+    middle = readings.mean(axis=0)
+    spread = float(np.sqrt(((readings - middle) ** 2).sum(axis=1).mean())) or 1.0
+    v = (readings - middle) / spread
+    # |v|^2 = 2 c.v + (r^2 - |c|^2); the minimum-norm solution where poses lie in a plane.
+    design = np.concatenate([2.0 * v, np.ones((len(v), 1))], axis=1)
+    for cut in (1e-6, 0.1):
+        solution = np.linalg.lstsq(design, (v**2).sum(axis=1), rcond=cut)[0]
+        radius = float(np.sqrt(max(solution[3] + (solution[:3] ** 2).sum(), 1e-12)))
+        # Near a plane noise alone says where the centre is along its normal: far off.
+        if radius < _RADIUS_MAX:
+            break
+    centre = middle + spread * solution[:3]
+    return ScalarData(
+        reading=(readings - centre) / (spread * radius),
+        basis=basis,
+        weight=weight / float(np.sqrt((weight**2).mean())),
+        gravity_g=gravity_g,
+        centre=centre,
+        radius=spread * radius,
+    )
+
+
+def split(
+    model: ScalarModel, gain_functions: int, P: int, theta: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """K (P, 3, 3) and bias (P, 3) by function of temperature, and Q (3, 6), from theta."""
+    m = len(model.gain)
+    gains = np.zeros((m, P))
+    gains[:, :gain_functions] = theta[: m * gain_functions].reshape(m, gain_functions)
+    rest = theta[m * gain_functions :]
+    bias = rest[: 3 * P].reshape(3, P).T
+    K = np.einsum("mp,mij->pij", gains, model.gain)
+    Q = model.known + np.einsum("q,qij->ij", rest[3 * P :], model.quadratic)
+    return K, bias, Q
+
+
+def residual_of(
+    model: ScalarModel, gain_functions: int, data: ScalarData, theta: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """|a| - g (n,) and its derivatives (n, parameters)."""
+    n, P = data.basis.shape
+    K_p, bias_p, Q = split(model, gain_functions, P, theta)
+    if P == 1:  # one temperature: one matrix
+        N = np.linalg.inv(K_p[0]) / data.basis[:, :, None]
+    else:
+        N = np.linalg.inv(np.einsum("np,pij->nij", data.basis, K_p))
+    linear = np.einsum("nij,nj->ni", N, data.reading - data.basis @ bias_p)
+    force = linear + products(linear) @ Q.T
+    length = np.linalg.norm(force, axis=1)
+    unit = force / length[:, None]
+    through = np.broadcast_to(np.eye(3), (n, 3, 3))
+    if Q.any():
+        through = through + np.einsum("ik,nkj->nij", Q, _product_slopes(linear))
+    row = np.einsum("ni,nij,njk->nk", unit, through, N)  # d|a| / d(U - U0)
+    by_gain = -np.einsum("nk,mkl,nl->nm", row, model.gain, linear)
+    columns = [
+        (by_gain[:, :, None] * data.basis[:, None, :gain_functions]).reshape(n, -1),
+        (-row[:, :, None] * data.basis[:, None, :]).reshape(n, -1),
+        np.einsum("ni,qik,nk->nq", unit, model.quadratic, products(linear)),
+    ]
+    return length - data.gravity_g, np.concatenate(columns, axis=1)
+
+
+def _product_slopes(force: FloatArray) -> FloatArray:
+    """Derivative of the products by the force, shape (n, 6, 3)."""
+    slopes = np.zeros((len(force), 6, 3))
+    for k, (i, j) in enumerate(PRODUCT_AXES):
+        slopes[:, k, i] += force[:, j]
+        slopes[:, k, j] += force[:, i]
+    return slopes
