@@ -25,9 +25,10 @@ from triaxcal.base.shipped import shipped
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import render_routine
-from triaxcal.targets import bench_table, cores, counting, matrix
+from triaxcal.targets import bench_table, counting, matrix
 from triaxcal.targets.bench import Subject, _write_subject, cost_of
 from triaxcal.targets.build import TargetError, Toolset, build, emulate
+from triaxcal.targets.cores import registry as cores
 from triaxcal.targets.counting import build_plugin, measure
 from triaxcal.targets.matrix import (
     FAILED,

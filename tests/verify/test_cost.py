@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from triaxcal.targets.bench import Cost, Subject, best_form
-from triaxcal.targets.cores import CORES
+from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import Counts, Span
 from triaxcal.targets.shapes import Case
 from triaxcal.targets.sizes import Flash

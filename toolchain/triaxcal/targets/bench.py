@@ -13,7 +13,8 @@ from triaxcal.base.shipped import shipped
 from triaxcal.codegen.forms import assembly
 from triaxcal.targets.bench_case import case_header, floating_macros, floating_tables
 from triaxcal.targets.build import TargetError, Toolset, build, run
-from triaxcal.targets.cores import CORES, Core, install_advice, missing_tools
+from triaxcal.targets.cores.core import Core
+from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
 from triaxcal.targets.counting import Counts, build_plugin, measure
 from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB1, THUMB2
 from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, GYRO, QUADRATIC, RATE_ALONE, Case

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import WARNINGS
-from triaxcal.targets.cores import Core
+from triaxcal.targets.cores.core import Core
 
 RUN_SECONDS = 600.0
 """A program that runs longer hangs; the slowest of the matrix takes about 20 s."""

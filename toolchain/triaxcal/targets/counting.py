@@ -8,7 +8,7 @@ from pathlib import Path
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import find_compiler
 from triaxcal.targets.build import TargetError, emulate, run
-from triaxcal.targets.cores import Core
+from triaxcal.targets.cores.core import Core
 
 LOOP_ROUNDS = (1, 10, 100, 1000)
 """As in bench_main.c; the loop of bench_known.S takes two instructions a round and one more."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from triaxcal.base.shipped import shipped
 from triaxcal.targets.build import TargetError, Toolset, build, emulate
-from triaxcal.targets.cores import CORES, install_advice, missing_tools
+from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
 from triaxcal.targets.shapes import CUBIC, Case
 from triaxcal.targets.vectors import case_header, expected_lines
 
@@ -37,7 +37,7 @@ class Build:
         """For people."""
         t = self.toolset
         return (
-            f"{self.case.name}, {t.core.name}, {t.compiler} {t.optimisation}, "
+            f"{self.case.name}, {t.core.label}, {t.compiler} {t.optimisation}, "
             f"{ARITHMETIC_NAMES[t.arithmetic]}"
         )
 

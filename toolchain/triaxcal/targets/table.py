@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from triaxcal import __version__
 from triaxcal.base.screentext import table
-from triaxcal.targets.cores import CORES
+from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.matrix import (
     ARITHMETIC_NAMES,
     COMPILERS,
@@ -28,7 +28,7 @@ def counts(outcomes: Sequence[Outcome]) -> dict[str, int]:
 
 def matrix_table(outcomes: Sequence[Outcome]) -> str:
     """A row for each shape and arithmetic, a column for each core: passed of all."""
-    names = [core.name.replace(" (big-endian)", "") for core in CORES]
+    names = [core.name for core in CORES]
     rows = []
     keys = dict.fromkeys((o.build.case.name, o.build.toolset.arithmetic) for o in outcomes)
     for shape, arithmetic in keys:
@@ -75,7 +75,7 @@ def matrix_json(outcomes: Sequence[Outcome]) -> str:
         "builds": [
             {
                 "shape": o.build.case.name,
-                "core": o.build.toolset.core.name,
+                "core": o.build.toolset.core.label,
                 "compiler": o.build.toolset.compiler,
                 "optimisation": o.build.toolset.optimisation,
                 "arithmetic": ARITHMETIC_NAMES[o.build.toolset.arithmetic],

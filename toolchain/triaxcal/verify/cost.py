@@ -9,7 +9,7 @@ from dataclasses import asdict
 from triaxcal.codegen.forms import assembly
 from triaxcal.targets.bench import Cost, Subject, best_form, compiler_versions, cost_of
 from triaxcal.targets.build import TargetError
-from triaxcal.targets.cores import CORES, install_advice, missing_tools
+from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
 from triaxcal.targets.counting import Span, build_plugin
 from triaxcal.targets.matrix import ARITHMETIC_NAMES
 from triaxcal.targets.shapes import Case

@@ -7,7 +7,7 @@ are made in `channels`.
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.base import ARCSEC
-from triaxcal.dynamic.blocks.block import Extension, State, StateBlock
+from triaxcal.dynamic.blocks.block import State, StateBlock, extension
 
 BLOCK = StateBlock(
     "rotation-axis",
@@ -16,9 +16,4 @@ BLOCK = StateBlock(
     reset=True,
     needs="table",
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "Direction of the table's axis in the unit while it turns; for units whose azimuth drifts.",
-    (BLOCK,),
-)
+ENTRY = extension(BLOCK, "The direction of the table's axis while it turns.")

@@ -139,6 +139,11 @@ class Extension:
     blocks: tuple[StateBlock, ...]
 
 
+def extension(block: StateBlock, doc: str, *before: StateBlock) -> Extension:
+    """Extension of one block, by its name and title; `before` are blocks that it needs."""
+    return Extension(block.name, block.title, doc, (*before, block))
+
+
 def spread(values: FloatArray) -> FloatArray:
     """Rows of a full 3 x 3 matrix of states acting on `values` (n, 3): shape (n, 3, 9), by rows."""
     n = len(values)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.blocks.attitude import rotation_of
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension
 from triaxcal.model.types import FloatArray
 
 
@@ -41,9 +41,4 @@ BLOCK = StateBlock(
     motion=rows,
     motion_curve=curve,
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "The accelerometers are sampled later than the gyros of the same time stamp.",
-    (BLOCK,),
-)
+ENTRY = extension(BLOCK, "The accelerometers' samples are later than the gyros'.")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.blocks.base import ARCSEC
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension
 from triaxcal.model.types import FloatArray
 
 
@@ -32,9 +32,4 @@ BLOCK = StateBlock(
     tuple(State(f"K{i}{j}", "arcsec/g", ARCSEC, 60.0) for i in (1, 2, 3) for j in (2, 3)),
     rate=_rows,
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "A load turns the sensing axes of the gyros.",
-    (BLOCK,),
-)
+ENTRY = extension(BLOCK, "A load turns the sensing axes of the gyros.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.base import DEG_PER_H
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, spread
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension, spread
 from triaxcal.model.types import FloatArray
 
 
@@ -22,9 +22,4 @@ BLOCK = StateBlock(
         'angle separates it (block "table-angles")'
     ),
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "Gyro drift in proportion to the specific force.",
-    (BLOCK,),
-)
+ENTRY = extension(BLOCK, "Gyro drift in proportion to the specific force.")

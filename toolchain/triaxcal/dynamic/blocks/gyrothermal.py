@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.base import DEG_PER_H, PPM
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension
 from triaxcal.dynamic.blocks.thermal import rows
 from triaxcal.model.types import FloatArray
 
@@ -22,9 +22,4 @@ BLOCK = StateBlock(
     rate=_rate,
     needs="temp_degc",
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "Linear temperature coefficients of the gyros' drifts and scale factors.",
-    (BLOCK,),
-)
+ENTRY = extension(BLOCK, "Coefficients of the gyros' drifts and scale factors.")

@@ -10,7 +10,7 @@ acceleration; the signs in print are damaged.
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.attitude import skew
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension
 from triaxcal.model.types import FloatArray
 
 
@@ -33,9 +33,4 @@ BLOCK = StateBlock(
     edges2=_velocity,
     reset=True,
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "The unit is not in the table's centre.",
-    (BLOCK,),
-)
+ENTRY = extension(BLOCK, "The unit is not in the table's centre.")

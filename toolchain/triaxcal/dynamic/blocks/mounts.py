@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from triaxcal.dynamic.blocks import tableangles
 from triaxcal.dynamic.blocks.base import ARCSEC
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, spread
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension, spread
 from triaxcal.model.types import FloatArray
 
 _PLACES = ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
@@ -25,9 +25,4 @@ BLOCK = StateBlock(
     table=_rows,
     needs="table_angle_rad",
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "The unit turns on its mounts under load; needs table-angles, which it switches on.",
-    (tableangles.BLOCK, BLOCK),
-)
+ENTRY = extension(BLOCK, "The unit turns on its mounts under load.", tableangles.BLOCK)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.blocks.attitude import skew
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension
 from triaxcal.model.types import FloatArray
 
 _MASSES = (1, 2)
@@ -48,9 +48,4 @@ BLOCK = StateBlock(
     motion=_rest,
     edges=_ends,
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "Accelerometers 2 and 3 are not where accelerometer 1 is.",
-    (BLOCK,),
-)
+ENTRY = extension(BLOCK, "Accelerometers 2 and 3 are not where accelerometer 1 is.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.base import ARCSEC
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, same
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension, same
 from triaxcal.model.types import FloatArray
 
 
@@ -19,9 +19,4 @@ BLOCK = StateBlock(
     reset=True,
     needs="table_angle_rad",
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "Angles between unit and plate by the table's angle at rest, new at each mounting.",
-    (BLOCK,),
-)
+ENTRY = extension(BLOCK, "Angles between unit and plate, by the table's angle at rest.")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.blocks.base import MM_PER_S2, PPM
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, diagonal, same
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, diagonal, extension, same
 from triaxcal.model.types import FloatArray
 
 
@@ -33,9 +33,4 @@ BLOCK = StateBlock(
     force=_force,
     needs="temp_degc",
 )
-ENTRY = Extension(
-    BLOCK.name,
-    BLOCK.title,
-    "Linear temperature coefficients of the accelerometers' biases and scale factors.",
-    (BLOCK,),
-)
+ENTRY = extension(BLOCK, "Coefficients of the accelerometers' biases and scale factors.")

@@ -1,0 +1,1 @@
+"""Cores: a file each."""
