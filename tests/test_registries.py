@@ -390,3 +390,16 @@ def test_keys_of_functions_are_documented_once() -> None:
     assert 'with model = "piecewise-linear" or "cubic-spline" only.' in knots.doc
     assert "piecewise-linear: T0" in knots.default_words
     assert "cubic-spline: " in knots.default_words
+
+
+@pytest.mark.parametrize("temps", [SEVEN, TABLE_TEMPS, (20.0,)])
+def test_settings_give_every_shape_again(temps: tuple[float, ...]) -> None:
+    """calibration.json keeps settings and ends: a shape is read from them as it was."""
+    at = np.array(temps)
+    shapes = [s for f in THERMAL_FUNCTIONS for s in f.candidates(at, 20.0)]
+    shapes += [f.exact(at, 20.0) for f in THERMAL_FUNCTIONS if len(temps) >= max(2, f.least_temps)]
+    for shape in shapes:
+        function = THERMAL_FUNCTIONS[shape.name]
+        assert set(shape.settings) == {key.name for key in function.keys}
+        again = function.stated(shape.settings, np.unique(shape.ends_degc), shape.t0_degc)
+        assert again == (shape,)
