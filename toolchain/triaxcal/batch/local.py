@@ -24,13 +24,14 @@ from triaxcal.batch.order import Make, Order, Outcome, filled, refused
 
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """A worker is a core's worth: libraries that would start threads of their own are told so."""
-_OF_THE_TERMINAL = {signal.SIGINT, signal.SIGHUP}
+_OF_THE_TERMINAL = {signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGINT)}
 """Signals that a terminal sends to the workers as well."""
 
 
 def cores() -> int:
     """Cores that this process may use."""
-    return len(os.sched_getaffinity(0))
+    affinity = getattr(os, "sched_getaffinity", None)  # of Linux alone
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def run_local(

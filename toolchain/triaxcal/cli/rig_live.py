@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import os
 import re
 import select
 import sys
-import termios
 import time
-import tty
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
@@ -47,13 +46,17 @@ class _Keys:
     """Keys of the operator: single ones on a terminal, none elsewhere."""
 
     def __init__(self, plain: bool) -> None:
-        self._on = not plain and sys.stdin.isatty()
+        has_keys = importlib.util.find_spec("termios") is not None  # not on Windows
+        self._on = not plain and has_keys and sys.stdin.isatty()
 
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
         if not self._on:
             yield
             return
+        import termios  # noqa: PLC0415
+        import tty  # noqa: PLC0415
+
         file = sys.stdin.fileno()
         before = termios.tcgetattr(file)
         tty.setcbreak(file)

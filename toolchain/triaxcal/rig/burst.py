@@ -22,7 +22,7 @@ MOST = 4096
 SO_TIMESTAMPNS, SO_RXQ_OVFL = 35, 40
 _CONTROL_BYTES = 128
 _HEADER_BYTES = 16  # struct cmsghdr: size_t, int, int
-_DONT_WAIT = socket.MSG_DONTWAIT
+_DONT_WAIT = getattr(socket, "MSG_DONTWAIT", 0)  # not on Windows, which has no SocketCAN
 
 
 class _Part(ctypes.Structure):
