@@ -11,8 +11,10 @@ table is nothing but its values, a frozen dataclass declares it: its fields are 
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
@@ -84,13 +86,38 @@ def key(
     return field(default=default, metadata=made)
 
 
+def setting(
+    kind: Kind[T], default: T = REQUIRED, unit: str = "", *, words: str = "", example: str = ""
+) -> T:
+    """A key as a field of a frozen dataclass.
+
+    Its name is the field's; its documentation stands under that name in the section Attributes of
+    the class's docstring. `words` are its `default_words`.
+    """
+    return key(kind, "", default, unit, default_words=words, example=example)
+
+
 def keys_of(record: type[Any]) -> tuple[Key[Any], ...]:
     """Keys that the fields of a dataclass declare, in their order."""
+    docs = _documentation(record.__doc__ or "")
     return tuple(
-        dataclasses.replace(f.metadata["key"], name=f.name)
+        dataclasses.replace(made, name=f.name, doc=made.doc or docs.get(f.name, ""))
         for f in dataclasses.fields(record)
-        if "key" in f.metadata
+        if (made := f.metadata.get("key"))
     )
+
+
+@cache
+def _documentation(docstring: str) -> dict[str, str]:
+    """Texts of the section Attributes of a docstring, by name."""
+    texts: dict[str, str] = {}
+    name = ""
+    for line in inspect.cleandoc(docstring).partition("Attributes\n---")[2].splitlines():
+        if line.startswith(" "):
+            texts[name] = f"{texts.get(name, '')} {line.strip()}".strip()
+        else:
+            name = line.partition(" :")[0]
+    return texts
 
 
 @dataclass(frozen=True)
@@ -155,7 +182,7 @@ class Values:
 
     def record(self, cls: type[T], **others: object) -> T:
         """Dataclass of keys with these values; `others` are its fields that are no keys."""
-        return cls(**{key.name: self[key] for key in keys_of(cls)}, **others)
+        return cls(**{k.name: self[k] for k in keys_of(cls)}, **others)
 
     def where(self, key: Key[Any] | str) -> str:
         """Place of a key as messages name it."""
@@ -181,6 +208,12 @@ class TableKeys:
     doc: str
     keys: tuple[Key[Any], ...]
     optional: bool = False
+
+    @classmethod
+    def of(cls, name: str, record: type[Any], optional: bool = False) -> TableKeys:
+        """Table of a dataclass of keys, whose docstring begins with "[name]: what it is."."""
+        doc = (record.__doc__ or "").partition("\n")[0].partition("]: ")[2]
+        return cls(name, doc[:1].upper() + doc[1:], keys_of(record), optional)
 
     def but(self, *others: Key[Any], **changes: Mapping[str, Any]) -> TableKeys:
         """Same table with more keys, or with attributes of its keys changed, by name of the key."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values
+from triaxcal.base.keys import FORMAT, FileKeys, TableKeys, Values, setting
 from triaxcal.base.kinds import listed, number, rising, three, whole, word
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
@@ -17,98 +17,127 @@ from triaxcal.unit.description import DESCRIPTION, T0_TOLERANCE_DEGC
 CANDIDATES_MAX = 16
 """Every subset of the candidates is tried: 2^13 of them at most, the ends and T0 being fixed."""
 
-READING = Key(
-    "reading_micro_g",
-    number(1e-3, 1e6),
-    "Standard deviation of one reading.",
-    unit="micro-g",
-    example="100",
-)
-FLOOR = Key(
-    "floor_micro_g",
-    number(0.0, 1e6),
-    "Standard deviation of a dwell's mean, however long: what averaging does not remove.",
-    0.0,
-    "micro-g",
-)
-REPEATABILITY = Key(
-    "repeatability_arcsec",
-    number(0.0, 36000.0),
-    "Standard deviation of each dwell's tilt about each axis.",
-    0.0,
-    "arcsec",
-)
-RATE = Key(
-    "rate_hz", whole(10, 10_000), "Readings a second of each axis.", unit="Hz", example="100"
-)
-VOLTS_PER_G = Key(
-    "volts_per_g",
-    three(number(-1e6, 1e6), "a list of 3 numbers"),
-    "Nominal scale of x, y, z with its sign.",
-    unit="V/g",
-    example="[0.5, 0.5, 0.5]",
-)
-TURN = Key(
-    "turn_s",
-    number(0.0, 3600.0),
-    "Time to the next position, before the rig's own settling.",
-    10.0,
-    "s",
-)
-RAMP = Key("ramp_k_per_min", number(0.01, 100.0), "Rate of the chamber.", unit="K/min", example="2")
-SOAK = Key(
-    "soak_min",
-    number(0.0, 1440.0),
-    "Time that the unit takes to follow the chamber.",
-    unit="min",
-    example="60",
-)
-TEMPERATURES = Key(
-    "temperatures_degc",
-    rising(*PLAUSIBLE_DEGC, 2, CANDIDATES_MAX),
-    "Temperatures to choose from; the first and the last are the ends of the working range.",
-    unit="degC",
-    example="[-40, -10, 20, 50, 85]",
-)
-POSITIONS = Key(
-    "positions",
-    listed(word(tuple(TEST_POSITIONS)), range(100), "a list of names TP1 to TP6"),
-    "Positions to choose from; all six are needed.",
-    tuple(TEST_POSITIONS),
-    default_words="all six",
-)
-T0 = Key(
-    "t0_degc",
-    number(*PLAUSIBLE_DEGC),
-    "T0; one of the temperatures is within 2 degC of it.",
-    unit="degC",
-    example="20",
-)
-ORDER = Key(
-    "order",
-    whole(0, 9),
-    "Order of the polynomials that the constants follow over temperature.",
-    example="3",
-)
-TARGET = Key(
-    "expanded_micro_g",
-    number(1e-3, 1e6),
-    "Expanded uncertainty (95 %) that noise and repeatability may give.",
-    None,
-    "micro-g",
-    default_words="that of the usual plan",
-)
+
+@dataclass(frozen=True)
+class _Noise:
+    """[noise]: noise of the readings.
+
+    Attributes
+    ----------
+    reading_micro_g
+        Standard deviation of one reading.
+    floor_micro_g
+        Standard deviation of a dwell's mean, however long: what averaging does not remove.
+    repeatability_arcsec
+        Standard deviation of each dwell's tilt about each axis.
+    """
+
+    reading_micro_g: float = setting(number(1e-3, 1e6), unit="micro-g", example="100")
+    floor_micro_g: float = setting(number(0.0, 1e6), 0.0, "micro-g")
+    repeatability_arcsec: float = setting(number(0.0, 36000.0), 0.0, "arcsec")
+
+
+@dataclass(frozen=True)
+class _Rig:
+    """[rig]: what the rig does.
+
+    Attributes
+    ----------
+    rate_hz
+        Readings a second of each axis.
+    volts_per_g
+        Nominal scale of x, y, z with its sign.
+    turn_s
+        Time to the next position, before the rig's own settling.
+    """
+
+    rate_hz: int = setting(whole(10, 10_000), unit="Hz", example="100")
+    volts_per_g: tuple[float, float, float] = setting(
+        three(number(), "a list of 3 numbers"), unit="V/g", example="[0.5, 0.5, 0.5]"
+    )
+    turn_s: float = setting(number(0.0, 3600.0), 10.0, "s")
+
+
+@dataclass(frozen=True)
+class _Chamber:
+    """[chamber]: what the chamber does.
+
+    Attributes
+    ----------
+    ramp_k_per_min
+        Its rate.
+    soak_min
+        Time that the unit takes to follow it.
+    """
+
+    ramp_k_per_min: float = setting(number(0.01, 100.0), unit="K/min", example="2")
+    soak_min: float = setting(number(0.0, 1440.0), unit="min", example="60")
+
+
+@dataclass(frozen=True)
+class _Candidates:
+    """[candidates]: what the plan may use.
+
+    Attributes
+    ----------
+    temperatures_degc
+        Temperatures to choose from; the first and the last are the ends of the working range.
+    positions
+        Positions to choose from; all six are needed.
+    """
+
+    temperatures_degc: tuple[float, ...] = setting(
+        rising(*PLAUSIBLE_DEGC, 2, CANDIDATES_MAX), unit="degC", example="[-40, -10, 20, 50, 85]"
+    )
+    positions: tuple[str, ...] = setting(
+        listed(word(tuple(TEST_POSITIONS)), range(100), "a list of names TP1 to TP6"),
+        tuple(TEST_POSITIONS),
+        words="all six",
+    )
+
+
+@dataclass(frozen=True)
+class _Curves:
+    """[curves]: what is fitted.
+
+    Attributes
+    ----------
+    t0_degc
+        T0; one of the temperatures is within 2 degC of it.
+    order
+        Order of the polynomials that the constants follow over temperature.
+    """
+
+    t0_degc: float = setting(number(*PLAUSIBLE_DEGC), unit="degC", example="20")
+    order: int = setting(whole(0, 9), example="3")
+
+
+@dataclass(frozen=True)
+class _Target:
+    """[target]: what is wanted.
+
+    Attributes
+    ----------
+    expanded_micro_g
+        Expanded uncertainty (95 %) that noise and repeatability may give.
+    """
+
+    expanded_micro_g: float | None = setting(
+        number(1e-3, 1e6), None, "micro-g", words="that of the usual plan"
+    )
+
+
 PROBLEM = FileKeys(
     "problem.toml",
     "The question to `triaxcal design`",
     (
         TableKeys("", "", (FORMAT, DESCRIPTION)),
-        TableKeys("noise", "Noise of the readings.", (READING, FLOOR, REPEATABILITY)),
-        TableKeys("rig", "What the rig does.", (RATE, VOLTS_PER_G, TURN)),
-        TableKeys("chamber", "What the chamber does.", (RAMP, SOAK)),
-        TableKeys("candidates", "What the plan may use.", (TEMPERATURES, POSITIONS)),
-        TableKeys("curves", "What is fitted.", (T0, ORDER)),
-        TableKeys("target", "What is wanted.", (TARGET,)),
+        TableKeys.of("noise", _Noise),
+        TableKeys.of("rig", _Rig),
+        TableKeys.of("chamber", _Chamber),
+        TableKeys.of("candidates", _Candidates),
+        TableKeys.of("curves", _Curves),
+        TableKeys.of("target", _Target),
     ),
 )
 
@@ -167,25 +196,27 @@ def read_problem(path: Path) -> Problem:
         constants; says which they leave open.
     """
     tables = PROBLEM.read(path)
-    noise, rig, curves = tables["noise"], tables["rig"], tables["curves"]
-    chamber, candidates, target = tables["chamber"], tables["candidates"], tables["target"][TARGET]
+    noise, rig = tables["noise"].record(_Noise), tables["rig"].record(_Rig)
+    chamber, curves = tables["chamber"].record(_Chamber), tables["curves"].record(_Curves)
+    candidates = tables["candidates"].record(_Candidates)
+    target = tables["target"].record(_Target).expanded_micro_g
     problem = Problem(
         source=str(path),
-        reading_g=noise[READING] * 1e-6,
-        floor_g=noise[FLOOR] * 1e-6,
-        repeatability_rad=float(np.radians(noise[REPEATABILITY] / 3600.0)),
-        rate_hz=rig[RATE],
-        volts_per_g=rig[VOLTS_PER_G],
-        turn_s=rig[TURN],
-        ramp_k_per_min=chamber[RAMP],
-        soak_s=60.0 * chamber[SOAK],
-        temps_degc=candidates[TEMPERATURES],
-        t0_degc=curves[T0],
-        order=curves[ORDER],
+        reading_g=noise.reading_micro_g * 1e-6,
+        floor_g=noise.floor_micro_g * 1e-6,
+        repeatability_rad=float(np.radians(noise.repeatability_arcsec / 3600.0)),
+        rate_hz=rig.rate_hz,
+        volts_per_g=rig.volts_per_g,
+        turn_s=rig.turn_s,
+        ramp_k_per_min=chamber.ramp_k_per_min,
+        soak_s=60.0 * chamber.soak_min,
+        temps_degc=candidates.temperatures_degc,
+        t0_degc=curves.t0_degc,
+        order=curves.order,
         target_g=None if target is None else target * 1e-6,
     )
-    _refuse_blind_positions(candidates)
-    _refuse_few_temperatures(problem, candidates)
+    _refuse_blind_positions(tables["candidates"], candidates.positions)
+    _refuse_few_temperatures(problem, tables["candidates"])
     return problem
 
 
@@ -210,8 +241,7 @@ def unobservable(positions: tuple[str, ...]) -> list[str]:
     return words
 
 
-def _refuse_blind_positions(values: Values) -> None:
-    positions = values[POSITIONS]
+def _refuse_blind_positions(values: Values, positions: tuple[str, ...]) -> None:
     missing = [p for p in TEST_POSITIONS if p not in positions]
     if not missing:
         return
@@ -222,17 +252,18 @@ def _refuse_blind_positions(values: Values) -> None:
     else:
         found += "; the constants are determined, but no residual shows a mistake"
     raise RefusedError(
-        values.where(POSITIONS), found, expected="all six", remedy="leave the key out"
+        values.where("positions"), found, expected="all six", remedy="leave the key out"
     )
 
 
 def _refuse_few_temperatures(problem: Problem, values: Values) -> None:
     temps, needed = problem.temps_degc, problem.order + 2
     if not any(abs(t - problem.t0_degc) <= T0_TOLERANCE_DEGC for t in temps):
-        raise values.refuse(TEMPERATURES, f"one within {T0_TOLERANCE_DEGC:g} degC of t0_degc")
+        near = f"one within {T0_TOLERANCE_DEGC:g} degC of t0_degc"
+        raise values.refuse("temperatures_degc", near)
     if len(temps) < needed:
         raise RefusedError(
-            values.where(TEMPERATURES),
+            values.where("temperatures_degc"),
             f"{len(temps)} candidates; polynomials of order {problem.order} have "
             f"{problem.order + 1} coefficients",
             expected=f"{needed} candidates at least: with {problem.order + 1} temperatures the "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from triaxcal.base.keys import TableKeys, Values, key, keys_of
+from triaxcal.base.keys import TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import interval, number, whole
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.unit.description import OUTPUT_Q_RANGE, Adc, TemperatureSensor
@@ -13,25 +13,36 @@ from triaxcal.unit.description import OUTPUT_Q_RANGE, Adc, TemperatureSensor
 
 @dataclass(frozen=True)
 class Device:
-    """What the firmware reads and gives. By default, results of +-128 g and +-4096 deg/s fit."""
+    """What the firmware reads and gives. By default, results of +-128 g and +-4096 deg/s fit.
+
+    Attributes
+    ----------
+    accel_bits
+        Width of the signed raw code.
+    accel_full_scale_g
+        Reading of the code 2^(accel_bits - 1), in g of 9.80665 m/s^2.
+    gyro_bits
+        Width of the signed raw code.
+    gyro_full_scale_deg_per_s
+        Reading of the code 2^(gyro_bits - 1).
+    range_degc
+        Working range.
+    accel_q
+        LSB of an acceleration: 2^-accel_q g.
+    gyro_rate_q
+        LSB of a rate: 2^-gyro_rate_q deg/s.
+    """
 
     temperature_sensor: TemperatureSensor
-    accel_bits: int = key(whole(8, 32), "Width of the signed raw code.", unit="bit", example="16")
-    accel_full_scale_g: float = key(
-        number(1e-3, 1e3),
-        "Reading of the code 2^(accel_bits - 1), in g of 9.80665 m/s^2.",
-        unit="g",
-        example="16",
+    accel_bits: int = setting(whole(8, 32), unit="bit", example="16")
+    accel_full_scale_g: float = setting(number(1e-3, 1e3), unit="g", example="16")
+    gyro_bits: int = setting(whole(8, 32), unit="bit", example="16")
+    gyro_full_scale_deg_per_s: float = setting(number(1e-3, 1e5), unit="deg/s", example="500")
+    range_degc: tuple[float, float] = setting(
+        interval(*PLAUSIBLE_DEGC), unit="degC", example="[-40, 85]"
     )
-    gyro_bits: int = key(whole(8, 32), "Width of the signed raw code.", unit="bit", example="16")
-    gyro_full_scale_deg_per_s: float = key(
-        number(1e-3, 1e5), "Reading of the code 2^(gyro_bits - 1).", unit="deg/s", example="500"
-    )
-    range_degc: tuple[float, float] = key(
-        interval(*PLAUSIBLE_DEGC), "Working range.", unit="degC", example="[-40, 85]"
-    )
-    accel_q: int = key(whole(*OUTPUT_Q_RANGE), "LSB of an acceleration: 2^-accel_q g.", 24)
-    gyro_rate_q: int = key(whole(*OUTPUT_Q_RANGE), "LSB of a rate: 2^-gyro_rate_q deg/s.", 19)
+    accel_q: int = setting(whole(*OUTPUT_Q_RANGE), 24)
+    gyro_rate_q: int = setting(whole(*OUTPUT_Q_RANGE), 19)
 
     @property
     def accel_adc(self) -> Adc:

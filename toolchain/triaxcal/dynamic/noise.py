@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from triaxcal.base.keys import key
+from triaxcal.base.keys import setting
 from triaxcal.base.kinds import number
 from triaxcal.dynamic.recording import INCREMENT
 
@@ -21,39 +21,33 @@ class DataSheet:
 
     Data sheets write the velocity random walk N, micro-g sqrt(s), in micro-g/sqrt(Hz). (A
     one-sided spectral density is sqrt(2) times N.)
+
+    Attributes
+    ----------
+    gyro_arw_deg_per_sqrt_h
+        Angle random walk N of the gyros: a mean over t scatters by N/sqrt(t).
+    accel_vrw_ug_per_sqrt_hz
+        Velocity random walk N of the accelerometers.
+    second_vrw_ug_per_sqrt_hz
+        Velocity random walk of the second accelerometer triad.
+    accel_lsb
+        One count of the accelerometers: micro-g for instants, mm/s for increments.
+    table_sd_arcsec
+        One reading of the table's angle, at rest.
+    axis_wobble_arcsec
+        How far the table's axis leans while it turns.
     """
 
-    gyro_arw_deg_per_sqrt_h: float = key(
-        number(1e-6, 100.0),
-        "Angle random walk N of the gyros: a mean over t scatters by N/sqrt(t).",
-        unit="deg/sqrt(h)",
-        example="0.3",
+    gyro_arw_deg_per_sqrt_h: float = setting(number(1e-6, 100.0), unit="deg/sqrt(h)", example="0.3")
+    accel_vrw_ug_per_sqrt_hz: float = setting(
+        number(1e-3, 1e5), unit="micro-g/sqrt(Hz)", example="100"
     )
-    accel_vrw_ug_per_sqrt_hz: float = key(
-        number(1e-3, 1e5),
-        "Velocity random walk N of the accelerometers.",
-        unit="micro-g/sqrt(Hz)",
-        example="100",
+    second_vrw_ug_per_sqrt_hz: float | None = setting(
+        number(1e-3, 1e5), None, "micro-g/sqrt(Hz)", words="as the first"
     )
-    second_vrw_ug_per_sqrt_hz: float | None = key(
-        number(1e-3, 1e5),
-        "Velocity random walk of the second accelerometer triad.",
-        None,
-        "micro-g/sqrt(Hz)",
-        default_words="as the first",
-    )
-    accel_lsb: float = key(
-        number(0.0, 1e6),
-        "One count of the accelerometers: micro-g for instants, mm/s for increments.",
-        0.0,
-        "micro-g or mm/s",
-    )
-    table_sd_arcsec: float | None = key(
-        number(1e-3, 1e5), "One reading of the table's angle, at rest.", None, "arcsec"
-    )
-    axis_wobble_arcsec: float | None = key(
-        number(1e-3, 1e5), "How far the table's axis leans while it turns.", None, "arcsec"
-    )
+    accel_lsb: float = setting(number(0.0, 1e6), 0.0, "micro-g or mm/s")
+    table_sd_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec")
+    axis_wobble_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec")
 
     @property
     def rate_density(self) -> float:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values, key, keys_of
+from triaxcal.base.keys import FORMAT, FileKeys, TableKeys, Values, setting
 from triaxcal.base.kinds import FLAG, number, rising, three, whole, word
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
@@ -17,73 +17,90 @@ from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import DESCRIPTION, UnitDescription
 
 
-def _threshold(low: float, doc: str, default: float, unit: str = "sigma") -> float:
-    """A limit in standard deviations."""
-    return key(number(low, 50.0), doc, default, unit)
-
-
 @dataclass(frozen=True)
 class Stillness:
-    """[stillness]: when the unit rests; docs/how-to/bench.md explains each."""
+    """[stillness]: when the unit rests.
 
-    reference_s: int = key(
-        whole(60, 3600), "Time at rest from which the noise is learned.", 120, "s"
-    )
-    moving_sigma: float = _threshold(
-        2.0, "A block moves when its variance is this far above the reference.", 5.6
-    )
-    moving_step_micro_g: float = key(
-        number(1.0, 1e6),
-        "A block moves when its mean is this far from the one before.",
-        1000.0,
-        "micro-g",
-    )
-    clean_blocks: int = key(whole(1, 600), "Seconds at rest before settling.", 5, "s")
-    settle_s: int = key(whole(0, 3600), "Time of settling.", 20, "s")
-    average_s: int = key(whole(10, 3600), "Time of averaging.", 60, "s")
-    guard_s: int = key(
-        whole(0, 600), "Time watched after the averaging, for slips at its end.", 12, "s"
-    )
-    noise_sigma: float = _threshold(2.0, "Limit of the dwell's variance.", 3.5)
-    slope_t: float = _threshold(2.0, "Limit of the dwell's slope.", 3.9)
-    slip_t: float = _threshold(2.0, "Limit of the dwell's largest step.", 4.4)
-    creep_t: float = _threshold(2.0, "Limit of the creep at rest.", 3.7)
-    batches: int = key(whole(5, 600), "Batch means from which u(A) is made; divides average_s.", 20)
-    u_max_micro_g: float = key(number(0.01, 1e5), "Largest u(A) accepted.", 3.0, "micro-g")
-    allan_floor_micro_g: float = key(
-        number(0.0, 1e5),
-        "Floor of the sensor's Allan deviation, added in quadrature.",
-        0.5,
-        "micro-g",
-    )
-    lost_max_ratio: float = key(number(0.0, 0.5), "Most samples lost in a dwell.", 0.01)
-    gap_max_s: float = key(number(0.0, 10.0), "Longest gap.", 0.5, "s")
-    jumps_max_ratio: float = key(
-        number(0.0, 1.0),
-        "With more jumps of the counters, another node sends under the rig's IDs.",
-        0.1,
-    )
+    Attributes
+    ----------
+    reference_s
+        Time at rest from which the noise is learned.
+    moving_sigma
+        A block moves when its variance is this far above the reference.
+    moving_step_micro_g
+        A block moves when its mean is this far from the one before.
+    clean_blocks
+        Seconds at rest before settling.
+    settle_s
+        Time of settling.
+    average_s
+        Time of averaging.
+    guard_s
+        Time watched after the averaging, for slips at its end.
+    noise_sigma
+        Limit of the dwell's variance.
+    slope_t
+        Limit of the dwell's slope.
+    slip_t
+        Limit of the dwell's largest step.
+    creep_t
+        Limit of the creep at rest.
+    batches
+        Batch means from which u(A) is made; divides average_s.
+    u_max_micro_g
+        Largest u(A) accepted.
+    allan_floor_micro_g
+        Floor of the sensor's Allan deviation, added in quadrature.
+    lost_max_ratio
+        Most samples lost in a dwell.
+    gap_max_s
+        Longest gap.
+    jumps_max_ratio
+        With more jumps of the counters, another node sends under the rig's IDs.
+    """
+
+    reference_s: int = setting(whole(60, 3600), 120, "s")
+    moving_sigma: float = setting(number(2.0, 50.0), 5.6, "sigma")
+    moving_step_micro_g: float = setting(number(1.0, 1e6), 1000.0, "micro-g")
+    clean_blocks: int = setting(whole(1, 600), 5, "s")
+    settle_s: int = setting(whole(0, 3600), 20, "s")
+    average_s: int = setting(whole(10, 3600), 60, "s")
+    guard_s: int = setting(whole(0, 600), 12, "s")
+    noise_sigma: float = setting(number(2.0, 50.0), 3.5, "sigma")
+    slope_t: float = setting(number(2.0, 50.0), 3.9, "sigma")
+    slip_t: float = setting(number(2.0, 50.0), 4.4, "sigma")
+    creep_t: float = setting(number(2.0, 50.0), 3.7, "sigma")
+    batches: int = setting(whole(5, 600), 20)
+    u_max_micro_g: float = setting(number(0.01, 1e5), 3.0, "micro-g")
+    allan_floor_micro_g: float = setting(number(0.0, 1e5), 0.5, "micro-g")
+    lost_max_ratio: float = setting(number(0.0, 0.5), 0.01)
+    gap_max_s: float = setting(number(0.0, 10.0), 0.5, "s")
+    jumps_max_ratio: float = setting(number(0.0, 1.0), 0.1)
 
 
 @dataclass(frozen=True)
 class Thermal:
-    """[thermal]: when the temperature rests."""
+    """[thermal]: when the temperature rests.
 
-    tolerance_k: float = key(number(0.01, 50.0), "Distance from the nominal temperature.", 1.0, "K")
-    slope_max_k_per_min: float = key(number(1e-4, 10.0), "Limit of |dT/dt| + 2u.", 0.02, "K/min")
-    window_s: int = key(whole(30, 7200), "Time over which dT/dt is taken.", 300, "s")
-    cycle_s: int = key(
-        whole(0, 3600),
-        "Period of a chamber that cycles, 0 when it does not; the window then spans two at least.",
-        0,
-        "s",
-    )
-    span_max_k: float = key(
-        number(0.001, 10.0),
-        "Largest span of the temperatures of the positions of one step.",
-        0.25,
-        "K",
-    )
+    Attributes
+    ----------
+    tolerance_k
+        Distance from the nominal temperature.
+    slope_max_k_per_min
+        Limit of |dT/dt| + 2u.
+    window_s
+        Time over which dT/dt is taken.
+    cycle_s
+        Period of a chamber that cycles, 0 when it does not; the window then spans two at least.
+    span_max_k
+        Largest span of the temperatures of the positions of one step.
+    """
+
+    tolerance_k: float = setting(number(0.01, 50.0), 1.0, "K")
+    slope_max_k_per_min: float = setting(number(1e-4, 10.0), 0.02, "K/min")
+    window_s: int = setting(whole(30, 7200), 300, "s")
+    cycle_s: int = setting(whole(0, 3600), 0, "s")
+    span_max_k: float = setting(number(0.001, 10.0), 0.25, "K")
 
 
 @dataclass(frozen=True)
@@ -123,53 +140,68 @@ class SessionPlan:
         return 1e6 * unit.adc.volts_per_code / np.array(self.volts_per_g)
 
 
-RATE = Key(
-    "rate_hz", whole(10, 10_000), "Readings a second of each axis.", unit="Hz", example="100"
-)
-LAYOUT = Key("layout", word(("classic", "fd")), "Layout of the frames on the bus.", "classic")
-VOLTS_PER_G = Key(
-    "volts_per_g",
-    three(
-        number(-100.0, 100.0),
-        "three signed numbers, 0.0001 to 100 V/g in size",
-        lambda v: abs(v) >= 1e-4,
-    ),
-    "Nominal scale of x, y, z with its sign.",
-    unit="V/g",
-    example="[0.5, 0.5, 0.5]",
-)
-_TEMPERATURES = rising(*PLAUSIBLE_DEGC, 1, 64)
-TEMPERATURES = Key(
-    "temperatures_degc",
-    _TEMPERATURES,
-    "Temperatures at which TP1 to TP6 are measured.",
-    unit="degC",
-    example="[-20, 20, 60]",
-)
-CHECK_TEMPERATURES = Key(
-    "check_temperatures_degc",
-    _TEMPERATURES,
-    "Temperatures at which CP1 to CP6 are measured.",
-    None,
-    "degC",
-)
-DIRECTION = Key("direction", word(("up", "down")), "Order of the temperatures.", "up")
-OUT_OF_ORDER = Key(
-    "take_out_of_order", FLAG, "A position found out of order is taken without asking.", False
-)
+@dataclass(frozen=True, kw_only=True)
+class _Rig:
+    """[rig]: what the unit sends.
+
+    Attributes
+    ----------
+    rate_hz
+        Readings a second of each axis.
+    layout
+        Layout of the frames on the bus.
+    volts_per_g
+        Nominal scale of x, y, z with its sign.
+    """
+
+    rate_hz: int = setting(whole(10, 10_000), unit="Hz", example="100")
+    layout: str = setting(word(("classic", "fd")), "classic")
+    volts_per_g: tuple[float, float, float] = setting(
+        three(
+            number(-100.0, 100.0),
+            "three signed numbers, 0.0001 to 100 V/g in size",
+            lambda v: abs(v) >= 1e-4,
+        ),
+        unit="V/g",
+        example="[0.5, 0.5, 0.5]",
+    )
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """[steps]: what is measured.
+
+    Attributes
+    ----------
+    temperatures_degc
+        Temperatures at which TP1 to TP6 are measured.
+    check_temperatures_degc
+        Temperatures at which CP1 to CP6 are measured.
+    direction
+        Order of the temperatures.
+    take_out_of_order
+        A position found out of order is taken without asking.
+    """
+
+    temperatures_degc: tuple[float, ...] = setting(
+        rising(*PLAUSIBLE_DEGC, 1, 64), unit="degC", example="[-20, 20, 60]"
+    )
+    check_temperatures_degc: tuple[float, ...] = setting(
+        rising(*PLAUSIBLE_DEGC, 1, 64), (), "degC", words="none", example="[20]"
+    )
+    direction: str = setting(word(("up", "down")), "up")
+    take_out_of_order: bool = setting(FLAG, False)
+
+
 SESSION_PLAN = FileKeys(
     "plan.toml",
     "The plan of a session at the rig",
     (
         TableKeys("", "", (FORMAT, DESCRIPTION)),
-        TableKeys("rig", "What the unit sends.", (RATE, LAYOUT, VOLTS_PER_G)),
-        TableKeys(
-            "steps",
-            "What is measured.",
-            (TEMPERATURES, CHECK_TEMPERATURES, DIRECTION, OUT_OF_ORDER),
-        ),
-        TableKeys("stillness", "When the unit rests.", keys_of(Stillness)),
-        TableKeys("thermal", "When the temperature rests.", keys_of(Thermal)),
+        TableKeys.of("rig", _Rig),
+        TableKeys.of("steps", _Steps),
+        TableKeys.of("stillness", Stillness),
+        TableKeys.of("thermal", Thermal),
     ),
 )
 
@@ -184,7 +216,7 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
         unit's range.
     """
     tables = SESSION_PLAN.read(path)
-    rig, steps = tables["rig"], tables["steps"]
+    rig, steps = tables["rig"].record(_Rig), tables["steps"].record(_Steps)
     stillness = tables["stillness"].record(Stillness)
     if stillness.average_s % stillness.batches:
         raise RefusedError(
@@ -195,30 +227,30 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
     return SessionPlan(
         source=str(path),
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-        rate_hz=rig[RATE],
-        layout=rig[LAYOUT],
-        volts_per_g=rig[VOLTS_PER_G],
-        take_out_of_order=steps[OUT_OF_ORDER],
-        steps=_steps(steps, unit),
+        rate_hz=rig.rate_hz,
+        layout=rig.layout,
+        volts_per_g=rig.volts_per_g,
+        take_out_of_order=steps.take_out_of_order,
+        steps=_steps(tables["steps"], steps, unit),
         stillness=stillness,
         thermal=tables["thermal"].record(Thermal),
     )
 
 
-def _steps(values: Values, unit: UnitDescription) -> tuple[Step, ...]:
+def _steps(values: Values, steps: _Steps, unit: UnitDescription) -> tuple[Step, ...]:
     at: dict[float, tuple[str, ...]] = {}
-    for temps, positions in (
-        (TEMPERATURES, tuple(TEST_POSITIONS)),
-        (CHECK_TEMPERATURES, CHECK_POSITIONS),
+    for name, temps, positions in (
+        ("temperatures_degc", steps.temperatures_degc, tuple(TEST_POSITIONS)),
+        ("check_temperatures_degc", steps.check_temperatures_degc, CHECK_POSITIONS),
     ):
-        for temp in values[temps] or ():
+        for temp in temps:
             if unit.range_degc and not unit.range_degc[0] <= temp <= unit.range_degc[1]:
                 low, high = unit.range_degc
                 raise RefusedError(
-                    values.where(temps),
+                    values.where(name),
                     f"found {temp:g} degC",
                     expected=f"temperatures of the unit's range, {low:g} to {high:g} degC",
                     remedy=f"correct the plan, or range_degc in the unit.toml of {unit.name}",
                 )
             at[temp] = at.get(temp, ()) + positions
-    return tuple(Step(temp, at[temp]) for temp in sorted(at, reverse=values[DIRECTION] == "down"))
+    return tuple(Step(temp, at[temp]) for temp in sorted(at, reverse=steps.direction == "down"))

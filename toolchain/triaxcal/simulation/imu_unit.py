@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values
+from triaxcal.base.keys import FORMAT, FileKeys, TableKeys, Values, setting
 from triaxcal.base.kinds import Kind, listed, meaning, number, three, word
 from triaxcal.base.tomltable import read_toml
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording
 from triaxcal.readings.measurements import write_measurements
 from triaxcal.simulation.imu import simulate_imu
-from triaxcal.simulation.imu_grades import EFFECTS, GRADES, draw_truth
+from triaxcal.simulation.imu_grades import EFFECTS, GRADES, Grade, draw_truth
 from triaxcal.simulation.imu_motion import (
     PRECISE_TABLE,
     WARMING,
     ImuMotion,
     Move,
     RoughTable,
+    TemperatureDrift,
     three_axes,
 )
 from triaxcal.simulation.imu_truth import ARCSEC
-from triaxcal.simulation.truth import SEED as SEED_KIND
-from triaxcal.simulation.truth import check_seed
+from triaxcal.simulation.truth import SEED, check_seed
 from triaxcal.unit.description import GRAVITY, LATITUDE, find_unit
 
 IMU_TRUTH_FILE = "imu_truth.toml"
@@ -46,63 +46,75 @@ def _moves(rows: object) -> tuple[Move, ...]:
 
 _RAMP_S = RoughTable().ramp_s
 _THREE_NUMBERS = three(number(), "")
-GRADE = Key("grade", meaning(GRADES), "How good the sensors are.", example='"mems"')
-SEED = Key("seed", SEED_KIND, "Seed of the constants and the noise.", example="1")
-_EFFECTS = ", ".join(EFFECTS)
-IMU_EFFECTS = Key(
-    "effects",
-    listed(word(tuple(EFFECTS)), range(100), f"a list of names out of {_EFFECTS}"),
-    "Effects of the unit beyond the base model.",
-    (),
-    default_words="none",
-)
-RATE = Key("rate_hz", number(1.0, 1e4), "Samples a second.", unit="Hz", example="50")
-MINUTES = Key(
-    "minutes_per_axis",
-    number(0.5, 600.0),
-    "How long the usual moves are repeated, three at least. This or `moves`.",
-    None,
-    "min",
-    example="4",
-)
-MOVES = Key(
-    "moves",
-    Kind(
-        "a list of [angle in deg, rate in deg/s, stop in s] such as [-360, 30, 5], rates up to "
-        f"1000, stops up to 36000, each angle reaching its rate in {_RAMP_S:g} s",
-        _moves,
-        {"type": "array", "items": _THREE_NUMBERS.schema, "minItems": 1},
-    ),
-    "Moves of each axis: [angle in deg, rate in deg/s, stop in s], the angle signed.",
-    None,
-    example="[[360, 30, 5], [-360, 30, 5]]",
-)
-STILL = Key(
-    "still_s",
-    number(1.0, 36000.0),
-    "Stand-still before the first move of each axis.",
-    unit="s",
-    example="30",
-)
-TABLE = Key(
-    "table",
-    meaning({"rough": RoughTable(), "precise": PRECISE_TABLE}),
-    "rough: 1 deg off level, wobbling, no angles; precise: no wobble, its angle is recorded.",
-    example='"rough"',
-)
-TEMPERATURE = Key(
-    "temperature",
-    meaning({"constant": None, "warming": WARMING}),
-    "constant: 20 degC; warming: 20 to 45 degC, with waves.",
-    example='"constant"',
-)
+
+
+@dataclass(frozen=True)
+class _Unit:
+    """[unit]: the sensors.
+
+    Attributes
+    ----------
+    grade
+        How good the sensors are.
+    seed
+        Seed of the constants and the noise.
+    effects
+        Effects of the unit beyond the base model.
+    """
+
+    grade: Grade = setting(meaning(GRADES), example='"mems"')
+    seed: int = setting(SEED, example="1")
+    effects: tuple[str, ...] = setting(
+        listed(word(tuple(EFFECTS)), range(100), f"a list of names out of {', '.join(EFFECTS)}"),
+        (),
+        words="none",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Motion:
+    """[motion]: how the unit is turned.
+
+    Attributes
+    ----------
+    rate_hz
+        Samples a second.
+    minutes_per_axis
+        How long the usual moves are repeated, three at least. This or `moves`.
+    moves
+        Moves of each axis: [angle in deg, rate in deg/s, stop in s], the angle signed.
+    still_s
+        Stand-still before the first move of each axis.
+    table
+        rough: 1 deg off level, wobbling, no angles; precise: no wobble, its angle is recorded.
+    temperature
+        constant: 20 degC; warming: 20 to 45 degC, with waves.
+    """
+
+    rate_hz: float = setting(number(1.0, 1e4), unit="Hz", example="50")
+    minutes_per_axis: float | None = setting(number(0.5, 600.0), None, "min", example="4")
+    moves: tuple[Move, ...] | None = setting(
+        Kind(
+            "a list of [angle in deg, rate in deg/s, stop in s] such as [-360, 30, 5], rates up "
+            f"to 1000, stops up to 36000, each angle reaching its rate in {_RAMP_S:g} s",
+            _moves,
+            {"type": "array", "items": _THREE_NUMBERS.schema, "minItems": 1},
+            example="[[360, 30, 5], [-360, 30, 5]]",
+        ),
+        None,
+    )
+    still_s: float = setting(number(1.0, 36000.0), unit="s", example="30")
+    table: RoughTable = setting(meaning({"rough": RoughTable(), "precise": PRECISE_TABLE}))
+    temperature: TemperatureDrift | None = setting(meaning({"constant": None, "warming": WARMING}))
+
+
 IMU_TRUTH = FileKeys(
     IMU_TRUTH_FILE,
     "What a simulated IMU is, and how it is moved",
     (
         TableKeys("", "", (FORMAT,)),
-        TableKeys("unit", "The sensors.", (GRADE, SEED, IMU_EFFECTS)),
-        TableKeys("motion", "The motion.", (RATE, MINUTES, MOVES, STILL, TABLE, TEMPERATURE)),
+        TableKeys.of("unit", _Unit),
+        TableKeys.of("motion", _Motion),
     ),
     ("minutes_per_axis",),
 )
@@ -120,12 +132,12 @@ def write_simulated_recording(folder: Path, seed: int | None = None) -> Path:
         When a file is missing or breaks a rule of docs/file-formats.md.
     """
     tables = IMU_TRUTH.read(folder / IMU_TRUTH_FILE)
-    unit, motion = tables["unit"], tables["motion"]
+    unit, motion = tables["unit"].record(_Unit), tables["motion"].record(_Motion)
     if seed is None:
-        seed = unit[SEED]
+        seed = unit.seed
     check_seed(seed, "seed")
-    truth = draw_truth(unit[GRADE], seed, unit[IMU_EFFECTS])
-    recording = simulate_imu(truth, _plan(folder, motion), motion[RATE], seed)
+    truth = draw_truth(unit.grade, seed, unit.effects)
+    recording = simulate_imu(truth, _plan(folder, tables["motion"]), motion.rate_hz, seed)
     target = folder / RECORDING_FILE
     write_measurements(target, _columns(recording), _rows(recording))
     return target
@@ -140,24 +152,24 @@ def planned_motion(folder: Path) -> tuple[ImuMotion, float]:
         As `write_simulated_recording`.
     """
     motion = IMU_TRUTH.read(folder / IMU_TRUTH_FILE)["motion"]
-    return _plan(folder, motion), motion[RATE]
+    return _plan(folder, motion), motion.record(_Motion).rate_hz
 
 
-def _plan(folder: Path, motion: Values) -> ImuMotion:
+def _plan(folder: Path, values: Values) -> ImuMotion:
     site = _site(find_unit(folder))
-    moves, minutes = motion[MOVES], motion[MINUTES]
-    if (moves is None) == (minutes is None):
+    motion = values.record(_Motion)
+    if (motion.moves is None) == (motion.minutes_per_axis is None):
         raise RefusedError(
-            f"{motion.where(MOVES)} and minutes_per_axis",
-            "neither given" if moves is None else "both given",
+            f"{values.where('moves')} and minutes_per_axis",
+            "neither given" if motion.moves is None else "both given",
             expected="one of them: the moves of an axis, or how long the usual ones are repeated",
         )
     plan = three_axes(
-        minutes or 0.0,
-        still_s=motion[STILL],
-        table=motion[TABLE],
-        temperature=motion[TEMPERATURE],
-        moves=moves,
+        motion.minutes_per_axis or 0.0,
+        still_s=motion.still_s,
+        table=motion.table,
+        temperature=motion.temperature,
+        moves=motion.moves,
     )
     return replace(plan, latitude_deg=site[LATITUDE], gravity_m_per_s2=site[GRAVITY])
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values, key, keys_of
+from triaxcal.base.keys import FORMAT, FileKeys, Key, TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import Kind, listed, number, rising, whole
 from triaxcal.base.tomltable import shown
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
@@ -24,52 +24,55 @@ SEED: Kind[int] = replace(whole(0, SEED_MAX), expected="a whole number from 0 to
 
 @dataclass(frozen=True)
 class Imperfections:
-    """[imperfections]: standard deviations of what is wrong with the rig."""
+    """[imperfections]: standard deviations of what is wrong with the rig.
 
-    squareness_sd_arcsec: float = key(
-        number(0.0, 36000.0),
-        "Tilt of each test position about each axis, one draw a seed for all temperatures.",
-        0.0,
-        "arcsec",
-    )
-    repeatability_sd_arcsec: float = key(
-        number(0.0, 36000.0), "Tilt of each dwell about each axis.", 0.0, "arcsec"
-    )
-    level_sd_arcsec: float = key(
-        number(0.0, 36000.0),
-        "Rotation of the whole rig against the unit, about each axis, one draw a seed.",
-        0.0,
-        "arcsec",
-    )
-    gravity_sd_m_per_s2: float = key(
-        number(0.0, 0.1),
-        "True gravity against local_gravity_m_per_s2 in unit.toml, one draw a seed.",
-        0.0,
-        "m/s^2",
-    )
-    thermometer_offset_sd_degc: float = key(
-        number(0.0, 10.0), "What the thermometer shows too much, one draw a seed.", 0.0, "degC"
-    )
+    Attributes
+    ----------
+    squareness_sd_arcsec
+        Tilt of each test position about each axis, one draw a seed for all temperatures.
+    repeatability_sd_arcsec
+        Tilt of each dwell about each axis.
+    level_sd_arcsec
+        Rotation of the whole rig against the unit, about each axis, one draw a seed.
+    gravity_sd_m_per_s2
+        True gravity against local_gravity_m_per_s2 in unit.toml, one draw a seed.
+    thermometer_offset_sd_degc
+        What the thermometer shows too much, one draw a seed.
+    """
+
+    squareness_sd_arcsec: float = setting(number(0.0, 36000.0), 0.0, "arcsec")
+    repeatability_sd_arcsec: float = setting(number(0.0, 36000.0), 0.0, "arcsec")
+    level_sd_arcsec: float = setting(number(0.0, 36000.0), 0.0, "arcsec")
+    gravity_sd_m_per_s2: float = setting(number(0.0, 0.1), 0.0, "m/s^2")
+    thermometer_offset_sd_degc: float = setting(number(0.0, 10.0), 0.0, "degC")
 
 
 @dataclass(frozen=True)
 class Spread:
-    """[series]: how the units of a series differ; standard deviations."""
+    """[series]: how the units of a series differ; standard deviations.
 
-    scale_sd_ratio: float = key(number(0.0, 0.1), "Of Kxx, Kyy, Kzz, relative.", example="0.01")
-    cross_axis_sd_v_per_g: float = key(
-        number(0.0, 1.0), "Of the other entries of K.", unit="V/g", example="0.001"
-    )
-    bias_sd_v: float = key(number(0.0, 1.0), "Of U0.", unit="V", example="0.001")
-    temperature_sd_ratio: float = key(
-        number(0.0, 1.0), "Of each coefficient of dT, dT^2, dT^3, relative.", example="0.1"
-    )
-    units_per_run: int = key(whole(1, 9999), "Units measured on one day.", example="8")
-    runs_between_moves: int = key(
-        whole(1, 9999),
-        "Days after which the rig is another: its tilts and its gravity are drawn anew.",
-        example="5",
-    )
+    Attributes
+    ----------
+    scale_sd_ratio
+        Of Kxx, Kyy, Kzz, relative.
+    cross_axis_sd_v_per_g
+        Of the other entries of K.
+    bias_sd_v
+        Of U0.
+    temperature_sd_ratio
+        Of each coefficient of dT, dT^2, dT^3, relative.
+    units_per_run
+        Units measured on one day.
+    runs_between_moves
+        Days after which the rig is another: its tilts and its gravity are drawn anew.
+    """
+
+    scale_sd_ratio: float = setting(number(0.0, 0.1), example="0.01")
+    cross_axis_sd_v_per_g: float = setting(number(0.0, 1.0), unit="V/g", example="0.001")
+    bias_sd_v: float = setting(number(0.0, 1.0), unit="V", example="0.001")
+    temperature_sd_ratio: float = setting(number(0.0, 1.0), example="0.1")
+    units_per_run: int = setting(whole(1, 9999), example="8")
+    runs_between_moves: int = setting(whole(1, 9999), example="5")
 
 
 @dataclass(frozen=True)
@@ -84,21 +87,18 @@ class Truth:
         [noise] of truth.toml.
     imperfections : Imperfections
         Of the rig; none by default.
+    reading_sd_v
+        Noise of one reading of an axis.
+    thermometer_sd_degc
+        Noise of one reading of the thermometer.
+    dwell_temp_sd_degc
+        Spread of the dwells' true temperatures about the nominal ones.
     """
 
     constants: ThermalModel
-    reading_sd_v: float = key(
-        number(0.0, 1.0), "Noise of one reading of an axis.", unit="V", example="1e-5"
-    )
-    thermometer_sd_degc: float = key(
-        number(0.0, 10.0), "Noise of one reading of the thermometer.", unit="degC", example="0.01"
-    )
-    dwell_temp_sd_degc: float = key(
-        number(0.0, 10.0),
-        "Spread of the dwells' true temperatures about the nominal ones.",
-        unit="degC",
-        example="0.05",
-    )
+    reading_sd_v: float = setting(number(0.0, 1.0), unit="V", example="1e-5")
+    thermometer_sd_degc: float = setting(number(0.0, 10.0), unit="degC", example="0.01")
+    dwell_temp_sd_degc: float = setting(number(0.0, 10.0), unit="degC", example="0.05")
     imperfections: Imperfections = Imperfections()
 
     def voltage_v(self, force_g: FloatArray, temp_degc: FloatArray | float) -> FloatArray:
@@ -115,29 +115,32 @@ class Truth:
 
 @dataclass(frozen=True)
 class Plan:
-    """[plan]: what is measured, each test position and check position at its temperatures."""
+    """[plan]: what is measured, each test position and check position at its temperatures.
 
-    seed: int = key(SEED, "Seed of all noise; `--seed` replaces it.", example="1")
+    Attributes
+    ----------
+    seed
+        Seed of all noise; `--seed` replaces it.
+    readings_per_dwell
+        Readings in each mean.
+    temperatures_degc
+        Nominal temperatures of TP1 to TP6.
+    check_temperatures_degc
+        Nominal temperatures of CP1 to CP6.
+    rig_seed
+        Seed of the rig; units with the same one are measured on the same rig.
+    """
+
+    seed: int = setting(SEED, example="1")
     # Two readings at least: a standard deviation of one has no meaning.
-    readings_per_dwell: int = key(whole(2, 10**6), "Readings in each mean.", example="1000")
-    temperatures_degc: tuple[float, ...] = key(
-        rising(*PLAUSIBLE_DEGC, 0, 64),
-        "Nominal temperatures of TP1 to TP6.",
-        unit="degC",
-        example="[-40, -10, 20, 50, 85]",
+    readings_per_dwell: int = setting(whole(2, 10**6), example="1000")
+    temperatures_degc: tuple[float, ...] = setting(
+        rising(*PLAUSIBLE_DEGC, 0, 64), unit="degC", example="[-40, -10, 20, 50, 85]"
     )
-    check_temperatures_degc: tuple[float, ...] = key(
-        rising(*PLAUSIBLE_DEGC, 0, 64),
-        "Nominal temperatures of CP1 to CP6.",
-        unit="degC",
-        example="[20]",
+    check_temperatures_degc: tuple[float, ...] = setting(
+        rising(*PLAUSIBLE_DEGC, 0, 64), unit="degC", example="[20]"
     )
-    rig_seed: int | None = key(
-        SEED,
-        "Seed of the rig; units with the same one are measured on the same rig.",
-        None,
-        default_words="a rig of its own",
-    )
+    rig_seed: int | None = setting(SEED, None, words="a rig of its own")
 
 
 T0 = Key("t0_degc", number(*PLAUSIBLE_DEGC), "Where dT = 0.", unit="degC", example="20")
@@ -161,18 +164,9 @@ TRUTH = FileKeys(
         TableKeys("", "", (FORMAT,)),
         TableKeys("curves", "The constants over temperature.", (T0, *CURVES)),
         TableKeys("noise", "Noise of the readings.", keys_of(Truth)),
-        TableKeys("plan", "What is measured.", keys_of(Plan)),
-        TableKeys(
-            "imperfections",
-            "What is wrong with the rig, as standard deviations.",
-            keys_of(Imperfections),
-        ),
-        TableKeys(
-            "series",
-            "How units of a series differ (`triaxcal simulate UNIT --series N --into FOLDER`).",
-            keys_of(Spread),
-            optional=True,
-        ),
+        TableKeys.of("plan", Plan),
+        TableKeys.of("imperfections", Imperfections),
+        TableKeys.of("series", Spread, optional=True),
     ),
 )
 

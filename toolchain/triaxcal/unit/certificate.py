@@ -5,26 +5,45 @@ from __future__ import annotations
 import datetime
 from dataclasses import dataclass
 
-from triaxcal.base.keys import TableKeys, Values, key, keys_of
+from triaxcal.base.keys import TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import DATE, line, pattern
 
 
 @dataclass(frozen=True)
 class CertificateDetails:
-    """Administrative data of a certificate."""
+    """Administrative data of a certificate.
 
-    identifier: str = key(line(), "The certificate's own number.", example='"CAL-2026-001"')
-    laboratory: str = key(line(), "Who calibrated.", example='"Inertial laboratory"')
-    city: str = key(line(), "City of the laboratory.", example='"Kyiv"')
-    country: str = key(
-        pattern("[A-Z]{2}", 'two capitals of ISO 3166-1, as "UA"', '"UA"'),
-        "Country of the laboratory.",
-    )
-    customer: str = key(line(), "For whom.", example='"Customer"')
-    signer: str = key(line(), "Who is responsible for the certificate.", example='"A. Person"')
-    manufacturer: str = key(line(), "Who made the unit.", example='"Manufacturer"')
-    begin: datetime.date = key(DATE, "First day of the measurements.", example="2026-03-30")
-    end: datetime.date = key(DATE, "Last day of the measurements.", example="2026-03-31")
+    Attributes
+    ----------
+    identifier
+        The certificate's own number.
+    laboratory
+        Who calibrated.
+    city
+        City of the laboratory.
+    country
+        Country of the laboratory.
+    customer
+        For whom.
+    signer
+        Who is responsible for the certificate.
+    manufacturer
+        Who made the unit.
+    begin
+        First day of the measurements.
+    end
+        Last day of the measurements.
+    """
+
+    identifier: str = setting(line(), example='"CAL-2026-001"')
+    laboratory: str = setting(line(), example='"Inertial laboratory"')
+    city: str = setting(line(), example='"Kyiv"')
+    country: str = setting(pattern("[A-Z]{2}", 'two capitals of ISO 3166-1, as "UA"', '"UA"'))
+    customer: str = setting(line(), example='"Customer"')
+    signer: str = setting(line(), example='"A. Person"')
+    manufacturer: str = setting(line(), example='"Manufacturer"')
+    begin: datetime.date = setting(DATE, example="2026-03-30")
+    end: datetime.date = setting(DATE, example="2026-03-31")
 
 
 CERTIFICATE = TableKeys(

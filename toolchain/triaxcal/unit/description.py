@@ -10,7 +10,7 @@ from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import FORMAT as FORMAT_KEY
-from triaxcal.base.keys import FileKeys, Key, TableKeys, Values, key, keys_of
+from triaxcal.base.keys import FileKeys, Key, TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import (
     TEXT,
     Kind,
@@ -116,16 +116,19 @@ ADC = TableKeys("adc", "What the raw codes are.", (BITS, FULL_SCALE, CODE_MIN, C
 
 @dataclass(frozen=True)
 class TemperatureSensor:
-    """How a temperature code stands for a temperature: T = code * degc_per_code + degc_at_zero."""
+    """How a temperature code stands for a temperature: T = code * degc_per_code + degc_at_zero.
 
-    degc_per_code: float = key(
-        number(1e-6, 10.0),
-        "T = code * degc_per_code + degc_at_zero; at most 131 072 codes in the working range, "
-        "each of which is proved and tested.",
-        unit="degC",
-        example="0.0078125",
-    )
-    degc_at_zero: float = key(number(-1e4, 1e4), "Temperature of the code 0.", 0.0, "degC")
+    Attributes
+    ----------
+    degc_per_code
+        T = code * degc_per_code + degc_at_zero; at most 131 072 codes in the working range,
+        each of which is proved and tested.
+    degc_at_zero
+        Temperature of the code 0.
+    """
+
+    degc_per_code: float = setting(number(1e-6, 10.0), unit="degC", example="0.0078125")
+    degc_at_zero: float = setting(number(-1e4, 1e4), 0.0, "degC")
 
     def degc(self, code: float) -> float:
         """Temperature of a code."""
@@ -178,12 +181,18 @@ def near_t0(temp_degc: float, t0_degc: float) -> bool:
 
 @dataclass(frozen=True)
 class Limits:
-    """Largest | |a| - g | accepted after compensation, P1 (13), in g."""
+    """Largest | |a| - g | accepted after compensation, P1 (13), in g.
 
-    at_t0_g: float = key(
-        number(1e-9, 1.0), "Largest | |a| - g | that is accepted at T0, P1 (13).", 3e-4, "g"
-    )
-    over_range_g: float = key(number(1e-9, 1.0), "The same over the working range.", 10e-4, "g")
+    Attributes
+    ----------
+    at_t0_g
+        Largest | |a| - g | that is accepted at T0, P1 (13).
+    over_range_g
+        The same over the working range.
+    """
+
+    at_t0_g: float = setting(number(1e-9, 1.0), 3e-4, "g")
+    over_range_g: float = setting(number(1e-9, 1.0), 10e-4, "g")
 
     def at(self, temp_degc: float, t0_degc: float) -> tuple[float, str]:
         """Limit at a temperature, g, and its key."""
@@ -194,45 +203,35 @@ class Limits:
 
 @dataclass(frozen=True)
 class StatedUncertainty:
-    """[uncertainty]: standard uncertainties that the user knows; None where none is stated."""
+    """[uncertainty]: standard uncertainties that the user knows; None where none is stated.
 
-    squareness_arcsec: float | None = key(
-        number(0.0, 36000.0),
-        "Of each test position's tilt about each axis, the same at all temperatures.",
-        None,
-        "arcsec",
-        default_words="from the residuals",
+    Attributes
+    ----------
+    squareness_arcsec
+        Of each test position's tilt about each axis, the same at all temperatures.
+    repeatability_arcsec
+        Of the tilt of each single dwell about each axis.
+    level_arcsec
+        Of the tilter as a whole against the unit's axes, about each axis.
+    gravity_m_per_s2
+        Of local gravity.
+    thermometer_degc
+        Of the unit's thermometer, the same at calibration and in use.
+    thermometer_drift_degc
+        Of the thermometer's change between calibration and use.
+    """
+
+    squareness_arcsec: float | None = setting(
+        number(0.0, 36000.0), None, "arcsec", words="from the residuals"
     )
-    repeatability_arcsec: float | None = key(
-        number(0.0, 36000.0),
-        "Of the tilt of each single dwell about each axis.",
-        None,
-        "arcsec",
-        default_words="from the residuals",
+    repeatability_arcsec: float | None = setting(
+        number(0.0, 36000.0), None, "arcsec", words="from the residuals"
     )
-    level_arcsec: float | None = key(
-        number(0.0, 36000.0),
-        "Of the tilter as a whole against the unit's axes, about each axis.",
-        None,
-        "arcsec",
-        default_words="20, assumed",
-    )
-    gravity_m_per_s2: float | None = key(
-        number(0.0, 0.1), "Of local gravity.", None, "m/s^2", default_words="5e-5, assumed"
-    )
-    thermometer_degc: float | None = key(
-        number(0.0, 10.0),
-        "Of the unit's thermometer, the same at calibration and in use.",
-        None,
-        "degC",
-        default_words="0.1, assumed",
-    )
-    thermometer_drift_degc: float | None = key(
-        number(0.0, 10.0),
-        "Of the thermometer's change between calibration and use.",
-        None,
-        "degC",
-        default_words="0.02, assumed",
+    level_arcsec: float | None = setting(number(0.0, 36000.0), None, "arcsec", words="20, assumed")
+    gravity_m_per_s2: float | None = setting(number(0.0, 0.1), None, "m/s^2", words="5e-5, assumed")
+    thermometer_degc: float | None = setting(number(0.0, 10.0), None, "degC", words="0.1, assumed")
+    thermometer_drift_degc: float | None = setting(
+        number(0.0, 10.0), None, "degC", words="0.02, assumed"
     )
 
 
@@ -246,17 +245,22 @@ def _axis_pair(value: object) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class PairSource:
-    """[quadratic]: readings of a pair on a dividing head, and the unit's axes that A and B are."""
+    """[quadratic]: readings of a pair on a dividing head, and the unit's axes that A and B are.
+
+    Attributes
+    ----------
+    axes
+        The unit's axes that A and B are.
+    """
 
     file: str
-    axes: tuple[int, int] = key(
+    axes: tuple[int, int] = setting(
         Kind(
             'the axes that A and B are, as ["x", "y"]',
             _axis_pair,
             {"type": "array", "items": {"enum": list(AXES)}, "minItems": 2, "maxItems": 2},
             example='["x", "y"]',
-        ),
-        "The unit's axes that A and B are.",
+        )
     )
 
 
@@ -273,32 +277,41 @@ LIMITS = TableKeys("limits", "What is accepted.", keys_of(Limits))
 
 @dataclass(frozen=True)
 class _Fit:
-    """[fit]."""
+    """[fit].
 
-    estimator: str = key(
-        word(("auto", *ESTIMATORS)),
-        "How K and U0 come from six positions: P1 (10); least squares; (10) with the bias from an "
-        "axis' own two positions.",
-        "auto",
-    )
-    terms: str = key(word(TERMS), "Of a recording: which candidates are tried.", "auto")
-    loss: str = key(
-        word(LOSSES), "Of a recording: how far a pose that stands out may pull.", "linear"
-    )
+    Attributes
+    ----------
+    estimator
+        How K and U0 come from six positions: P1 (10); least squares; (10) with the bias from an
+        axis' own two positions.
+    terms
+        Of a recording: which candidates are tried.
+    loss
+        Of a recording: how far a pose that stands out may pull.
+    """
+
+    estimator: str = setting(word(("auto", *ESTIMATORS)), "auto")
+    terms: str = setting(word(TERMS), "auto")
+    loss: str = setting(word(LOSSES), "linear")
 
 
 @dataclass(frozen=True)
 class _Compensation:
-    """[compensation]."""
+    """[compensation].
 
-    method: str = key(TEXT, "What the firmware evaluates.", METHODS.names[0])
-    output_q: int = key(whole(*OUTPUT_Q_RANGE), "The LSB of the result is 2^-output_q g.", 24)
-    model_error_max_micro_g: float = key(
-        number(1e-3, 1e6),
-        "How far the firmware's functions may be from the fitted model.",
-        1.0,
-        "micro-g",
-    )
+    Attributes
+    ----------
+    method
+        What the firmware evaluates.
+    output_q
+        The LSB of the result is 2^-output_q g.
+    model_error_max_micro_g
+        How far the firmware's functions may be from the fitted model.
+    """
+
+    method: str = setting(TEXT, METHODS.names[0])
+    output_q: int = setting(whole(*OUTPUT_Q_RANGE), 24)
+    model_error_max_micro_g: float = setting(number(1e-3, 1e6), 1.0, "micro-g")
 
 
 POLARITY = Key(

@@ -5,20 +5,24 @@ from __future__ import annotations
 import datetime
 from dataclasses import dataclass
 
-from triaxcal.base.keys import TableKeys, key, keys_of
+from triaxcal.base.keys import TableKeys, keys_of, setting
 from triaxcal.base.kinds import DATE, line
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Rig and day of the measurements; None where the file does not say."""
+    """Rig and day of the measurements; None where the file does not say.
 
-    rig: str | None = key(
-        line(64), "Name of the rig; a series compares its runs.", None, example='"tilter 3"'
-    )
-    date: datetime.date | None = key(
-        DATE, "Day of the measurements, without quotes.", None, example="2026-03-30"
-    )
+    Attributes
+    ----------
+    rig
+        Name of the rig; a series compares its runs.
+    date
+        Day of the measurements, without quotes.
+    """
+
+    rig: str | None = setting(line(64), None, example='"tilter 3"')
+    date: datetime.date | None = setting(DATE, None, example="2026-03-30")
 
     @property
     def run(self) -> str | None:
