@@ -67,8 +67,9 @@ types: $(DEVELOPER)
 nightly: $(DEVELOPER)  ## The slow campaigns as well
 	@$(PYTEST)
 
-golden: $(DEVELOPER)  ## Write the golden files anew; look at the difference before committing it
+golden: $(DEVELOPER)  ## Write golden files and generated tables; look at the difference before committing
 	@$(BIN)/pytest -q tests/test_golden.py --update-golden
+	@$(BIN)/python docs/_ext/generated.py
 
 docs: $(WRITER)  ## The documentation as a site: docs/_build/html/index.html
 	@$(BIN)/python -m sphinx -q -W --keep-going -E -b html docs docs/_build/html
@@ -109,7 +110,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 $(DEVELOPER): $(INSTALLED)
 	@echo "adding the developers' tools to $(VENV) (once) ..."
-	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[dev,rig,series]'
+	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[dev,rig,series,plot]'
 	@touch $@
 
 $(WRITER): $(INSTALLED)

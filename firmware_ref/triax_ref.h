@@ -1,7 +1,7 @@
 /*
  * triax_ref.h - reference of the compensation arithmetic, for any shape.
  *
- * Written by hand from docs/fixed-point.md, not from the templates: one plain function a step,
+ * Written by hand from docs/explanation/fixed-point.md, not from the templates: one plain function a step,
  * floors without a signed shift, every parameter read from the image. It is what the generated
  * routine is compared with, not what a unit runs.
  */

@@ -1,4 +1,4 @@
-"""The routine of docs/fixed-point.md, written from that page alone in unbounded integers.
+"""The routine of fixed-point.md, written from that page alone in unbounded integers.
 
 Slow and obvious, and independent: nothing of triaxcal.fixedpoint is called, only a plan's fields
 are read. Floors are floors of Fractions; int32 is a matter of `sat32` where the page says so, and

@@ -1,8 +1,8 @@
 """Plans shared by the tests: exact integers chosen here, never fitted, the same on every machine.
 
-`integer_plan` builds any shape that docs/fixed-point.md allows from integers alone; `COVERING`
-names a set of shapes that touches every branch of the templates; `GOLDEN` are the plans behind
-tests/golden/.
+`integer_plan` builds any shape that docs/explanation/fixed-point.md allows from integers alone;
+`COVERING` names a set of shapes that touches every branch of the templates; `GOLDEN` are the plans
+behind tests/golden/.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def with_quadratic(plan: Plan, rows: Sequence[Sequence[int]], rounded_by: float 
 
 
 def real_of(shape: Shape, rows: Coefficients, rounded_by: float = 0.0) -> list[list[float]]:
-    """What integers stand for (docs/fixed-point.md, step H): halves and preloads taken off."""
+    """What integers stand for (fixed-point.md, step H): halves and preloads taken off."""
     result = []
     for f, row in enumerate(rows):
         preload = shape.rounding_in_offset if f % 4 == 3 and shape.inverse is None else 0

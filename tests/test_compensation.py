@@ -88,7 +88,7 @@ def printed_sign(method: str, voltage_v: FloatArray, temp_degc: float) -> FloatA
     return uncorrected(voltage_v) - delta
 
 
-# Largest error of any axis over all orientations, mg, as docs/theory.md prints it: at -40, +70.
+# Largest error of any axis over all orientations, mg, as theory.md prints it: at -40, +70.
 METHOD_2 = {
     "uncorrected": ("14.2", "5.2"),
     "printed sign of (5), (6)": ("28.5", "10.5"),

@@ -174,7 +174,7 @@ def test_residuals_of_13_before_and_after(methods: dict[str, Delivery]) -> None:
             assert max(after) <= 3 * 0.1e-6
 
 
-# Largest component of the error over all orientations, mg: docs/theory.md.
+# Largest component of the error over all orientations, mg: docs/explanation/theory.md.
 METHOD_2_MG = {
     "additive": {-40.0: 0.059, 70.0: 0.114},
     "additive-first-order": {-40.0: 0.023, 70.0: 0.010},

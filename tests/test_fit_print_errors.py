@@ -1,4 +1,4 @@
-"""What docs/theory.md says about errors in the print of P1, measured on its own tables."""
+"""What theory.md says about errors in the print of P1, measured on its own tables."""
 
 from __future__ import annotations
 

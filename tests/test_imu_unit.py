@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.blocks.registry import EXTENSIONS
-from triaxcal.dynamic.description import imu_file, read_dynamic
+from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.reading import read_recording
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
@@ -106,25 +105,6 @@ def test_too_short_a_recording_is_refused(unit: Path) -> None:
         "motion of a simulated IMU: 0.6 min an axis, 30 s of it at rest; expected time for at "
         "least three moves"
     )
-
-
-def test_the_docs_name_every_key_of_an_imu_with_its_table() -> None:
-    text = (REPO / "docs/reference/keys.md").read_text(encoding="utf-8")
-    section = text.split("## unit.toml of an IMU")[1].split("\n## ")[0]
-    table, documented = "", set()
-    for line in section.splitlines():
-        cells = [cell.strip() for cell in line.split("|")]
-        if len(cells) > 2 and cells[2].startswith("`"):
-            table = cells[1].strip("`[]") or table
-            documented.add((table, cells[2].strip("`")))
-    assert documented == {(t.name, k.name) for t in imu_file().tables for k in t.keys}
-
-
-def test_the_docs_name_every_extension() -> None:
-    text = (REPO / "docs/how-to/imu.md").read_text(encoding="utf-8")
-    rows = [line.split("|")[1] for line in text.splitlines() if line.count("|") == 4]
-    named = {name.strip() for row in rows for name in row.split(",")}
-    assert set(EXTENSIONS.names) <= named, set(EXTENSIONS.names) - named
 
 
 def test_the_example_of_the_docs_is_read(tmp_path: Path) -> None:

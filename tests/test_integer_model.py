@@ -1,4 +1,4 @@
-"""The integer model and the reference C against an oracle written from docs/fixed-point.md."""
+"""The integer model and the reference C against an oracle written from fixed-point.md."""
 
 from __future__ import annotations
 

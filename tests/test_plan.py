@@ -1,4 +1,4 @@
-"""The plan: codes, segments, formats and rounding, against what docs/fixed-point.md says."""
+"""The plan: codes, segments, formats and rounding, against what fixed-point.md says."""
 
 from __future__ import annotations
 

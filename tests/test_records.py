@@ -303,7 +303,7 @@ HEADERS = [
 @pytest.mark.parametrize(("header", "expected"), HEADERS)
 def test_a_wrong_header_is_refused(tmp_path: Path, header: str, expected: str) -> None:
     message = refusal(tmp_path, f"# comment\n{header}\nTP1,20,0.5,0,0\n")
-    assert message.removesuffix("; columns: see docs/file-formats.md") == (
+    assert message.removesuffix("; columns: see docs/reference/file-formats.md") == (
         f", row 2 (header): {expected}"
     )
 
@@ -355,7 +355,7 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
         read_measurements(tmp_path / "measurements.csv", UNIT)
     assert str(caught.value) == (
         f"{tmp_path}/measurements.csv: cannot be read: no such file or directory; "
-        "put the dwells there, as docs/add-a-unit.md tells"
+        "put the dwells there, as docs/how-to/add-a-unit.md tells"
     )
     with pytest.raises(RefusedError, match="cannot be read: is a directory"):
         read_measurements(tmp_path, UNIT)

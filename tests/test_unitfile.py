@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 
 from strategies import unit_names
 from triaxcal.base.errors import RefusedError
-from triaxcal.model.methods.registry import METHODS
-from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
 from triaxcal.unit.description import (
     Adc,
     Limits,
@@ -23,8 +21,6 @@ from triaxcal.unit.description import (
     find_unit,
     list_units,
     read_unit,
-    recording_file,
-    tilter_file,
 )
 
 REPO = Path(__file__).parent.parent
@@ -479,23 +475,7 @@ def test_a_copied_unit_is_told_by_its_serial(tmp_path: Path) -> None:
         read_unit(tmp_path / "AT-NEW")
 
 
-# ---- docs/file-formats.md ----
-
-
-def test_the_docs_name_every_key_with_its_table() -> None:
-    text = (REPO / "docs/reference/keys.md").read_text(encoding="utf-8")
-    section = text.split("## unit.toml")[1].split("## measurements.csv")[0]
-    table = ""
-    documented = set()
-    for line in section.split("Every key;")[1].split("Methods:")[0].splitlines():
-        cells = [cell.strip() for cell in line.split("|")]
-        if len(cells) > 2 and cells[2].startswith("`"):
-            table = cells[1].strip("`[]") or table
-            documented.add((table, cells[2].strip("`")))
-    tables = (*tilter_file().tables, *recording_file().tables)
-    assert documented == {(table.name, key.name) for table in tables for key in table.keys}
-    assert all(f'`"{method}"`' in section for method in METHODS.names)
-    assert all(f'`"{function}"`' in section for function in THERMAL_FUNCTIONS.names)
+# ---- docs/reference/keys.md ----
 
 
 def test_the_example_of_the_docs_is_read(tmp_path: Path) -> None:

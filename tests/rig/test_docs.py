@@ -1,28 +1,24 @@
-"""docs/how-to/bench.md lists every setting with its default, every command and every fault."""
+"""docs/how-to/bench.md has a plan that is read, every command and every fault."""
 
 from __future__ import annotations
 
-import re
-from dataclasses import fields
-
-import pytest
 from click import Group
 from rig_cases import REPO
 
 from triaxcal.cli.rig import rig
 from triaxcal.rig.dbc import REQUIRED
-from triaxcal.rig.plan import Stillness, Thermal
+from triaxcal.rig.plan import read_plan
 from triaxcal.rig.simorders import KINDS
+from triaxcal.unit.description import read_unit
 
 PAGE = (REPO / "docs/how-to/bench.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("settings", [Stillness(), Thermal()])
-def test_every_setting_is_listed_with_its_default(settings):
-    for field in fields(settings):
-        line = re.search(rf"\| `{field.name}` \| ([0-9.]+) \|", PAGE)
-        assert line is not None, field.name
-        assert float(line[1]) == getattr(settings, field.name), field.name
+def test_the_plan_of_the_page_is_read(tmp_path):
+    path = tmp_path / "plan.toml"
+    path.write_text(PAGE.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    plan = read_plan(path, read_unit(REPO / "units/AT-SIM-BENCH"))
+    assert [step.temp_degc for step in plan.steps] == [-40, -10, 20, 45, 70]
 
 
 def test_every_command_is_named():

@@ -50,7 +50,7 @@ def test_no_interval_is_no_bound() -> None:
 
 
 def test_a_floor_of_a_floor_is_the_floor() -> None:
-    """What the script takes from docs/fixed-point.md, step A: checked whole for small words."""
+    """What the script takes from fixed-point.md, step A: checked whole for small words."""
     for s, b, spare in itertools.product(range(-70, 70), range(-9, 9), range(4)):
         twice = (s // 16 + b) // 2**spare
         assert twice == (Fraction(s, 16) + b) // 2**spare

@@ -94,7 +94,7 @@ def test_a_unit_without_c_is_refused(unit: Path, tmp_path: Path) -> None:
     assert str(done.exception) == (
         f"{other / 'unit.toml'}: has no [device], and so the unit gets no C; expected [device] "
         "with accel_bits, accel_full_scale_g, gyro_bits, gyro_full_scale_deg_per_s, "
-        "degc_per_code, range_degc; add it: docs/dynamic.md"
+        "degc_per_code, range_degc; add it: docs/how-to/imu.md"
     )
     assert not (tmp_path / "build").exists()
 

@@ -76,15 +76,15 @@ class Firmware:
         temp_codes : array_like of whole numbers, shape () or (n,)
             Codes of the thermometer, any int32.
         rate_codes : array_like of whole numbers, shape () or (n,), or None
-            dT/dt in 2^-RATE_Q codes of the thermometer per second (docs/c-api.md). None is zero; a
-            routine without a term in dT/dt does not look at it.
+            dT/dt in 2^-RATE_Q codes of the thermometer per second (docs/reference/c-api.md). None
+            is zero; a routine without a term in dT/dt does not look at it.
 
         Returns
         -------
         accel : array of int32, shape (n, 3)
             In `lsb_g`.
         status : array of uint32, shape (n,)
-            Bits of docs/c-api.md; 0 is good.
+            Bits of docs/reference/c-api.md; 0 is good.
 
         Raises
         ------

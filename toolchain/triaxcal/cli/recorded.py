@@ -37,7 +37,7 @@ def recorded(folder: Path) -> tuple[RecordingLayout, Samples]:
             f"{folder}/unit.toml",
             "no table [recording]",
             expected="a unit whose readings are a recording",
-            remedy="see docs/recordings.md",
+            remedy="see docs/how-to/recordings.md",
         )
     return unit.recording, read_samples(folder, unit.recording, unit.temperature_sensor)
 

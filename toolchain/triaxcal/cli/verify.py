@@ -25,7 +25,7 @@ def verify(unit: Path, build: Path) -> None:
 
     run = _verify_imu if has_table(find_unit(unit), "dynamic") else _verify_accelerometer
     target, code = run(unit, build)
-    say(f"\nresults in {target / 'verification.json'}; what they mean: docs/verification.md")
+    say(f"\nresults in {target / 'verification.json'}; see docs/explanation/verification.md")
     sys.exit(code)
 
 

@@ -1,8 +1,8 @@
 """Images that the loader must accept or refuse, at and just beyond every limit of step R.
 
-What is accepted is decided here from docs/fixed-point.md, step R, in Python's unbounded integers,
-not by the code that plans or proves. Accepted images, however wild their constants, must give the
-same answers in the generated C and in the reference C.
+What is accepted is decided here from docs/explanation/fixed-point.md, step R, in Python's
+unbounded integers, not by the code that plans or proves. Accepted images, however wild their
+constants, must give the same answers in the generated C and in the reference C.
 """
 
 from __future__ import annotations

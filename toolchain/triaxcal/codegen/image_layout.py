@@ -1,7 +1,7 @@
 """Where the words of an image stand, and what the loader must accept: step R.
 
-Decided from docs/fixed-point.md in Python's unbounded integers, not by the code that plans or
-proves.
+Decided from docs/explanation/fixed-point.md in Python's unbounded integers, not by the code that
+plans or proves.
 """
 
 from __future__ import annotations

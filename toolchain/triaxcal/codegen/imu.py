@@ -127,7 +127,7 @@ def render_imu(
 def rate_bound(gyro: Plan, own: Bound, accel: Bound) -> tuple[float, float, float]:
     """Bound of each rate, LSB, when the specific force is off by the accelerometer's bound.
 
-    It was in the sum with the weight of the g-sensitivity's words: docs/fixed-point.md, step G.
+    It was in the sum with the weight of the g-sensitivity's words: fixed-point.md, step G.
     """
     assert gyro.sensitivity is not None
     weight = np.abs(gyro.sensitivity) * 2.0**-gyro.shape.output_shift

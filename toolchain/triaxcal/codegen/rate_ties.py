@@ -1,7 +1,7 @@
 """Images in which the rounding of dT/dt decides a result.
 
-Step D (docs/fixed-point.md) rounds r w / 2^32 half up. Planned words and the vectors' rates meet
-that border nowhere, so that a half that is one off would not be seen.
+Step D (docs/explanation/fixed-point.md) rounds r w / 2^32 half up. Planned words and the vectors'
+rates meet that border nowhere, so that a half that is one off would not be seen.
 """
 
 from __future__ import annotations

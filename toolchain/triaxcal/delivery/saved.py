@@ -77,7 +77,7 @@ class Saved:
 
 
 def calibration_json(fitted: Fitted) -> bytes:
-    """Constants, curves, covariance and provenance; docs/file-formats.md has the layout."""
+    """Constants, curves, covariance and provenance; file-formats.md has the layout."""
     calibration = fitted.calibration
     curves = calibration.thermal.curves
     document = {

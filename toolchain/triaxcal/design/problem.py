@@ -192,8 +192,8 @@ def read_problem(path: Path) -> Problem:
     Raises
     ------
     RefusedError
-        When the file breaks a rule of docs/design.md, or the candidates cannot determine the
-        constants; says which they leave open.
+        When the file breaks a rule of docs/reference/keys.md, or the candidates cannot determine
+        the constants; says which they leave open.
     """
     tables = PROBLEM.read(path)
     noise, rig = tables["noise"].record(_Noise), tables["rig"].record(_Rig)

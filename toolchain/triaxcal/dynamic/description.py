@@ -252,7 +252,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
     Raises
     ------
     RefusedError
-        When there is no such unit or its file breaks a rule of docs/file-formats.md.
+        When there is no such unit or its file breaks a rule of docs/reference/keys.md.
     """
     path = find_unit(folder)
     if not has_table(path, "dynamic"):
@@ -260,7 +260,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
             str(path),
             "no table [dynamic]",
             expected="a whole IMU on a turntable",
-            remedy=f"`triaxcal calib {folder}` calibrates this unit; see docs/dynamic.md",
+            remedy=f"`triaxcal calib {folder}` calibrates this unit; see docs/how-to/imu.md",
         )
     tables = imu_file().read(path)
     dynamic, site = tables["dynamic"], tables["site"]

@@ -1,6 +1,6 @@
 """A gyro triad in integers: the accelerometer's arithmetic, and a g-sensitivity, step G.
 
-Source: docs/fixed-point.md, step G; P2 (2), (13).
+Source: docs/explanation/fixed-point.md, step G; P2 (2), (13).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """K(T) inverted in integers: adjugate, one division, nine products.
 
-Source: docs/fixed-point.md, step I.
+Source: docs/explanation/fixed-point.md, step I.
 """
 
 from __future__ import annotations

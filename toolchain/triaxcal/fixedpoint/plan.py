@@ -1,7 +1,7 @@
 """The plan: formats, shifts and coefficients that turn the float model into integers.
 
 What the routine computes, for the raw codes u shifted left to fill int32 and x the temperature
-normalised to Q31 on its segment (docs/fixed-point.md has the derivation):
+normalised to Q31 on its segment (docs/explanation/fixed-point.md has the derivation):
 
     p_k = c_k + floor(x p_(k+1) / 2^32)      Horner from p_order = c_order down to p_0
     a_i = (sum_j n_ij u_j + b_i 2^32) >> output_shift       LSB 2^-output_q g

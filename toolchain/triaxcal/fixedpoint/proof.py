@@ -6,7 +6,7 @@ largest distance from the exact value over the raw box is that of a corner:
 
     error_i <= (sum_j |n_ij - n_ij exact| u_max / 2^32 + |b_i - b_i exact|) / 2^spare + 1/2.
 
-Every code of the working range is visited. docs/fixed-point.md, step E.
+Every code of the working range is visited. docs/explanation/fixed-point.md, step E.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Proof of range and error of the terms beyond the linear; docs/fixed-point.md, steps R and E."""
+"""Proof of range and error of the terms beyond the linear; fixed-point.md, steps R and E."""
 
 from __future__ import annotations
 

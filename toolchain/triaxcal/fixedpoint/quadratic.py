@@ -1,6 +1,6 @@
 """Quadratic terms in integers: their format, and the sum that step Q adds to the linear one.
 
-Source: docs/fixed-point.md, step Q.
+Source: docs/explanation/fixed-point.md, step Q.
 """
 
 from __future__ import annotations

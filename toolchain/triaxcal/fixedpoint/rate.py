@@ -1,6 +1,6 @@
 """The term in dT/dt in integers, step D: an offset for the rate that the caller gives.
 
-Source: docs/fixed-point.md, step D.
+Source: docs/explanation/fixed-point.md, step D.
 """
 
 from __future__ import annotations

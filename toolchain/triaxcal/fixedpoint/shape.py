@@ -8,7 +8,7 @@ from triaxcal.fixedpoint.inversion import InverseShifts
 
 ROW_LIMIT = 2**32 - 8
 """|n_i0| + |n_i1| + |n_i2| + 2 |b_i| stays below this: the 64-bit sum and its high word plus b
-cannot overflow for any int32 raw codes (docs/fixed-point.md, step R)."""
+cannot overflow for any int32 raw codes (docs/explanation/fixed-point.md, step R)."""
 
 ROW_LIMIT_WITH_TERMS = 3 * 2**30
 """The same where quadratic terms or a g-sensitivity need room beside the row."""

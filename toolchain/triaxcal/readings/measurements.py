@@ -91,7 +91,7 @@ def read_measurements(path: Path, unit: UnitDescription) -> MeasurementSet:
     Raises
     ------
     RefusedError
-        When the file breaks a rule of docs/file-formats.md; names row and column.
+        When the file breaks a rule of docs/reference/file-formats.md; names row and column.
     """
     return _measurements(str(path), *read_rows(path), unit)
 

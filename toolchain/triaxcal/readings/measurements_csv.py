@@ -182,7 +182,7 @@ def _text(path: Path) -> str:
         raise RefusedError(
             str(path),
             f"cannot be read: {reason}",
-            remedy="put the dwells there, as docs/add-a-unit.md tells",
+            remedy="put the dwells there, as docs/how-to/add-a-unit.md tells",
         ) from error
     try:
         return data.decode("utf-8-sig")
@@ -252,7 +252,9 @@ def _header(where: str, columns: tuple[str, ...]) -> Header:
                 (shown(c) if c else "an empty name") + did_you_mean(c, _KNOWN) for c in unknown
             ]
             parts.append("unknown column: " + ", ".join(hints))
-        raise RefusedError(where, "; ".join(parts), remedy="columns: see docs/file-formats.md")
+        raise RefusedError(
+            where, "; ".join(parts), remedy="columns: see docs/reference/file-formats.md"
+        )
     _check_together(where, columns, readings, deviations)
     return Header(columns, readings, temperatures[0])
 

@@ -4,7 +4,7 @@ A CHARACTERISTIC for each word of `triax_calib_t`: the temperature range, where 
 and has its origin, and each coefficient. They stand at SYMBOL_LINK "TRIAX_CALIB" with their byte
 offset; the tool that includes the fragment fills in the address from the linked program's map. The
 COMPU_METHODs are linear and give the value that the coefficient of x^k stands for: 1/2 for the
-floor after it and the preloaded half LSB of the output are taken off (docs/fixed-point.md).
+floor after it and the preloaded half LSB of the output are taken off (fixed-point.md).
 """
 
 from __future__ import annotations

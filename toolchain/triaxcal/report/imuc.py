@@ -40,7 +40,7 @@ def refuse_no_device(unit: DynamicDescription) -> None:
             str(unit.path),
             "has no [device], and so the unit gets no C",
             expected="[device] with " + ", ".join(REQUIRED),
-            remedy="add it: docs/dynamic.md",
+            remedy="add it: docs/how-to/imu.md",
         )
 
 

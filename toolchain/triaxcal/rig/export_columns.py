@@ -123,7 +123,7 @@ def _records(frames: Frames, group: str) -> Any:
 
 @contextmanager
 def parquet_writer(target: Path) -> Iterator[Callable[[Frames], None]]:
-    """Open a Parquet table, one row a frame; its columns are in docs/can.md."""
+    """Open a Parquet table, one row a frame; its columns are in docs/reference/can.md."""
     try:
         import pyarrow as arrow  # noqa: PLC0415
         from pyarrow import parquet  # noqa: PLC0415

@@ -212,7 +212,7 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
     Raises
     ------
     RefusedError
-        When the file breaks a rule of docs/bench.md, or asks for a temperature outside the
+        When the file breaks a rule of docs/reference/keys.md, or asks for a temperature outside the
         unit's range.
     """
     tables = SESSION_PLAN.read(path)

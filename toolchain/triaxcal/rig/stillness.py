@@ -2,7 +2,7 @@
 
 A variance sees shaking but neither slips nor creep; a slope sees creep, a step test slips. Blocks
 of one second; the noise within a block and from block to block is learned from a reference at
-rest (docs/bench.md has the thresholds and what they miss).
+rest (docs/how-to/bench.md has the thresholds and what they miss).
 """
 
 from __future__ import annotations

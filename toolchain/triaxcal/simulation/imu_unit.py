@@ -129,7 +129,7 @@ def write_simulated_recording(folder: Path, seed: int | None = None) -> Path:
     Raises
     ------
     RefusedError
-        When a file is missing or breaks a rule of docs/file-formats.md.
+        When a file is missing or breaks a rule of docs/reference/keys.md.
     """
     tables = IMU_TRUTH.read(folder / IMU_TRUTH_FILE)
     unit, motion = tables["unit"].record(_Unit), tables["motion"].record(_Motion)

@@ -108,7 +108,7 @@ def truth_text(truth: Truth, plan: Plan, coefficients: FloatArray, seed: int, ri
         for name, row in zip(CONSTANT_NAMES, coefficients, strict=True)
     )
     wrong = "\n".join(f"{name} = {value!r}" for name, value in asdict(truth.imperfections).items())
-    return f"""# One unit of a simulated series; docs/file-formats.md explains every key.
+    return f"""# One unit of a simulated series; docs/reference/keys.md explains every key.
 format = 1
 
 [curves]

@@ -183,7 +183,7 @@ def read_truth(folder: Path) -> tuple[Truth, Plan]:
     Raises
     ------
     RefusedError
-        When the file cannot be read or breaks a rule of docs/file-formats.md.
+        When the file cannot be read or breaks a rule of docs/reference/keys.md.
     """
     tables = TRUTH.read(folder / TRUTH_FILE)
     truth = tables["noise"].record(

@@ -41,7 +41,7 @@ def write_simulated_unit(folder: Path, seed: int | None = None) -> Path:
         raise RefusedError(
             str(folder),
             found,
-            expected="one of the two, as docs/file-formats.md describes",
+            expected="one of the two, as docs/reference/keys.md describes",
             remedy="only simulated units have one: real measurements are not made anew",
         )
     if has_tables:

@@ -25,7 +25,7 @@ _RATIO_COLUMNS = ("core", "raw codes", "form", "both", "double", "float")
 
 
 def markdown(costs: Sequence[Cost], compilers: Sequence[str]) -> str:
-    """Tables for docs/targets.md: every cost, and the ratios to the baselines."""
+    """Tables for docs/reference/targets.md: every cost, and the ratios to the baselines."""
     done = [c for c in costs if c.counts is not None]
     tools = "; ".join(compilers)
     lines = [

@@ -1,7 +1,8 @@
 """How errors of readings become errors of the constants and of the compensated acceleration.
 
-The fit is linear in the readings (docs/theory.md, Thermal curves): the constants of output i at T
-are c_i(T) = C_i(T) U_i, C_i (4, 6 G). An error of the constants is an error of the force,
+The fit is linear in the readings (docs/explanation/theory.md, Thermal curves): the constants of
+output i at T are c_i(T) = C_i(T) U_i, C_i (4, 6 G). An error of the constants is an error of the
+force,
 
     da = -N (dK a + dU0) = D [a; 1],    D = -N [dK dU0]    (3 x 4),
 

@@ -432,7 +432,7 @@ def read_unit(folder: Path) -> UnitDescription:
     Raises
     ------
     RefusedError
-        When there is no such unit, its file breaks a rule of docs/file-formats.md, or another
+        When there is no such unit, its file breaks a rule of docs/reference/keys.md, or another
         unit beside it has the same serial number.
     """
     path = find_unit(folder)

@@ -3,7 +3,7 @@
 One script for each axis and segment: the integers are those of the delivered image, the reals
 those that the plan stands for; temperature and raw codes are intervals. Gappa propagates the
 errors of the floors by interval arithmetic, which is coarser than visiting every code: its bound
-lies above the exact one or one of the two is wrong. docs/verification.md has the script explained.
+lies above the exact one or one of the two is wrong. verification.md has the script explained.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ constant functions both bounds are the same number, and Gappa's is not rounded u
 _KEY, _TITLE = "gappa", "Gappa: error bound"
 _NAMES = "ABCD"
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-"""Axes of the products, as docs/fixed-point.md, step Q, names them."""
+"""Axes of the products, as docs/explanation/fixed-point.md, step Q, names them."""
 _NUMBER = r"(-?\d+)(?:b(-?\d+))?"
 _APPROXIMATION = r"(?: \{[^}]*\})?"
 _HARMLESS = re.compile(

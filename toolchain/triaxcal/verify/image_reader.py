@@ -1,7 +1,7 @@
 """The delivered image read back: the integers that the checks reason about.
 
-Written from the layout in docs/fixed-point.md and not from the writer, so that a mistake of the
-writer shows.
+Written from the layout in docs/explanation/fixed-point.md and not from the writer, so that a
+mistake of the writer shows.
 """
 
 from __future__ import annotations

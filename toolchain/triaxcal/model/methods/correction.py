@@ -2,7 +2,7 @@
 
 The correction Delta_a is linear in U, so a + Delta_a is again a matrix and an offset. With
 dK = K(T) - K(T0) and dU0 = U0(T) - U0(T0) the correction is *added*: the sign printed in P1 doubles
-the error (docs/theory.md).
+the error (docs/explanation/theory.md).
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ def _functions(_: ThermalModel, target: Target) -> PiecewisePolynomial:
 ENTRY = CompensationMethod(
     name="inverse",
     label="inverse",
-    doc="K(T) and U0(T) as fitted; the device inverts K for every sample.",
+    doc="K(T) and U0(T) as fitted; the device inverts K when the temperature changes.",
     short_label="inverse",
     colour="#2a9d8f",
     form=INVERSE,

@@ -1,4 +1,4 @@
-"""passport.json: the passport for machines. docs/file-formats.md has the layout."""
+"""passport.json: the passport for machines. docs/reference/file-formats.md has the layout."""
 
 from __future__ import annotations
 

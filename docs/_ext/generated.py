@@ -1,0 +1,100 @@
+"""Tables of the pages that are made from declarations in the code.
+
+A page has a region between `<!-- generated: NAME ARGUMENTS -->` and `<!-- end -->`. What stands in
+it is kept in the page, so that it can be read without building the site. `make golden` writes it;
+`tests/test_doc_tables.py` fails where it differs.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from triaxcal.dynamic.blocks.registry import EXTENSIONS
+from triaxcal.keytable.catalogue import FILES
+from triaxcal.keytable.reference import reference_markdown
+from triaxcal.model.methods.registry import METHODS
+from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
+from triaxcal.readings.format import FORMATS, Format
+from triaxcal.rig.source import SOURCES
+
+DOCS = Path(__file__).parent.parent
+_REGION = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+
+
+def _keys(kind: str, *without: str) -> str:
+    """Keys of a kind of file; tables that are the same in the kinds `without` are not repeated."""
+    said = {text for other in without for text in _key_tables(other)}
+    return "\n\n".join(text for text in _key_tables(kind) if text not in said)
+
+
+def _key_tables(kind: str) -> list[str]:
+    return re.split(r"\n\n(?=\*\*)", reference_markdown(FILES[kind]()))
+
+
+def _needs(entry: Format) -> str:
+    present = entry.package in {"", "numpy", "scipy", *sys.stdlib_module_names}
+    return "nothing" if present else f"`pip install 'triaxcal[{entry.extra}]'`"
+
+
+def _formats() -> str:
+    rows = ((_bare(e.label), ", ".join(e.extensions), e.doc, _needs(e)) for e in FORMATS)
+    return _table(("format", "usual ending", "columns", "needs"), rows)
+
+
+def _bare(label: str) -> str:
+    return label.removeprefix("a ").removeprefix("an ")
+
+
+def _blocks() -> str:
+    rows = ((f"`{e.name}`", e.doc, str(sum(len(b.states) for b in e.blocks))) for e in EXTENSIONS)
+    return _table(("name", "what it adds", "states"), rows)
+
+
+def _sources() -> str:
+    rows = ((f"`{e.label}`", e.doc) for e in SOURCES)
+    return _table(("`--bus`", "where the frames come from"), rows)
+
+
+def _named(entries: Iterable[object]) -> str:
+    rows = ((f'`"{e.name}"`', e.label, e.doc) for e in entries)  # type: ignore[attr-defined]
+    return _table(("name", "in reports", "what it is"), rows)
+
+
+TABLES: dict[str, Callable[..., str]] = {
+    "keys": _keys,
+    "formats": _formats,
+    "blocks": _blocks,
+    "methods": lambda: _named(METHODS),
+    "functions": lambda: _named(THERMAL_FUNCTIONS),
+    "sources": _sources,
+}
+
+
+def filled(text: str) -> str:
+    """A page with its regions made anew."""
+
+    def fill(match: re.Match[str]) -> str:
+        begin, what, end = match.groups()
+        name, *arguments = what.split()
+        return f"{begin}\n{TABLES[name](*arguments)}\n\n{end}"
+
+    return _REGION.sub(fill, text)
+
+
+def pages() -> list[Path]:
+    """Pages that may have such regions."""
+    return sorted(p for p in DOCS.rglob("*.md") if "_build" not in p.parts)
+
+
+if __name__ == "__main__":
+    for page in pages():
+        text = page.read_text(encoding="utf-8")
+        page.write_text(filled(text), encoding="utf-8")
