@@ -32,7 +32,18 @@ if TYPE_CHECKING:
         load_imu,
         read_imu,
     )
+    from triaxcal.api.studies import (
+        MeasurementPlan,
+        Study,
+        compare_history,
+        cross_coupling,
+        find_poses,
+        plan_measurements,
+        simulate,
+        study_drift,
+    )
     from triaxcal.api.unit import Unit, read_unit
+    from triaxcal.api.verification import Verification, verify_unit
     from triaxcal.base.errors import RefusedError, UsageError
     from triaxcal.delivery.judgement import Tested, Verdict
     from triaxcal.uncertainty.budget import Budget
@@ -41,9 +52,11 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "Firmware", "Imu",
-    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "RefusedError", "Tested", "Unit",
-    "UsageError", "Verdict", "__version__", "deliver", "firmware", "firmware_imu", "fit", "fit_imu",
-    "load", "load_imu", "read_imu", "read_unit",
+    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "MeasurementPlan", "RefusedError",
+    "Study", "Tested", "Unit", "UsageError", "Verdict", "Verification", "__version__",
+    "compare_history", "cross_coupling", "deliver", "find_poses", "firmware", "firmware_imu", "fit",
+    "fit_imu", "load", "load_imu", "plan_measurements", "read_imu", "read_unit", "simulate",
+    "study_drift", "verify_unit",
 ]  # fmt: skip
 
 _MODULES = {
@@ -54,7 +67,12 @@ _MODULES = {
         "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "firmware_imu",
         "fit_imu", "load_imu", "read_imu",
     ),
+    "triaxcal.api.studies": (
+        "MeasurementPlan", "Study", "compare_history", "cross_coupling", "find_poses",
+        "plan_measurements", "simulate", "study_drift",
+    ),
     "triaxcal.api.unit": ("Unit", "read_unit"),
+    "triaxcal.api.verification": ("Verification", "verify_unit"),
     "triaxcal.base.errors": ("RefusedError", "UsageError"),
     "triaxcal.delivery.judgement": ("Tested", "Verdict"),
     "triaxcal.uncertainty.budget": ("Budget",),

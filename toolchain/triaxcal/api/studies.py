@@ -1,0 +1,202 @@
+"""What the other commands do: poses, drift, a pair, history, design, simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from triaxcal.api.unit import Unit
+from triaxcal.base.errors import RefusedError
+from triaxcal.design.problem import Problem, read_problem
+from triaxcal.design.search import Design, best, usual
+from triaxcal.design.words import comparison, rig_plan
+from triaxcal.fitting.core.drift import Drift, study
+from triaxcal.fitting.pair.cross_coupling import PairFit, fit_pair, recursive_pair
+from triaxcal.poses.poses import PoseSet
+from triaxcal.poses.poses import find_poses as poses_of
+from triaxcal.readings.pair import read_pair
+from triaxcal.readings.samples import Samples, read_samples
+from triaxcal.report import studies
+from triaxcal.report.history import history_text
+from triaxcal.simulation.unit import write_simulated_unit
+from triaxcal.uncertainty.history import Change, changes, read_history, repeatability
+from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.recording import RecordingLayout
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Study(Generic[T]):
+    """A result, and how people look at it.
+
+    Attributes
+    ----------
+    result : object
+        Its class is that of the function's return type.
+    summary : str
+        The text that the command line prints.
+    """
+
+    result: T
+    summary: str
+    _draw: Callable[[], bytes] | None = None
+
+    def picture(self) -> bytes:
+        """The picture, as SVG.
+
+        Raises
+        ------
+        RefusedError
+            Where the study has none.
+        """
+        if self._draw is None:
+            raise RefusedError("picture", "this study has no picture")
+        return self._draw()
+
+
+def find_poses(unit: Unit) -> Study[PoseSet]:
+    """Poses in the recording of a unit, and the still stretches that are none, with the reason.
+
+    Raises
+    ------
+    RefusedError
+        When the unit has no [recording], it cannot be read, or it is never still.
+    """
+    layout, samples = _recorded(unit)
+    found = poses_of(samples, layout)
+    return Study(
+        found,
+        studies.poses_text(found, layout),
+        lambda: studies.poses_picture(samples, found, layout),
+    )
+
+
+def study_drift(unit: Unit) -> Study[Drift]:
+    """Heating against cooling in one orientation: hysteresis, and a term in dT/dt.
+
+    Raises
+    ------
+    RefusedError
+        When the unit has no [recording], or its readings are no thermal cycle.
+    """
+    layout, samples = _recorded(unit)
+    found = study(samples)
+    return Study(
+        found,
+        studies.drift_text(found, layout),
+        lambda: studies.drift_picture(samples, found, layout),
+    )
+
+
+def cross_coupling(
+    file: str | Path, gravity_m_per_s2: float = STANDARD_GRAVITY_M_PER_S2
+) -> Study[PairFit]:
+    """Cross-coupling of an orthogonal pair of accelerometers on a dividing head.
+
+    Parameters
+    ----------
+    file : path
+        CSV with columns theta_deg, a_g, b_g, one row for each position.
+    gravity_m_per_s2 : float
+
+    Raises
+    ------
+    RefusedError
+        When the file cannot be read, or its positions do not determine the coefficients.
+    """
+    theta, a, b = read_pair(Path(file))
+    gravity_g = gravity_m_per_s2 / STANDARD_GRAVITY_M_PER_S2
+    fit = fit_pair(str(file), theta, a, b, gravity_g)
+    recursion = recursive_pair(theta, a, b, gravity_g)
+    return Study(fit, studies.pair_text(fit, recursion), lambda: studies.pair_picture(recursion))
+
+
+def compare_history(unit: Unit) -> Study[list[Change]]:
+    """Changes between the calibrations of a unit: history/*.csv, then measurements.csv.
+
+    Raises
+    ------
+    RefusedError
+        When the unit has no folder, or one of them cannot be calibrated.
+    """
+    found = read_history(_folder(unit), unit.description)
+    change = changes(unit.description, found)
+    repeat = repeatability(unit.description, found)
+    return Study(change, history_text(unit.serial, found, change, repeat))
+
+
+@dataclass(frozen=True)
+class MeasurementPlan:
+    """A plan of least chamber time.
+
+    Attributes
+    ----------
+    problem : Problem
+        The question.
+    usual, best : Design
+        The usual plan, and the one that takes least time.
+    """
+
+    problem: Problem
+    usual: Design
+    best: Design
+
+    def session_plan(self, made_by: str) -> str:
+        """TOML of the best plan, for `triaxcal rig run --plan`; `made_by` stands in a comment."""
+        return rig_plan(self.problem, self.best, made_by)
+
+
+def plan_measurements(question: str | Path) -> Study[MeasurementPlan]:
+    """What to measure, and for how long, for a wanted uncertainty.
+
+    Raises
+    ------
+    RefusedError
+        When the file breaks a rule, or no candidate reaches the uncertainty.
+    """
+    problem = read_problem(Path(question))
+    ordinary = usual(problem)
+    found = best(problem, problem.target_g or ordinary.expanded_g)
+    return Study(MeasurementPlan(problem, ordinary, found), comparison(problem, ordinary, found))
+
+
+def simulate(folder: str | Path, seed: int | None = None) -> Path:
+    """Write the readings of a simulated unit or IMU from the truth in its folder.
+
+    Returns
+    -------
+    Path
+        measurements.csv, or recording.csv of an IMU.
+
+    Raises
+    ------
+    RefusedError
+        When the folder has no truth, or it breaks a rule.
+    """
+    return write_simulated_unit(Path(folder), seed)
+
+
+def _folder(unit: Unit) -> Path:
+    if unit.folder is None:
+        raise RefusedError(
+            f"unit {unit.name}",
+            "made without a folder",
+            expected="a unit's folder",
+            remedy="read it with read_unit(folder)",
+        )
+    return unit.folder
+
+
+def _recorded(unit: Unit) -> tuple[RecordingLayout, Samples]:
+    folder, layout = _folder(unit), unit.description.recording
+    if layout is None:
+        raise RefusedError(
+            f"{folder}/unit.toml",
+            "no table [recording]",
+            expected="a unit whose readings are a recording",
+            remedy="see docs/how-to/recordings.md",
+        )
+    return layout, read_samples(folder, layout, unit.description.temperature_sensor)
