@@ -39,7 +39,9 @@ if TYPE_CHECKING:
         cross_coupling,
         find_poses,
         plan_measurements,
+        plan_motion,
         simulate,
+        simulate_series,
         study_drift,
     )
     from triaxcal.api.unit import Unit, read_unit
@@ -55,8 +57,8 @@ __all__ = [
     "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "MeasurementPlan", "RefusedError",
     "Study", "Tested", "Unit", "UsageError", "Verdict", "Verification", "__version__",
     "compare_history", "cross_coupling", "deliver", "find_poses", "firmware", "firmware_imu", "fit",
-    "fit_imu", "load", "load_imu", "plan_measurements", "read_imu", "read_unit", "simulate",
-    "study_drift", "verify_unit",
+    "fit_imu", "load", "load_imu", "plan_measurements", "plan_motion", "read_imu", "read_unit",
+    "simulate", "simulate_series", "study_drift", "verify_unit",
 ]  # fmt: skip
 
 _MODULES = {
@@ -69,7 +71,7 @@ _MODULES = {
     ),
     "triaxcal.api.studies": (
         "MeasurementPlan", "Study", "compare_history", "cross_coupling", "find_poses",
-        "plan_measurements", "simulate", "study_drift",
+        "plan_measurements", "plan_motion", "simulate", "simulate_series", "study_drift",
     ),
     "triaxcal.api.unit": ("Unit", "read_unit"),
     "triaxcal.api.verification": ("Verification", "verify_unit"),

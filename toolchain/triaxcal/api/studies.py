@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
+from triaxcal.api.delivery import Progress
 from triaxcal.api.unit import Unit
 from triaxcal.base.errors import RefusedError
+from triaxcal.design.imu import plan_unit
 from triaxcal.design.problem import Problem, read_problem
 from triaxcal.design.search import Design, best, usual
 from triaxcal.design.words import comparison, rig_plan
+from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.fitting.core.drift import Drift, study
 from triaxcal.fitting.pair.cross_coupling import PairFit, fit_pair, recursive_pair
 from triaxcal.poses.poses import PoseSet
@@ -19,7 +22,9 @@ from triaxcal.poses.poses import find_poses as poses_of
 from triaxcal.readings.pair import read_pair
 from triaxcal.readings.samples import Samples, read_samples
 from triaxcal.report import studies
+from triaxcal.report.dynamic import plan_summary
 from triaxcal.report.history import history_text
+from triaxcal.simulation.series import write_series
 from triaxcal.simulation.unit import write_simulated_unit
 from triaxcal.uncertainty.history import Change, changes, read_history, repeatability
 from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
@@ -177,6 +182,31 @@ def simulate(folder: str | Path, seed: int | None = None) -> Path:
         When the folder has no truth, or it breaks a rule.
     """
     return write_simulated_unit(Path(folder), seed)
+
+
+def simulate_series(
+    folder: str | Path, into: str | Path, count: int, seed: int = 1
+) -> Iterator[Path]:
+    """Write `count` units that differ from the one in `folder`; yields the folder of each.
+
+    Raises
+    ------
+    RefusedError
+        As `simulate`; when `into` has units already.
+    """
+    return write_series(Path(folder), Path(into), count, seed)
+
+
+def plan_motion(folder: str | Path, progress: Progress | None = None) -> Study[DynamicUnit]:
+    """What the motion in imu_truth.toml determines of an IMU, without a recording.
+
+    Raises
+    ------
+    RefusedError
+        When the folder has no such file, or it breaks a rule.
+    """
+    done = plan_unit(Path(folder), progress)
+    return Study(done, plan_summary(done))
 
 
 def _folder(unit: Unit) -> Path:

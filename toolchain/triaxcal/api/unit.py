@@ -7,8 +7,9 @@ from typing import Any
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import renew
+from triaxcal.base.tomltable import has_table
 from triaxcal.base.tomltext import toml_text
-from triaxcal.unit.description import FORMAT, UNIT_FILE, UnitDescription, unit_of_text
+from triaxcal.unit.description import FORMAT, UNIT_FILE, UnitDescription, find_unit, unit_of_text
 from triaxcal.unit.description import read_unit as read_description
 
 
@@ -92,5 +93,12 @@ def read_unit(folder: str | Path) -> Unit:
         serial number.
     """
     path = Path(folder)
+    if has_table(find_unit(path), "dynamic"):
+        raise RefusedError(
+            f"{path / UNIT_FILE}, [dynamic]",
+            "a whole IMU",
+            expected="the unit of one accelerometer triad",
+            remedy=f"use read_imu, or `triaxcal dynamic {path}`",
+        )
     description = read_description(path)
     return Unit.of(description, (path / UNIT_FILE).read_text(encoding="utf-8-sig"), path)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import PICTURE, example, say
+from triaxcal.cli.options import PICTURE, example, show
 
 
 @click.command(epilog=example("triaxcal crosscoupling pair.csv --picture pair.svg"))
@@ -25,14 +25,6 @@ def crosscoupling(file: Path, gravity: float, picture: Path | None) -> None:
     FILE is a CSV with columns theta_deg, a_g, b_g and one row for each position of the dividing
     head.
     """
-    from triaxcal.cli.recorded import write_picture  # noqa: PLC0415
-    from triaxcal.fitting.pair.cross_coupling import fit_pair, recursive_pair  # noqa: PLC0415
-    from triaxcal.readings.pair import read_pair  # noqa: PLC0415
-    from triaxcal.report.studies import pair_picture, pair_text  # noqa: PLC0415
+    import triaxcal  # noqa: PLC0415
 
-    theta, a, b = read_pair(file)
-    fit = fit_pair(str(file), theta, a, b, gravity / 9.80665)
-    recursion = recursive_pair(theta, a, b, gravity / 9.80665)
-    if picture is not None:
-        write_picture(picture, pair_picture(recursion))
-    say(pair_text(fit, recursion))
+    show(triaxcal.cross_coupling(file, gravity), picture)

@@ -6,11 +6,8 @@ from pathlib import Path
 
 import click
 
-from triaxcal.base.errors import RefusedError
-from triaxcal.cli.options import example, say
-from triaxcal.design.problem import read_problem
-from triaxcal.design.search import best, usual
-from triaxcal.design.words import comparison, rig_plan
+from triaxcal.base.publish import renew
+from triaxcal.cli.options import example, show
 
 
 @click.command(epilog=example("triaxcal design rig/design.toml --plan my-plan.toml"))
@@ -22,18 +19,12 @@ def design(question: Path, plan: Path | None) -> None:
     QUESTION is a TOML file with the uncertainty that is wanted and what is known of unit and
     chamber: see docs/how-to/design.md.
     """
-    problem = read_problem(question)
-    ordinary = usual(problem)
-    found = best(problem, problem.target_g or ordinary.expanded_g)
+    import triaxcal  # noqa: PLC0415
+
+    found = triaxcal.plan_measurements(question)
     if plan is not None:
-        try:
-            plan.write_text(
-                rig_plan(problem, found, f"triaxcal design {question.name}"), encoding="utf-8"
-            )
-        except OSError as error:
-            raise RefusedError(
-                str(plan), f"cannot be written: {(error.strerror or str(error)).lower()}"
-            ) from error
-    say(comparison(problem, ordinary, found))
+        text = found.result.session_plan(f"triaxcal design {question.name}")
+        renew({plan.name: text.encode()}, plan.parent)
+    show(found)
     if plan is not None:
         click.echo(f"\n{plan} written; measure by it with: triaxcal rig run --plan {plan}")

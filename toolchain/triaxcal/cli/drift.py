@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import PICTURE, UnitFolder, example, say
+from triaxcal.cli.options import PICTURE, UnitFolder, example, show
 
 
 @click.command(epilog=example("triaxcal drift MPU-1 --picture drift.svg"))
@@ -18,12 +18,6 @@ def drift(unit: Path, picture: Path | None) -> None:
     The recording of UNIT is a thermal cycle at rest. Its half-cycles show the hysteresis, and
     whether a term in dT/dt predicts held-out half-cycles better.
     """
-    from triaxcal.cli.recorded import recorded, write_picture  # noqa: PLC0415
-    from triaxcal.fitting.core.drift import study  # noqa: PLC0415
-    from triaxcal.report.studies import drift_picture, drift_text  # noqa: PLC0415
+    import triaxcal  # noqa: PLC0415
 
-    layout, samples = recorded(unit)
-    found = study(samples)
-    if picture is not None:
-        write_picture(picture, drift_picture(samples, found, layout))
-    say(drift_text(found, layout))
+    show(triaxcal.study_drift(triaxcal.read_unit(unit)), picture)

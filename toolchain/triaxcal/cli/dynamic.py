@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from triaxcal.cli.options import example, say, unit_and_build
+from triaxcal.cli.options import example, show, unit_and_build
 from triaxcal.cli.progress import bar, calibrate
-
-if TYPE_CHECKING:
-    from triaxcal.delivery.imu import ImuDelivery
 
 
 @click.command(epilog=example("triaxcal dynamic IMU-SIM", "triaxcal dynamic IMU-SIM --plan"))
@@ -37,17 +33,8 @@ def dynamic(unit: Path, build: Path, plan: bool) -> None:
 
 def tell_plan(unit: Path) -> None:
     """Print what a planned motion determines; nothing is written."""
-    from triaxcal.design.imu import plan_unit  # noqa: PLC0415
-    from triaxcal.report.dynamic import plan_summary  # noqa: PLC0415
+    import triaxcal  # noqa: PLC0415
 
     with bar() as progress:
-        done = plan_unit(unit, progress)
-    say(plan_summary(done))
-
-
-def delivered_imu(unit: Path) -> ImuDelivery:
-    """Calibrate the IMU and make its C, with a bar of progress."""
-    from triaxcal.delivery.imu import deliver_imu  # noqa: PLC0415
-
-    with bar() as progress:
-        return deliver_imu(unit, progress)
+        done = triaxcal.plan_motion(unit, progress)
+    show(done)

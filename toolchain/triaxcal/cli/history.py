@@ -6,14 +6,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import UnitFolder, example, say
-from triaxcal.report.history import history_text
-from triaxcal.uncertainty.history import (
-    changes,
-    read_history,
-    repeatability,
-)
-from triaxcal.unit.description import read_unit
+from triaxcal.cli.options import UnitFolder, example, show
 
 
 @click.command(epilog=example("triaxcal history AT-0042"))
@@ -23,13 +16,6 @@ def history(unit: Path) -> None:
 
     UNIT has earlier readings as history/*.csv, whose names are dates, beside measurements.csv.
     """
-    description = read_unit(unit)
-    found = read_history(unit, description)
-    say(
-        history_text(
-            description.serial,
-            found,
-            changes(description, found),
-            repeatability(description, found),
-        )
-    )
+    import triaxcal  # noqa: PLC0415
+
+    show(triaxcal.compare_history(triaxcal.read_unit(unit)))

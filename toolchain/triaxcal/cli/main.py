@@ -99,15 +99,14 @@ def simulate(unit: Path, seed: int | None, series: int | None, into: Path | None
     The folder UNIT has unit.toml and truth.toml (or tables.toml), and receives measurements.csv. An
     IMU has imu_truth.toml and receives recording.csv.
     """
-    from triaxcal.simulation.series import write_series  # noqa: PLC0415
-    from triaxcal.simulation.unit import write_simulated_unit  # noqa: PLC0415
+    import triaxcal  # noqa: PLC0415
 
     if (series is None) != (into is None):
         raise click.UsageError("--series and --into belong together")
     if series is None or into is None:
-        click.echo(f"{write_simulated_unit(unit, seed)} written")
+        click.echo(f"{triaxcal.simulate(unit, seed)} written")
         return
-    folders = write_series(unit, into, series, 1 if seed is None else seed)
+    folders = triaxcal.simulate_series(unit, into, series, 1 if seed is None else seed)
     with click.progressbar(folders, length=series, label="simulating", file=sys.stderr) as bar:
         written = list(bar)
     click.echo(f"{len(written)} units written: {written[0]} to {written[-1].name}")

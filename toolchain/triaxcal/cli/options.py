@@ -5,13 +5,17 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.publish import renew
 from triaxcal.base.screentext import wrapped
+
+if TYPE_CHECKING:
+    from triaxcal import Study
 
 UNITS = Path("units")
 _WIDTHS = 60, 120
@@ -94,3 +98,10 @@ def say(text: str) -> None:
     """Print text with its words wrapped to the terminal, to 80 columns where there is none."""
     narrow, wide = _WIDTHS
     click.echo(wrapped(text, min(max(shutil.get_terminal_size().columns, narrow), wide)))
+
+
+def show(study: Study[Any], picture: Path | None = None) -> None:
+    """Print the text of a study; write its picture, whole or not at all, where one is wanted."""
+    if picture is not None:
+        renew({picture.name: study.picture()}, picture.parent)
+    say(study.summary)

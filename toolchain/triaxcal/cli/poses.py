@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import PICTURE, UnitFolder, example, say
+from triaxcal.cli.options import PICTURE, UnitFolder, example, show
 
 
 @click.command(epilog=example("triaxcal poses MPU-1 --picture poses.svg"))
@@ -17,12 +17,6 @@ def poses(unit: Path, picture: Path | None) -> None:
 
     The unit.toml of UNIT has a table [recording].
     """
-    from triaxcal.cli.recorded import recorded, write_picture  # noqa: PLC0415
-    from triaxcal.poses.poses import find_poses  # noqa: PLC0415
-    from triaxcal.report.studies import poses_picture, poses_text  # noqa: PLC0415
+    import triaxcal  # noqa: PLC0415
 
-    layout, samples = recorded(unit)
-    found = find_poses(samples, layout)
-    if picture is not None:
-        write_picture(picture, poses_picture(samples, found, layout))
-    say(poses_text(found, layout))
+    show(triaxcal.find_poses(triaxcal.read_unit(unit)), picture)
