@@ -109,7 +109,7 @@ def test_text_in_a_column_of_numbers_is_refused(text: Any) -> None:
 
 def test_the_wrong_kind_of_unit_is_told_in_one_line() -> None:
     for command, unit, told in (
-        ("poses", "IMU-SIM", "a whole IMU on a turntable, [dynamic]; expected a unit with a table"),
+        ("poses", "IMU-SIM", "a whole IMU, [dynamic]; expected the unit of one accelerometer"),
         ("drift", "IMU-SIM", "`triaxcal dynamic "),
         ("poses", "AT-SIM", "no table [recording]"),
         ("dynamic", "AT-SIM", "no table [dynamic]; expected a whole IMU on a turntable; `triaxcal"),

@@ -205,7 +205,7 @@ def plan_motion(folder: str | Path, progress: Progress | None = None) -> Study[D
     RefusedError
         When the folder has no such file, or it breaks a rule.
     """
-    done = plan_unit(Path(folder), progress)
+    done = plan_unit(Path(folder), progress or (lambda _step, _part: None))
     return Study(done, plan_summary(done))
 
 

@@ -95,9 +95,9 @@ def read_unit(folder: str | Path) -> Unit:
     path = Path(folder)
     if has_table(find_unit(path), "dynamic"):
         raise RefusedError(
-            f"{path / UNIT_FILE}, [dynamic]",
-            "a whole IMU",
-            expected="the unit of one accelerometer triad",
+            f"{path / UNIT_FILE}",
+            "a whole IMU, [dynamic]",
+            expected="the unit of one accelerometer",
             remedy=f"use read_imu, or `triaxcal dynamic {path}`",
         )
     description = read_description(path)

@@ -153,16 +153,18 @@ def header(fitted: Fitted) -> dict[str, Any]:
 
 
 def _state(fitted: Fitted) -> dict[str, Any]:
-    found = fitted.calibration
+    """Without the path of the folder: equal inputs give equal bytes wherever they lie."""
+    found, measurements = fitted.calibration, fitted.measurements
     if found.recording is not None:
         # Where samples were still is of no use without the samples.
-        poses = replace(found.recording.poses, stillness=None)
+        poses = found.recording.poses
+        poses = replace(poses, stillness=None, source=Path(poses.source).name)
         found = replace(found, recording=replace(found.recording, poses=poses))
     rest = {key: value for key, value in plain(found, _CUSTOM).items() if key not in _ELSEWHERE}
     return {
         "unit_toml": fitted.unit_toml,
         "adc": plain(fitted.unit.adc),
-        "measurements": plain(fitted.measurements),
+        "measurements": plain(replace(measurements, source=Path(measurements.source).name)),
         "calibration": rest,
     }
 
