@@ -73,10 +73,10 @@ BAD_TOML = {
         '"gyro-thermal" is switched on and no temp_column is given',
     ),
     "unit of increments": ('"rad/s"', '"rad"', 'expected one of "rad/s", "deg/s"'),
-    "two columns": ('"gy", ', "", "three different names"),
+    "two columns": ('"gy", ', "", "three different columns, by name or number"),
     "absent column": ('"gy"', '"gyro_y"', "no column 'gyro_y'"),
     "no such file": ("recording.csv", "other.csv", "other.csv: no such file"),
-    "kind of file": ("recording.csv", "unit.toml", "ends in '.toml'"),
+    "kind of file": ("recording.csv", "unit.toml", "no column 'time_s' ([dynamic] time_column)"),
     "beyond the gyros' range": (
         "[noise]",
         "rate_max = 0.05\n[noise]",
@@ -101,16 +101,63 @@ def test_bad_cells_and_times(tmp_path: Path) -> None:
     csv = folder / "recording.csv"
     lines = csv.read_text(encoding="utf-8").splitlines()
     csv.write_text("\n".join([*lines[:10], "oops" + lines[10], *lines[11:]]), encoding="utf-8")
-    assert "could not convert string" in refused(folder)
-    csv.write_text("\n".join([*lines[:10], "nan," + lines[10], *lines[11:]]), encoding="utf-8")
-    assert "row 11, time_s: found nan; expected a finite number" in refused(folder)
-    csv.write_text("\n".join([*lines[:10], lines[9], *lines[10:]]), encoding="utf-8")
-    assert "row 11: time" in refused(folder)
-    assert "does not rise" in refused(folder)
+    assert "line 11, column time_s: found 'oops" in refused(folder)
     csv.write_text(lines[0] + "\n", encoding="utf-8")
+    assert "a header but no rows" in refused(folder)
+    csv.write_text("\n".join(lines[:3]), encoding="utf-8")
     assert "fewer than three samples" in refused(folder)
     csv.write_bytes(b"\xff\xfe\x00")
-    assert "is not UTF-8 text" in refused(folder)
+    assert "begins as UTF-16 text, but byte 2 is none" in refused(folder)
+
+
+def test_rows_that_are_doubled_late_or_empty_are_left_out_and_reported(tmp_path: Path) -> None:
+    folder = write_unit(tmp_path / "IMU-A", table()[:300])
+    plain = read_recording(read_dynamic(folder))
+    csv = folder / "recording.csv"
+    lines = csv.read_text(encoding="utf-8").splitlines()
+    nothing = "nan," + lines[10].split(",", 1)[1]
+    mended = [*lines[:10], lines[9], nothing, *lines[10:20], lines[15], *lines[20:]]
+    csv.write_text("\n".join(mended), encoding="utf-8")
+    found = read_recording(read_dynamic(folder))
+    told = "1 row with the time of the row before left out (1 of them the same in all), the first"
+    assert found.findings == (
+        "1 row without all readings left out, the first is line 12",
+        f"{told} is line 11",
+        "1 row out of order in time left out, by 0.08 s at most, the first is line 23",
+    )
+    for name in ("time_s", "rate", "force"):
+        assert np.array_equal(getattr(found.all(), name), getattr(plain.all(), name))
+    text = (folder / "unit.toml").read_text(encoding="utf-8")
+    text = text.replace('"rad/s"', '"rad"').replace("instant", "increment")
+    text = text.replace('"m/s^2"', '"m/s"')
+    (folder / "unit.toml").write_text(text, encoding="utf-8")
+    assert "expected every increment: the sum lacks what is left out" in refused(folder)
+
+
+def test_dynamic_takes_what_recording_takes(tmp_path: Path) -> None:
+    """Delimiter, decimal sign, comments, columns by number, signs and a time in two columns."""
+    rows = table()[:300]
+    folder = write_unit(tmp_path / "IMU-A", rows)
+    plain = read_recording(read_dynamic(folder)).all()
+    text = UNIT_TOML.replace('"time_s"', '[1, "ms"]').replace('"gx", "gy", "gz"', '2, "-gy", 4')
+    text = text.replace("[noise]", 'time_unit = ["s", "ms"]\ndelimiter = "semicolon"\n[noise]')
+    text = text.replace("[noise]", 'decimal = ","\ncomment = "%"\n[noise]')
+    assert text.count("[noise]") == 1
+    (folder / "unit.toml").write_text(text, encoding="utf-8")
+    whole, rest = np.divmod(np.rint(rows[:, 0] * 1000), 1000)
+    rows[:, 2] *= -1.0
+    body = [
+        f"{int(s)};" + ";".join(f"{v!r}" for v in row[1:].tolist()) + f";{int(ms)}"
+        for s, ms, row in zip(whole, rest, rows, strict=True)
+    ]
+    header = ";".join([*COLUMNS, "ms"])
+    csv = "\n".join(["% made by hand", header, *body]).replace(".", ",")
+    (folder / "recording.csv").write_text(csv, encoding="utf-8")
+    found = read_recording(read_dynamic(folder)).all()
+    assert np.array_equal(found.rate, plain.rate)
+    assert np.array_equal(found.force, plain.force)
+    # Seconds and thousandths are added: the sum is rounded once more.
+    np.testing.assert_allclose(found.time_s, plain.time_s, rtol=4e-16)
 
 
 def test_the_command(tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from test_recordings import calibrated, found
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
-from triaxcal.dynamic.reading import _doubles
+from triaxcal.readings.arrays import ArraySource
+from triaxcal.unit.recordingfile import FileLayout
 
 UNITS = Path(__file__).parents[2] / "units"
 TEXT = csv_text(log(directions(10)), "t,ax,ay,az")
@@ -55,9 +56,9 @@ def test_utf_32_of_the_other_order_is_read(tmp_path: Path) -> None:
     ("text", "line"),
     [
         (f'{TEXT}"{"x" * 140_000}"\n', len(TEXT.splitlines()) + 1),
-        ('{"rows": 3,"data": "' + "x" * 140_000 + '"}\n', 1),
+        ('rows;"' + "x" * 140_000 + '"\n', 1),
     ],
-    ids=["quoted", "json"],
+    ids=["quoted", "document"],
 )
 def test_a_cell_without_end_is_refused_by_its_line(tmp_path: Path, text: str, line: int) -> None:
     told = refusal(write_unit(tmp_path / "U", text))
@@ -76,9 +77,9 @@ def test_a_header_alone_is_called_one(tmp_path: Path, columns: str) -> None:
 @pytest.mark.parametrize(
     ("start", "name"),
     [
-        (b"PK\x03\x04\0\0", ", a ZIP archive or an Excel workbook; expected text, or a MAT-file"),
-        (b"SQLite format 3\0", ", an SQLite database, as ROS 2 writes; expected"),
-        (b"\x01\0\x02\x03\0", "a binary file; expected text, or a MAT-file of MATLAB 5 to 7.2"),
+        (b"PK\x03\x04\0\0", "a binary file, a ZIP archive; expected a MAT-file of version"),
+        (b"SQLite format 3\0", "a binary file, an SQLite database; expected a MAT-file of version"),
+        (b"\x01\0\x02\x03\0", "a binary file; expected a MAT-file of version"),
     ],
 )
 def test_what_is_no_text_is_named(tmp_path: Path, start: bytes, name: str) -> None:
@@ -92,19 +93,21 @@ def test_vectors_of_unequal_length_are_refused(tmp_path: Path) -> None:
     rows = log(directions(4))
     columns = {"t": rows[:, 0], "ax": rows[:, 1], "ay": rows[:-3, 2], "az": rows[:, 3]}
     savemat(folder / "log.csv", columns, appendmat=False)
-    assert f"{len(rows) - 3} values in ay ([recording] acceleration), {len(rows)} in ax" in refusal(
-        folder
-    )
+    n = len(rows)
+    told = f"columns of different lengths: t {n}, ax {n}, ay {n - 3}, az {n}; expected one value"
+    assert told in refusal(folder)
 
 
 @pytest.mark.parametrize("text", [np.array(["a", "b"]), np.array(["1", "x"], dtype=object)])
 def test_text_in_a_column_of_numbers_is_refused(text: Any) -> None:
     """What Parquet and HDF5 give for text; gaps among numbers go through."""
-    with pytest.raises(RefusedError, match=r"r.parquet, column a: holds .*; expected numbers"):
-        _doubles(Path("r.parquet"), "a", text)
-    gaps = _doubles(Path("r"), "a", np.array([1.5, None], dtype=object))
-    assert gaps[0] == 1.5
-    assert np.isnan(gaps[1])
+    layout = FileLayout("recording")
+    with pytest.raises(RefusedError, match=r"r.parquet, .*column a: .*; expected"):
+        list(ArraySource("r.parquet", {"a": text}, layout).blocks([0], []))
+    some = ArraySource("r", {"a": np.array([1.5, None], dtype=object)}, layout)
+    (gaps,) = some.blocks([0], [])
+    assert gaps.numbers[0, 0] == 1.5
+    assert np.isnan(gaps.numbers[1, 0])
 
 
 def test_the_wrong_kind_of_unit_is_told_in_one_line() -> None:

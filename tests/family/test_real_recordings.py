@@ -104,8 +104,8 @@ def test_mikoffs_samples_of_poses_left_out_are_no_worse(tmp_path: Path) -> None:
     assert found is not None
     held_out, noise = found.held_out_g or 0.0, []
     for pose in found.poses.poses:
-        start = int(np.searchsorted(samples.line, pose.line))
-        part = samples.reading[start : start + pose.count]
+        start = int(np.searchsorted(samples.part("row"), pose.line))
+        part = samples.part("reading", start, start + pose.count)
         direction = pose.reading / np.linalg.norm(pose.reading)
         noise.append(float(((part - pose.reading) @ direction).std()) / 9.81)
     sample_rms = float(np.sqrt(np.mean(np.square(noise))))

@@ -281,7 +281,7 @@ REFUSED = {
         },
         "the readings turn with the gyro as x, y, z = -x, y, z would (correlation 1.00; ",
     ),
-    "time-back": (BACK, {}, "line 902: time runs back by 4.98 s; expected rising time"),
+    "time-back": (BACK, {}, "line 902: time runs back by 4.98 s; "),
     "coarse-clock": (COARSE, {}, "rows repeat the time of the row before"),
     "one-temperature": (
         hot(log(directions(12))),

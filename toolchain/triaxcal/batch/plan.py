@@ -15,7 +15,7 @@ from triaxcal.batch.order import Order, Outcome, planned, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.readings.measurements import MEASUREMENTS_FILE
 from triaxcal.unit.description import UNIT_FILE, find_unit, list_units
-from triaxcal.unit.recording import is_in_folder
+from triaxcal.unit.recordingfile import is_in_folder
 
 
 @dataclass(frozen=True)

@@ -44,4 +44,4 @@ def plan_unit(folder: Path, progress: Callable[[str, float], None]) -> DynamicUn
         reference_degc=unit.reference_degc,
         progress=lambda number, part: progress(f"pass {number + 1}", part),
     )
-    return DynamicUnit(unit, result, observability(result.layout, result.covariance), ())
+    return DynamicUnit(unit, result, observability(result.layout, result.covariance), (), ())

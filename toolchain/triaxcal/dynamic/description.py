@@ -10,7 +10,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import FileKeys, Key, TableKeys, Values, key, keys_of
-from triaxcal.base.kinds import TEXT, Kind, listed, meaning, number, word
+from triaxcal.base.kinds import TEXT, Kind, listed, number, word
 from triaxcal.base.tomltable import has_table
 from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
@@ -19,6 +19,8 @@ from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT, Turntable
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
+from triaxcal.readings.table import Quantity, signed
+from triaxcal.readings.units import to_degc
 from triaxcal.unit.description import (
     GRAVITY,
     LATITUDE,
@@ -27,38 +29,24 @@ from triaxcal.unit.description import (
     UNIT_FILE,
     find_unit,
 )
+from triaxcal.unit.recordingfile import (
+    COLUMN,
+    SIGNED_COLUMNS,
+    STAMPS,
+    TEMPERATURE_UNITS,
+    TIMES,
+    ClockLayout,
+    Column,
+    FileLayout,
+    SignedColumn,
+    WrittenFile,
+    check_units,
+)
 
 _RATE_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180, "deg/h": math.pi / 648000}
 _ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "arcsec": math.pi / 648000}
 _FORCE_UNITS = {"m/s^2": 1.0, "g": 1e6 * MICRO_G, "mg": 1e3 * MICRO_G}
 _VELOCITY_UNITS = {"m/s": 1.0, "mm/s": 1e-3}
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-
-
-@dataclass(frozen=True)
-class Columns:
-    """Where the readings stand in the file and what one of them is in SI units.
-
-    Attributes
-    ----------
-    time : str or None
-    time_scale, rate_scale, force_scale : float
-        s, rad/s (rad), m/s^2 (m/s) for one unit of the file.
-    rate, force : three str
-    force2 : three str, or None
-    temp, table_angle : str or None
-        degC; degrees.
-    """
-
-    time: str | None
-    time_scale: float
-    rate: tuple[str, ...]
-    rate_scale: float
-    force: tuple[str, ...]
-    force_scale: float
-    force2: tuple[str, ...] | None
-    temp: str | None
-    table_angle: str | None
 
 
 @dataclass(frozen=True)
@@ -71,8 +59,11 @@ class DynamicDescription:
     path : Path
         Its unit.toml, for messages.
     recording : Path
-    rate_hz : float or None
-        Where there is no column of times.
+    file : FileLayout
+        How the recording is written.
+    clock : ClockLayout
+    quantities : tuple of Quantity
+        Its columns, by the names of `ImuSamples`, and their conversion to SI units.
     rate_max : float or None
         Full scale of the gyros, rad/s.
     device : Device or None
@@ -85,8 +76,9 @@ class DynamicDescription:
     recording: Path
     latitude_deg: float
     gravity_m_per_s2: float
-    columns: Columns
-    rate_hz: float | None
+    file: FileLayout
+    clock: ClockLayout
+    quantities: tuple[Quantity, ...]
     rate_max: float | None
     rate_convention: str
     force_convention: str
@@ -99,21 +91,6 @@ class DynamicDescription:
     def state_blocks(self) -> tuple[StateBlock, ...]:
         """Blocks of the extensions that are switched on."""
         return tuple(b for name in self.blocks for b in EXTENSIONS[name].blocks)
-
-
-def _three(value: object) -> tuple[str, ...]:
-    names = value if isinstance(value, list) else []
-    if len(names) != 3 or not all(isinstance(v, str) and v for v in names) or len(set(names)) != 3:
-        raise ValueError
-    return tuple(names)
-
-
-_THREE = Kind(
-    "three different names of columns, of axes x, y, z",
-    _three,
-    {"type": "array", "items": {"type": "string"}, "minItems": 3, "maxItems": 3},
-    example='["x", "y", "z"]',
-)
 
 
 def _mounting(text: object) -> FloatArray:
@@ -134,20 +111,36 @@ _AXES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class DynamicTable:
+class _RecordedFile:
+    """The file, before how it is written."""
+
+    recording: str = key(TEXT, "File of the readings.", example='"recording.csv"')
+
+
+@dataclass(frozen=True, kw_only=True)
+class DynamicTable(WrittenFile, _RecordedFile):
     """[dynamic], as it stands in the file."""
 
-    recording: str = key(
-        TEXT,
-        "The readings: a file .csv, .parquet, .h5 or .hdf5 (a column is a data set in HDF5).",
-        example='"recording.csv"',
+    time_column: tuple[Column, ...] = key(
+        TIMES,
+        "Time of each sample, or a list as `time` of `[recording]`; or `rate_hz`.",
+        (),
+        default_words="none",
+        example='"time_s"',
     )
-    time_column: str | None = key(TEXT, "Time of each sample; or `rate_hz`.", None)
-    time_unit: float = key(meaning(TIME_UNITS), "Unit of the times.", 1.0, default_words='`"s"`')
+    time_unit: tuple[str, ...] = key(
+        STAMPS,
+        "Unit of the times, as in `[recording]`.",
+        ("s",),
+        default_words='`"s"`',
+        example='"s"',
+    )
     rate_hz: float | None = key(
         number(1.0, 1e5), "Rate of even samples, in place of `time_column`.", None, "Hz"
     )
-    rate_columns: tuple[str, ...] = key(_THREE, "Gyros x, y, z.", example='["gx", "gy", "gz"]')
+    rate_columns: tuple[SignedColumn, ...] = key(
+        SIGNED_COLUMNS, 'Gyros x, y, z; "-gy" turns a sign.', example='["gx", "gy", "gz"]'
+    )
     rate_unit: str = key(
         word((*_RATE_UNITS, *_ANGLE_UNITS)),
         "Unit of the gyros: of instants the first three, of increments the others.",
@@ -164,8 +157,10 @@ class DynamicTable:
         None,
         "deg/s",
     )
-    force_columns: tuple[str, ...] = key(
-        _THREE, "Accelerometers x, y, z, on the axes of the gyros.", example='["ax", "ay", "az"]'
+    force_columns: tuple[SignedColumn, ...] = key(
+        SIGNED_COLUMNS,
+        "Accelerometers x, y, z, on the axes of the gyros.",
+        example='["ax", "ay", "az"]',
     )
     force_unit: str = key(
         word((*_FORCE_UNITS, *_VELOCITY_UNITS)),
@@ -174,14 +169,17 @@ class DynamicTable:
         example='"m/s^2"',
     )
     force_samples: str = key(word(CONVENTIONS), "As `rate_samples`.", example='"instant"')
-    force2_columns: tuple[str, ...] | None = key(
-        _THREE, "A second accelerometer triad, in the same unit.", None
+    force2_columns: tuple[SignedColumn, ...] | None = key(
+        SIGNED_COLUMNS, "A second accelerometer triad, in the same unit.", None
     )
-    temp_column: str | None = key(
-        TEXT, "Temperature; required by the blocks of temperature.", None, "degC"
+    temp_column: Column | None = key(
+        COLUMN, "Temperature; required by the blocks of temperature.", None
     )
-    table_angle_column: str | None = key(
-        TEXT, "Angle of the table; required by the blocks of the table's angle.", None, "deg"
+    temperature_unit: str = key(
+        word(TEMPERATURE_UNITS[:3]), "Unit of `temp_column`.", TEMPERATURE_UNITS[0]
+    )
+    table_angle_column: Column | None = key(
+        COLUMN, "Angle of the table; required by the blocks of the table's angle.", None, "deg"
     )
     reference_degc: float = key(
         number(*PLAUSIBLE_DEGC),
@@ -265,12 +263,13 @@ def read_dynamic(folder: Path) -> DynamicDescription:
     tables = imu_file().read(path)
     dynamic, site = tables["dynamic"], tables["site"]
     found = dynamic.record(DynamicTable)
-    if (found.rate_hz is None) == (found.time_column is None):
+    if (found.rate_hz is None) == (not found.time_column):
         raise RefusedError(
             f"{dynamic.where('time_column')} and rate_hz",
             "neither given" if found.rate_hz is None else "both given",
             expected="one of them: a column of times, or the rate of even sampling",
         )
+    check_units(dynamic, found.time_column, found.time_unit)
     return DynamicDescription(
         name=folder.absolute().name,
         serial=tables[""][SERIAL],
@@ -278,8 +277,9 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         recording=folder / found.recording,
         latitude_deg=site[LATITUDE],
         gravity_m_per_s2=site[GRAVITY],
-        columns=_columns(dynamic, found),
-        rate_hz=found.rate_hz,
+        file=found.layout("dynamic", _names(found)),
+        clock=ClockLayout(found.time_column, found.time_unit, found.rate_hz, from_first=False),
+        quantities=_quantities(dynamic, found),
         rate_max=None if found.rate_max is None else math.radians(found.rate_max),
         rate_convention=found.rate_samples,
         force_convention=found.force_samples,
@@ -291,23 +291,33 @@ def read_dynamic(folder: Path) -> DynamicDescription:
     )
 
 
-def _columns(values: Values, found: DynamicTable) -> Columns:
+def _quantities(values: Values, found: DynamicTable) -> tuple[Quantity, ...]:
     rate_units = _ANGLE_UNITS if found.rate_samples == INCREMENT else _RATE_UNITS
     force_units = _VELOCITY_UNITS if found.force_samples == INCREMENT else _FORCE_UNITS
     for name, units in (("rate_unit", rate_units), ("force_unit", force_units)):
         if values.given[name] not in units:
             raise values.refuse(name, word(tuple(units)).expected)
-    return Columns(
-        time=found.time_column,
-        time_scale=found.time_unit,
-        rate=found.rate_columns,
-        rate_scale=rate_units[found.rate_unit],
-        force=found.force_columns,
-        force_scale=force_units[found.force_unit],
-        force2=found.force2_columns,
-        temp=found.temp_column,
-        table_angle=found.table_angle_column,
-    )
+    force_scale = force_units[found.force_unit]
+    quantities = [
+        signed("rate", "rate_columns", found.rate_columns, rate_units[found.rate_unit]),
+        signed("force", "force_columns", found.force_columns, force_scale),
+    ]
+    if found.force2_columns is not None:
+        quantities.append(signed("force2", "force2_columns", found.force2_columns, force_scale))
+    if found.temp_column is not None:
+        degc = to_degc(found.temperature_unit)
+        quantities.append(Quantity("temp_degc", "temp_column", (found.temp_column,), degc))
+    if found.table_angle_column is not None:
+        column = (found.table_angle_column,)
+        quantities.append(Quantity("table_angle_rad", "table_angle_column", column, np.radians))
+    return tuple(quantities)
+
+
+def _names(found: DynamicTable) -> list[Column]:
+    """Columns that are asked for by themselves or in triads."""
+    triads = (*found.rate_columns, *found.force_columns, *(found.force2_columns or ()))
+    single = (found.temp_column, found.table_angle_column)
+    return [*found.time_column, *(c.column for c in triads), *(c for c in single if c is not None)]
 
 
 _COLUMN_OF = {

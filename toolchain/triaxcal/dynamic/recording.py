@@ -132,6 +132,8 @@ class ImuRecording:
         One of `CONVENTIONS`.
     table : Turntable, or None
         Needed only where the table's angle readings are used.
+    findings : tuple of str
+        What was left out or mended when it was read.
     """
 
     name: str
@@ -142,6 +144,7 @@ class ImuRecording:
     rate_convention: str = INSTANT
     force_convention: str = INSTANT
     table: Turntable | None = None
+    findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for convention in (self.rate_convention, self.force_convention):

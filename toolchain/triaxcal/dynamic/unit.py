@@ -24,12 +24,15 @@ class DynamicUnit:
     seen : Observability
     off : tuple of Effect
         Effects that are switched off, tested on the recording.
+    findings : tuple of str
+        What was left out or mended when the recording was read.
     """
 
     unit: DynamicDescription
     result: DynamicResult
     seen: Observability
     off: tuple[Effect, ...]
+    findings: tuple[str, ...]
 
 
 def calibrate_unit(
@@ -53,4 +56,5 @@ def calibrate_unit(
         progress=lambda number, part: tell(f"pass {number + 1}", part),
     )
     off = missing_effects(recording, unit.noise, result, lambda part: tell("effects off", part))
-    return DynamicUnit(unit, result, observability(result.layout, result.covariance), off)
+    seen = observability(result.layout, result.covariance)
+    return DynamicUnit(unit, result, seen, off, recording.findings)

@@ -16,7 +16,7 @@ from triaxcal.fitting.recorded.temperatures import temperature_findings
 from triaxcal.fitting.table.calibrate import calibrate_table
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import MeasurementSet
-from triaxcal.readings.samples import Samples, read_samples
+from triaxcal.readings.samples import READING, TEMP, Samples, read_samples
 from triaxcal.unit.description import Adc, UnitDescription
 from triaxcal.unit.recording import RecordingLayout
 
@@ -41,7 +41,7 @@ def calibrate_recording(
     if layout.faces:
         measurements = face_measurements(unit, layout, samples)
         found = calibrate(unit, measurements, pair)
-        unseen = temperature_findings(unit, samples.temp_degc)
+        unseen = temperature_findings(unit, samples.extremes(TEMP) if TEMP in samples else None)
         calibration = replace(
             found,
             reading_unit=layout.acceleration_unit,
@@ -64,8 +64,8 @@ def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Sample
     adc = unit.adc
     lsb = adc.volts_per_code
     # Half a code: readings in other units than counts are not rounded to codes.
-    low = float(samples.reading.min()) / lsb + 0.5
-    high = float(samples.reading.max()) / lsb - 0.5
+    extremes = samples.extremes(READING)
+    low, high = float(extremes.min()) / lsb + 0.5, float(extremes.max()) / lsb - 0.5
     if adc.code_min <= low and high <= adc.code_max:
         return adc
     fitting = [b for b in _WIDTHS if -(2 ** (b - 1)) <= low and high <= 2 ** (b - 1) - 1]
@@ -73,12 +73,16 @@ def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Sample
         bits = fitting[0]
         half = 2 ** (bits - 1)
         return Adc(bits, lsb * half, -half, half - 1)
-    index = int(np.abs(samples.reading).max(axis=1).argmax())
+    largest = float(np.abs(extremes).max())
+    index = next(
+        first + int(np.argmax(size))
+        for first, rows in samples.pieces()
+        if (size := np.abs(samples.cut(rows, READING)).max(axis=1)).max() == largest
+    )
     wide = f"bits = {fitting[0]}" if fitting else "a larger lsb"
     raise RefusedError(
-        f"{samples.source}, line {samples.line[index]}",
-        f"a reading of {np.abs(samples.reading).max():.6g} {layout.acceleration_unit}, "
-        f"{np.abs(samples.reading).max() / lsb:.0f} codes",
+        samples.place(index),
+        f"a reading of {largest:.6g} {layout.acceleration_unit}, {largest / lsb:.0f} codes",
         expected=f"{adc.code_min} to {adc.code_max} codes of [adc]",
         remedy=f"set [adc] {wide}, or correct lsb, code_min and code_max",
     )

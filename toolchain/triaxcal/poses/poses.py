@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,8 +11,10 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.stillness import Stillness, duration_s, find_stillness
-from triaxcal.readings.samples import Samples
-from triaxcal.unit.recording import POSES, SECTIONS, TIME_UNITS, RecordingLayout
+from triaxcal.readings.samples import ANGLES, READING, TEMP, Samples
+from triaxcal.readings.table import ROW, TIME
+from triaxcal.unit.recording import POSES, SECTIONS, RecordingLayout
+from triaxcal.unit.recordingfile import TIME_UNITS
 
 BATCHES = 8
 _DRIFT_MAX = 6.0
@@ -21,8 +23,6 @@ _STEPS_S = (5e-4, 0.5)
 """Between samples of a logger: what tells seconds from milliseconds."""
 _SAME_RAD = 1e-6
 """Angles of one pose are written alike in all its rows."""
-_NOTED = 0.25
-"""Of the shortest pose: still stretches shorter than this are part of the movement."""
 _MOVING = 0.1
 """Of 1 g: a pose whose readings scatter by more was not held still."""
 ALIKE_DEG = 5.0
@@ -117,9 +117,10 @@ class _Scale:
 
     @staticmethod
     def of(samples: Samples, layout: RecordingLayout) -> _Scale:
-        low, high = samples.reading.min(axis=0), samples.reading.max(axis=0)
+        low, high = samples.extremes(READING)
         # Counts do not say: half of what nine tenths of the samples span on the widest axis.
-        spans = np.ptp(np.percentile(samples.reading, [5.0, 95.0], axis=0), axis=0)
+        rows = np.concatenate(samples.table.spool.stretches())
+        spans = np.ptp(np.percentile(samples.cut(rows, READING), [5.0, 95.0], axis=0), axis=0)
         return _Scale(low, high, layout.reading_of_1_g or float(spans.max()) / 2.0)
 
 
@@ -139,16 +140,12 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     scale = _Scale.of(samples, layout)
     poses: list[Pose] = []
     refused: list[RefusedPose] = []
-    number = 0
-    for run in stillness.runs:
-        length = duration_s(samples, run)
-        if length < _NOTED * layout.still_s:
-            continue
-        number += 1
+    for number, run in enumerate(stillness.runs, start=1):
         pose = _pose(samples, run, number)
         reason = _reason(samples, run, pose, layout, scale)
         if reason:
-            refused.append(RefusedPose(number, pose.line, pose.start_s, length, reason))
+            told = RefusedPose(number, pose.line, pose.start_s, pose.duration_s, reason)
+            refused.append(told)
         else:
             poses.append(pose)
     if not poses:
@@ -157,20 +154,23 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
 
 
 def _row_poses(samples: Samples) -> tuple[Pose, ...]:
+    rows, times, readings = (samples.part(name) for name in (ROW, TIME, READING))
+    temps = samples.part(TEMP) if TEMP in samples else None
+    angles = samples.part(ANGLES) if ANGLES in samples else None
     return tuple(
         Pose(
             number=k + 1,
-            line=int(samples.line[k]),
-            start_s=float(samples.time_s[k]),
+            line=int(rows[k]),
+            start_s=float(times[k]),
             duration_s=0.0,
-            reading=samples.reading[k],
+            reading=readings[k],
             sd_mean=None,
             count=1,
-            temp_degc=None if samples.temp_degc is None else float(samples.temp_degc[k]),
-            label="" if samples.label is None else samples.label[k],
-            angles_rad=None if samples.angles_rad is None else samples.angles_rad[k],
+            temp_degc=None if temps is None else float(temps[k]),
+            label=samples.label(k),
+            angles_rad=None if angles is None else angles[k],
         )
-        for k in range(len(samples.reading))
+        for k in range(len(samples))
     )
 
 
@@ -179,20 +179,17 @@ def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
 
     With `faces` only their labels count.
     """
-    assert samples.label is not None
     scale = _Scale.of(samples, layout)
     poses: list[Pose] = []
     refused: list[RefusedPose] = []
-    start = 0
-    for label, rows in groupby(samples.label):
-        run = start, start + len(list(rows))
-        start = run[1]
+    for run in samples.runs():
+        label = samples.label(run[0])
         if not label.strip() or (layout.faces and label not in layout.faces):
             continue
         pose = _pose(samples, run, len(poses) + len(refused) + 1)
-        reason = _moves(samples.reading[run[0] : run[1]].std(axis=0), layout, scale)
-        if samples.angles_rad is not None:
-            angles = samples.angles_rad[run[0] : run[1]]
+        reason = _moves(samples.deviation(READING, *run), layout, scale)
+        if ANGLES in samples:
+            angles = samples.part(ANGLES, *run)
             pose = replace(pose, angles_rad=angles[0])
             if np.ptp(angles, axis=0).max() > _SAME_RAD:
                 reason = "its angles change within the section"
@@ -205,7 +202,7 @@ def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
         first = f": pose {refused[0].number}: {refused[0].reason}" if refused else ""
         labels = ""
         if layout.faces and not refused:
-            labels = f"; sections found: {', '.join(sorted(set(samples.label))[:10])}"
+            labels = f"; sections found: {', '.join(sorted(samples.table.labels or ())[:10])}"
         raise RefusedError(
             samples.source,
             f"no section is a pose{first}{labels}",
@@ -216,21 +213,21 @@ def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
 
 def _pose(samples: Samples, run: tuple[int, int], number: int) -> Pose:
     start, stop = run
-    reading = samples.reading[start:stop]
-    batches = min(BATCHES, len(reading))
-    means = np.array([part.mean(axis=0) for part in np.array_split(reading, batches)])
+    batches = min(BATCHES, stop - start)
+    each, more = divmod(stop - start, batches)
+    ends = [start + k * each + min(k, more) for k in range(batches + 1)]
+    means = np.array([samples.mean(READING, *part) for part in pairwise(ends)])
     sd_mean = means.std(axis=0, ddof=1) / np.sqrt(batches) if batches > 1 else np.full(3, np.inf)
-    temp = None if samples.temp_degc is None else float(samples.temp_degc[start:stop].mean())
     return Pose(
         number=number,
-        line=int(samples.line[start]),
-        start_s=float(samples.time_s[start]),
+        line=int(samples.one(ROW, start)),
+        start_s=samples.one(TIME, start),
         duration_s=duration_s(samples, run),
-        reading=reading.mean(axis=0),
+        reading=samples.mean(READING, start, stop),
         sd_mean=sd_mean,
         count=stop - start,
-        temp_degc=temp,
-        label="" if samples.label is None else samples.label[start],
+        temp_degc=float(samples.mean(TEMP, start, stop)) if TEMP in samples else None,
+        label=samples.label(start),
         angles_rad=None,
     )
 
@@ -245,24 +242,25 @@ def _reason(
     """Why a still stretch is no pose; "" when it is one."""
     if pose.duration_s < layout.still_s:
         return f"{pose.duration_s:.1f} s still, needs {layout.still_s:.1f}"
-    reading = samples.reading[run[0] : run[1]]
-    deviation = reading.std(axis=0)
+    start, stop = run
+    deviation = samples.deviation(READING, start, stop)
+    first = samples.part(READING, start, start + 1)[0]
     for axis in range(3):
         moves = scale.low[axis] < scale.high[axis]
         stuck = moves and deviation[axis] == 0.0 and (np.delete(deviation, axis) > 0.0).any()
-        if stuck and reading[0, axis] in (scale.low[axis], scale.high[axis]):
+        if stuck and first[axis] in (scale.low[axis], scale.high[axis]):
             return (
-                f"axis {AXES[axis]} is clipped: it stays at {reading[0, axis]:g}, the end of what "
+                f"axis {AXES[axis]} is clipped: it stays at {first[axis]:g}, the end of what "
                 "the file shows; measure with a wider range"
             )
     moves_by = _moves(deviation, layout, scale)
     if moves_by:
         return moves_by
-    half = len(reading) // 2
-    drift = np.abs(reading[half:].mean(axis=0) - reading[:half].mean(axis=0))
+    half = start + (stop - start) // 2
+    drift = np.abs(samples.mean(READING, half, stop) - samples.mean(READING, start, half))
     assert pose.sd_mean is not None
     # Halves of independent noise differ by 2 standard errors of the mean.
-    noise = 2.0 * deviation / np.sqrt(len(reading))
+    noise = 2.0 * deviation / np.sqrt(stop - start)
     worst = int(np.argmax(drift - _DRIFT_MAX * noise))
     if drift[worst] > _DRIFT_MAX * noise[worst] and drift[worst] > deviation[worst]:
         return (
@@ -299,13 +297,13 @@ def _no_poses(
 
 def _wrong_clock(samples: Samples, layout: RecordingLayout) -> str:
     """What to do where the whole recording is shorter than a few poses can be; "" where not."""
-    whole = float(samples.time_s[-1]) + samples.step_s
+    whole = samples.one(TIME, len(samples) - 1) + samples.step_s
     if whole > 4.0 * layout.still_s:
         return ""
     told = f"the whole recording lasts {whole:.3g} s"
-    if layout.time is None:
+    if not layout.time:
         return f"{told} at {1.0 / samples.step_s:g} Hz: check sample_rate_hz"
-    scale = TIME_UNITS[layout.time_unit]
+    scale = TIME_UNITS[layout.time_unit[0]]
     near = [
         u for u, s in TIME_UNITS.items() if _STEPS_S[0] < samples.step_s / scale * s < _STEPS_S[1]
     ]

@@ -21,6 +21,7 @@ _BINARY = (
     (b"PK\x03\x04", "a ZIP archive"),
     (b"\xd0\xcf\x11\xe0", "an old Excel workbook"),
     (b"\x1f\x8b", "packed by gzip"),
+    (b"SQLite format 3", "an SQLite database"),
 )
 
 
@@ -90,6 +91,10 @@ class RecordingFile:
                 f"{len(found)} columns {shown(column)} ({key})",
                 expected="one of that name" if len(full) == 1 else "one of " + _some(full),
                 remedy="give its number from 1" if len(full) == 1 else "",
+            )
+        if not any(names) and self.source.row_word != "line":
+            raise RefusedError(
+                str(self.path), "holds no columns", expected=f"column {shown(column)} ({key})"
             )
         if not any(names):
             raise RefusedError(

@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from triaxcal.readings.measurements_csv import is_number
-from triaxcal.unit.recording import DELIMITERS, RecordingLayout
+from triaxcal.unit.recordingfile import DELIMITERS, FileLayout
 
 _SPACES = re.compile(r"[ \t]+")
-_LOOKED_AT = 200
+LOOKED_AT = 200
 """Lines in which the first row must be found."""
 _NUMBERS_MIN = 3
 _NEIGHBOURS = 3
@@ -34,66 +34,82 @@ class Line:
 
 @dataclass(frozen=True)
 class FoundTable:
-    """Names of the columns, cells, and their lines from 1."""
+    """Where the rows begin and how their cells are separated.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the columns; empty without a header.
+    start : int
+        Line of the first row, from 1; 0 where there is none.
+    delimiter : str
+    width : int
+        Cells of a row.
+    closed : bool
+        Whether a delimiter may close the line.
+    findings : tuple of str
+        What was left out above the rows.
+    """
 
     names: tuple[str, ...]
-    lines: list[int]
-    rows: list[list[str]]
+    start: int
+    delimiter: str
+    width: int
+    closed: bool
     findings: tuple[str, ...]
 
 
-def find_table(lines: Sequence[Line], layout: RecordingLayout) -> FoundTable:
-    """Rows and header of a text, with what is left open in the layout found."""
+def find_table(lines: Sequence[Line], layout: FileLayout) -> FoundTable:
+    """Rows and header from the first lines of a text, with what is left open in the layout found.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+        Of them `LOOKED_AT` and more that are no comment, where the text has as many.
+    """
     plain = [line for line in lines if not line.comment]
     first = _first_row(plain, layout)
     delimiter = layout.delimiter or _delimiter(plain[first].text, layout.decimal)
-    width = len(_trimmed(_split(plain[first].text, delimiter)))
+    cells = split_cells(plain[first].text, delimiter)
+    width = len(_trimmed(cells))
     above = [line for line in lines if line.number < plain[first].number]
     if layout.header is None:
-        header = _header(above, _wanted(layout), delimiter, width)
-        if len(plain) == 1 and not any(map(_numeric, _split(plain[0].text, delimiter))):
+        wanted = {name.lower() for name in layout.wanted}
+        header = _header(above, wanted, delimiter, width)
+        if len(plain) == 1 and not any(map(_numeric, cells)):
             header = plain[0]
     else:
         header = plain[0] if layout.header else None
-    names: tuple[str, ...] = ()
-    after = 0
-    if header is not None:
-        names = _names(_split(header.text, delimiter), width)
-        after = header.number
-    rows: list[list[str]] = []
-    numbers: list[int] = []
+    names = () if header is None else _names(split_cells(header.text, delimiter), width)
+    if len(names) == len(cells):
+        width = len(cells)  # the last cell of the first row is empty: no delimiter closes it
+    after = 0 if header is None else header.number
     skipped: list[int] = []
+    start = 0
     for line in plain:
-        cells = _split(line.text, delimiter)
-        if (
-            not rows
-            and line is not header
-            and (
-                line.number < after
-                or (line.number < plain[first].number and not _could_be_row(cells, width))
-            )
-        ):
-            skipped.append(line.number)
-        elif line is not header:
-            rows.append(cells)
-            numbers.append(line.number)
-    _drop_trailing(rows, width)
+        if line is header:
+            continue
+        could_be = _could_be_row(split_cells(line.text, delimiter), width)
+        if line.number >= after and (line.number >= plain[first].number or could_be):
+            start = line.number
+            break
+        skipped.append(line.number)
     findings: tuple[str, ...] = ()
     if skipped:
         plural = "s" * (len(skipped) != 1)
         findings = (f"{len(skipped)} line{plural} above the rows left out, from {skipped[0]} on",)
-    return FoundTable(names, numbers, rows, findings)
+    return FoundTable(names, start, delimiter, width, len(cells) > width, findings)
 
 
-def _first_row(plain: Sequence[Line], layout: RecordingLayout) -> int:
+def _first_row(plain: Sequence[Line], layout: FileLayout) -> int:
     """Index of the first row of numbers; of the second line, or the only one, where none is."""
-    for k, line in enumerate(plain[:_LOOKED_AT]):
+    for k, line in enumerate(plain[:LOOKED_AT]):
         delimiter = layout.delimiter or _delimiter(line.text, layout.decimal)
-        cells = _split(line.text, delimiter)
+        cells = split_cells(line.text, delimiter)
         if sum(map(_numeric, cells)) < _NUMBERS_MIN:
             continue
         near = plain[k + 1 : k + _NEIGHBOURS]
-        if all(len(_split(other.text, delimiter)) == len(cells) for other in near):
+        if all(len(split_cells(other.text, delimiter)) == len(cells) for other in near):
             return k
     return 1 if len(plain) > 1 else 0
 
@@ -102,7 +118,7 @@ def _header(above: Sequence[Line], wanted: set[str], delimiter: str, width: int)
     """Line of names above the first row; None where there is none."""
     best: tuple[int, int, Line] | None = None
     for line in above:
-        cells = _trimmed(_split(line.text, delimiter))
+        cells = _trimmed(split_cells(line.text, delimiter))
         if any(map(_numeric, cells)) or not width - 1 <= len(cells) <= width:
             continue
         known = {cell.strip("\"' ").lower() for cell in cells}
@@ -115,22 +131,9 @@ def _header(above: Sequence[Line], wanted: set[str], delimiter: str, width: int)
         return best[2]
     # A line of words just above, whatever its width: told as a header that does not fit.
     plain = [line for line in above if not line.comment]
-    if not plain or any(map(_numeric, _split(plain[-1].text, delimiter))):
+    if not plain or any(map(_numeric, split_cells(plain[-1].text, delimiter))):
         return None
     return plain[-1]
-
-
-def _wanted(layout: RecordingLayout) -> set[str]:
-    """Names of columns that the layout asks for."""
-    columns = [
-        *(c.column for c in layout.acceleration),
-        *(layout.gyro or ()),
-        *(layout.angles.columns if layout.angles else ()),
-        layout.time,
-        layout.temperature,
-        layout.section,
-    ]
-    return {column.lower() for column in columns if isinstance(column, str)}
 
 
 def _names(cells: Sequence[str], width: int) -> tuple[str, ...]:
@@ -155,14 +158,6 @@ def _trimmed(cells: Sequence[str]) -> list[str]:
     return list(cells[:-1]) if len(cells) > 1 and not cells[-1].strip() else list(cells)
 
 
-def _drop_trailing(rows: list[list[str]], width: int) -> None:
-    """Take off the empty cell after a closing delimiter, where every row has one."""
-    if rows and all(len(row) == width + 1 and not row[-1] for row in rows[:-1] or rows):
-        for row in rows:
-            if len(row) == width + 1:
-                row.pop()
-
-
 def _delimiter(line: str, decimal: str) -> str:
     """Delimiter of a line of numbers: the strongest there is, white space being the weakest."""
     for name in ("tab", "semicolon", "comma"):
@@ -172,7 +167,8 @@ def _delimiter(line: str, decimal: str) -> str:
     return DELIMITERS["space"]
 
 
-def _split(line: str, delimiter: str) -> list[str]:
+def split_cells(line: str, delimiter: str) -> list[str]:
+    """Cells of a line, without the white space around them."""
     if delimiter == " ":
         return _SPACES.split(line.strip())
     # Line by line: a stray quotation mark must not join lines.

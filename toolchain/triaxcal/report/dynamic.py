@@ -71,7 +71,7 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
             for w in seen.weak
         ],
         "known_only_together": [list(pair) for pair in seen.together],
-    }
+    } | ({"findings": list(done.findings)} if done.findings else {})
 
 
 def _states(result: DynamicResult) -> list[dict[str, Any]]:
@@ -106,6 +106,7 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
         f"unit            {unit.name}  (serial {unit.serial})",
         f"recording       {unit.recording.name}: {found.sections[-1].last + 1:_} samples, "
         f"{len(found.sections)} section{'s' * (len(found.sections) > 1)}".replace("_", " "),
+        *(f"                {finding}" for finding in done.findings),
         f"                first {found.sections[0].still_s:.0f} s at rest, {axis_up(result)} up",
     ]
     for stage in found.stages:

@@ -10,7 +10,8 @@ from triaxcal.fitting.pair.cross_coupling import NAMES, UNITS, PairFit, Recursio
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
-from triaxcal.readings.samples import Samples
+from triaxcal.readings.samples import READING, Samples
+from triaxcal.readings.table import TIME
 from triaxcal.report.pictures.line_plot import BAD, COLOURS, GOOD, Band, Line, Panel, line_plot
 from triaxcal.unit.recording import RecordingLayout
 
@@ -58,12 +59,13 @@ def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
 
 def poses_picture(samples: Samples, poses: PoseSet, layout: RecordingLayout) -> bytes:
     """Readings over time with the poses behind them, and the activity with its threshold."""
-    t = samples.time_s
+    rows = samples.table.spool.thinned()
+    t, reading = samples.cut(rows, TIME), samples.cut(rows, READING)
     bands = [Band(p.start_s, p.start_s + p.duration_s, GOOD, str(p.number)) for p in poses.poses]
     bands += [Band(r.start_s, r.start_s + r.duration_s, BAD, str(r.number)) for r in poses.refused]
-    low, high = np.percentile(samples.reading, [0.5, 99.5])
+    low, high = np.percentile(reading, [0.5, 99.5])
     room = 0.1 * float(high - low) or 1.0
-    lines = [Line(AXES[k], COLOURS[k], t, samples.reading[:, k]) for k in range(3)]
+    lines = [Line(AXES[k], COLOURS[k], t, reading[:, k]) for k in range(3)]
     panels = [
         Panel(
             f"readings, {layout.acceleration_unit}; green: poses, red: refused",
@@ -82,7 +84,7 @@ def poses_picture(samples: Samples, poses: PoseSet, layout: RecordingLayout) -> 
                 "activity, times its floor (powers of ten)",
                 "s",
                 [
-                    Line("activity", COLOURS[3], t, activity),
+                    Line("activity", COLOURS[3], poses.stillness.time_s, activity),
                     Line("threshold", "#d0021b", edges, level, dashed=True),
                 ],
             )
@@ -147,14 +149,15 @@ def _why(drift: Drift, scale: float, unit: str) -> str:
 def drift_picture(samples: Samples, drift: Drift, layout: RecordingLayout) -> bytes:
     """Each output over temperature, half-cycle by half-cycle: hysteresis is what lies between."""
     panels = []
+    reading = samples.part(READING)
     for k in range(3):
-        mean = float(samples.reading[:, k].mean())
+        mean = float(reading[:, k].mean())
         lines = [
             Line(
                 h.label(drift.temp_degc),
                 COLOURS[n % len(COLOURS)],
                 drift.temp_degc[h.start : h.stop],
-                _running(samples.reading[h.start : h.stop, k]) - mean,
+                _running(reading[h.start : h.stop, k]) - mean,
                 dashed=not h.rising,
             )
             for n, h in enumerate(drift.halves)

@@ -29,7 +29,8 @@ from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS, owners, the
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC, Settings
 from triaxcal.unit.certificate import CERTIFICATE, CertificateDetails, certificate_details
 from triaxcal.unit.measured import MEASURED, Measured
-from triaxcal.unit.recording import DEFAULT_LSB, FILE, RECORDING, RecordingLayout, recording_layout
+from triaxcal.unit.recording import DEFAULT_LSB, RECORDING, RecordingLayout, recording_layout
+from triaxcal.unit.recordingfile import FILE
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
 OUTPUT_Q_RANGE = (8, 30)

@@ -14,7 +14,22 @@ from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import TableKeys, Values, key, keys_of
-from triaxcal.base.kinds import FLAG, TEXT, Kind, checked, listed, meaning, number, whole, word
+from triaxcal.base.kinds import Kind, number, word
+from triaxcal.unit.recordingfile import (
+    COLUMN,
+    COLUMNS,
+    FILE,
+    SIGNED_COLUMNS,
+    STAMPS,
+    TEMPERATURE_UNITS,
+    TIMES,
+    ClockLayout,
+    Column,
+    FileLayout,
+    SignedColumn,
+    WrittenFile,
+    check_units,
+)
 
 SAMPLES, POSES, SECTIONS = "samples", "poses", "sections"
 ACCELERATION_UNITS: Mapping[str, float | None] = MappingProxyType(
@@ -25,13 +40,6 @@ DEFAULT_LSB: Mapping[str, float] = MappingProxyType(
     {"m/s^2": 2.0**-16, "g": 2.0**-20, "mg": 2.0**-10, "count": 1.0, "V": 2.0**-22, "mV": 2.0**-12}
 )
 """Reading of one raw code where [adc] says nothing: at 24 bits +-128 m/s^2, +-8 g, +-2 V."""
-TIME_UNITS: Mapping[str, float] = MappingProxyType(
-    {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "iso": 1.0}
-)
-TEMPERATURE_UNITS = ("degC", "K", "degF", "code")
-DELIMITERS: Mapping[str, str] = MappingProxyType(
-    {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
-)
 AIRCRAFT, INCLINOMETER = "aircraft", "inclinometer"
 ANGLE_NAMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {AIRCRAFT: ("pitch", "roll", "yaw"), INCLINOMETER: ("zenith", "tool_face", "azimuth")}
@@ -78,17 +86,6 @@ PRESETS: Mapping[str, Mapping[str, object]] = MappingProxyType(
     }
 )
 
-Column = str | int
-"""Name in the header, or number from 1."""
-
-
-@dataclass(frozen=True)
-class SignedColumn:
-    """A column, and the sign that its readings are given."""
-
-    column: Column
-    sign: int
-
 
 @dataclass(frozen=True)
 class Angles:
@@ -109,63 +106,12 @@ class Angles:
     unit: str
 
 
-def is_in_folder(name: object) -> bool:
-    """Whether the name of a file stays in the unit's folder."""
-    return (
-        isinstance(name, str)
-        and bool(name)
-        and not name.startswith("/")
-        and ".." not in name.replace("\\", "/").split("/")
-    )
-
-
-def _column(value: object) -> Column:
-    named = isinstance(value, str) and value != ""
-    numbered = isinstance(value, int) and not isinstance(value, bool) and value >= 1
-    if not (named or numbered):
-        raise ValueError
-    return value  # type: ignore[return-value]  # what `named` and `numbered` say
-
-
-def _signed_column(value: object) -> SignedColumn:
-    """Column; a minus before its name or number turns the sign of its readings."""
-    negative = value < 0 if isinstance(value, int) else str(value).startswith("-")
-    bare = -value if negative and isinstance(value, int) else value
-    bare = bare.removeprefix("-") if isinstance(bare, str) else bare
-    return SignedColumn(_column(bare), -1 if negative else 1)
-
-
-def _three_signed(value: object) -> tuple[SignedColumn, ...]:
-    found = tuple(map(_signed_column, value)) if isinstance(value, list) else ()
-    if len(found) != 3 or len({c.column for c in found}) != 3:
-        raise ValueError
-    return found
-
-
 def _faces(value: object) -> Mapping[str, str]:
     if not isinstance(value, dict) or not all(face in FACES for face in value.values()):
         raise ValueError
     return {str(label): str(face) for label, face in value.items()}
 
 
-FILE: Kind[str] = checked(
-    is_in_folder,
-    "a file in the unit's folder",
-    {"type": "string"},
-    '"recording.csv"',
-    "copy it there",
-)
-_SCHEMA = {"anyOf": [{"type": "string", "minLength": 1}, {"type": "integer"}]}
-COLUMN = Kind("the name of a column, or its number from 1", _column, _SCHEMA, example='"column"')
-COLUMNS = listed(
-    COLUMN, range(3, 4), "a list of 3 different columns, by name or number", different=True
-)
-SIGNED_COLUMNS = Kind(
-    'three different columns, by name or number, as ["ax", "-ay", "az"]',
-    _three_signed,
-    {"type": "array", "items": _SCHEMA, "minItems": 3, "maxItems": 3},
-    example='["ax", "ay", "az"]',
-)
 LABELLED_FACES = Kind(
     'a label and the axis that points up each, as {top = "+z", bottom = "-z"}',
     _faces,
@@ -174,9 +120,9 @@ LABELLED_FACES = Kind(
 )
 
 
-@dataclass(frozen=True)
-class RecordingLayout:
-    """[recording]: what a recording's file is; absent optional columns are None."""
+@dataclass(frozen=True, kw_only=True)
+class _RecordedFile:
+    """The file and its rows."""
 
     file: str = key(FILE, "File of the recording, in the unit's folder or below it.")
     preset: str | None = key(
@@ -187,26 +133,12 @@ class RecordingLayout:
         'What a row is. "sections": a sample, and each stretch with one label is a pose.',
         SAMPLES,
     )
-    delimiter: str | None = key(
-        meaning(DELIMITERS),
-        'What separates the cells; "space" is any white space.',
-        None,
-        default_words="found from the file",
-    )
-    header: bool | None = key(
-        FLAG, "Whether the first line names the columns.", None, default_words="found from the file"
-    )
-    skip_rows: int = key(
-        whole(0, 10**6),
-        "Lines above the header or the first row. What a logger writes there is found without it.",
-        0,
-        "lines",
-    )
-    comment: str = key(TEXT, "Lines that begin with it are ignored.", "#")
-    decimal: str = key(word((".", ",")), "Decimal sign.", ".")
-    variable: str | None = key(
-        TEXT, "Matrix of a MAT-file, for columns by number.", None, default_words="the only matrix"
-    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingLayout(WrittenFile, _RecordedFile):
+    """[recording]: what a recording's file is; absent optional columns are None."""
+
     acceleration: tuple[SignedColumn, ...] = key(
         SIGNED_COLUMNS,
         'Readings of x, y, z, by name or number from 1; "-ay" or -2 turns the sign.',
@@ -221,11 +153,21 @@ class RecordingLayout:
         default_words="of the preset; required without one",
         example='"m/s^2"',
     )
-    time: Column | None = key(COLUMN, "Time of each sample.", None, example='"time"')
-    time_unit: str = key(
-        word(tuple(TIME_UNITS)),
-        'Unit of `time`; "iso" is 2026-03-30T12:00:00.25 or 12:00:00.25.',
-        "s",
+    time: tuple[Column, ...] = key(
+        TIMES,
+        'Time of each row; a list is added up, as ["sec", "nanosec"], or put together, as '
+        '["date", "time"].',
+        (),
+        default_words="none",
+        example='"time"',
+    )
+    time_unit: tuple[str, ...] = key(
+        STAMPS,
+        'Unit of `time`, or a list of them; "iso" is 2026-03-30T12:00:00.25, 12:00:00.25 or, of '
+        "two columns, a date and a time of day.",
+        ("s",),
+        default_words='`"s"`',
+        example='"s"',
     )
     sample_rate_hz: float | None = key(
         number(1e-3, 1e6), "Rate of even samples, in place of `time`.", None, "Hz", example="100"
@@ -282,6 +224,19 @@ class RecordingLayout:
         return ACCELERATION_UNITS[self.acceleration_unit]
 
     @property
+    def written(self) -> FileLayout:
+        """How the file is written."""
+        columns = [c.column for c in self.acceleration]
+        columns += [*self.time, *(self.gyro or ()), *(self.angles.columns if self.angles else ())]
+        columns += [column for column in (self.temperature, self.section) if column is not None]
+        return self.layout("recording", columns)
+
+    @property
+    def clock(self) -> ClockLayout:
+        """Where the times are."""
+        return ClockLayout(self.time, self.time_unit, self.sample_rate_hz)
+
+    @property
     def angles(self) -> Angles | None:
         """Angles of the rows, None without them."""
         for kind_of_angles, names in ANGLE_NAMES.items():
@@ -319,7 +274,8 @@ def recording_layout(values: Values) -> RecordingLayout | None:
                 expected=values.keys[required].kind.expected,
                 remedy="or name a preset: " + ", ".join(PRESETS),
             )
-    clock = layout.time is not None or layout.sample_rate_hz is not None
+    check_units(values, layout.time, layout.time_unit)
+    clock = layout.time or layout.sample_rate_hz is not None
     if layout.rows == SAMPLES and not layout.faces and not clock:
         raise RefusedError(
             values.where("time"), "missing", expected="a time column, or sample_rate_hz"
@@ -334,7 +290,7 @@ def recording_layout(values: Values) -> RecordingLayout | None:
         raise RefusedError(values.where("faces"), "given without section", expected="its column")
     _check_angles(values, layout)
     # A time column says more than a rate; a preset's rate yields to it.
-    return layout if layout.time is None else replace(layout, sample_rate_hz=None)
+    return layout if not layout.time else replace(layout, sample_rate_hz=None)
 
 
 def _check_angles(values: Values, layout: RecordingLayout) -> None:

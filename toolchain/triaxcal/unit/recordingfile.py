@@ -1,43 +1,196 @@
-"""How the file of a recording is written, whatever its columns mean."""
+"""How the file of a recording is written, and what a column of it is, in any table."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from types import MappingProxyType
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.keys import Values, key
+from triaxcal.base.kinds import FLAG, TEXT, Kind, checked, listed, meaning, whole, word
 
 DELIMITERS: Mapping[str, str] = MappingProxyType(
     {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 )
+
+ISO = "iso"
+TIME_UNITS: Mapping[str, float] = MappingProxyType(
+    {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, ISO: 1.0}
+)
+
+TEMPERATURE_UNITS = ("degC", "K", "degF", "code")
 
 Column = str | int
 """Name in the file, or number from 1."""
 
 
 @dataclass(frozen=True)
-class FileLayout:
-    """How a file is written, as far as a table of unit.toml says it.
+class SignedColumn:
+    """A column, and the sign that its readings are given."""
+
+    column: Column
+    sign: int
+
+
+def is_in_folder(name: object) -> bool:
+    """Whether the name of a file stays in the unit's folder."""
+    return (
+        isinstance(name, str)
+        and bool(name)
+        and not name.startswith("/")
+        and ".." not in name.replace("\\", "/").split("/")
+    )
+
+
+def _column(value: object) -> Column:
+    named = isinstance(value, str) and value != ""
+    numbered = isinstance(value, int) and not isinstance(value, bool) and value >= 1
+    if not (named or numbered):
+        raise ValueError
+    return value  # type: ignore[return-value]  # what `named` and `numbered` say
+
+
+def _signed_column(value: object) -> SignedColumn:
+    """Column; a minus before its name or number turns the sign of its readings."""
+    negative = value < 0 if isinstance(value, int) else str(value).startswith("-")
+    bare = -value if negative and isinstance(value, int) else value
+    bare = bare.removeprefix("-") if isinstance(bare, str) else bare
+    return SignedColumn(_column(bare), -1 if negative else 1)
+
+
+def _three_signed(value: object) -> tuple[SignedColumn, ...]:
+    found = tuple(map(_signed_column, value)) if isinstance(value, list) else ()
+    if len(found) != 3 or len({c.column for c in found}) != 3:
+        raise ValueError
+    return found
+
+
+FILE: Kind[str] = checked(
+    is_in_folder,
+    "a file in the unit's folder",
+    {"type": "string"},
+    '"recording.csv"',
+    "copy it there",
+)
+_SCHEMA = {"anyOf": [{"type": "string", "minLength": 1}, {"type": "integer"}]}
+COLUMN = Kind("the name of a column, or its number from 1", _column, _SCHEMA, example='"column"')
+_TIMES = listed(COLUMN, range(1, 5), "", different=True)
+TIMES: Kind[tuple[Column, ...]] = Kind(
+    "a column by name or number, or a list of up to four",
+    lambda value: _TIMES.parse(value if isinstance(value, list) else [value]),
+    {"anyOf": [_SCHEMA, _TIMES.schema]},
+    example='"time"',
+)
+_UNIT = word(tuple(TIME_UNITS))
+STAMPS: Kind[tuple[str, ...]] = Kind(
+    _UNIT.expected + ", or a list with one for each column",
+    lambda value: tuple(map(_UNIT.parse, value if isinstance(value, list) else [value])),
+    {"anyOf": [_UNIT.schema, {"type": "array", "items": _UNIT.schema}]},
+    choices=_UNIT.choices,
+    example='"s"',
+)
+COLUMNS = listed(
+    COLUMN, range(3, 4), "a list of 3 different columns, by name or number", different=True
+)
+SIGNED_COLUMNS = Kind(
+    'three different columns, by name or number, as ["ax", "-ay", "az"]',
+    _three_signed,
+    {"type": "array", "items": _SCHEMA, "minItems": 3, "maxItems": 3},
+    example='["ax", "ay", "az"]',
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrittenFile:
+    """How a file is written."""
+
+    format: str | None = key(
+        TEXT, "Format of the file, by its name.", None, default_words="found by the content"
+    )
+    variable: str | None = key(
+        TEXT,
+        "Matrix, sheet, topic or group of a file that holds several.",
+        None,
+        default_words="the only one",
+    )
+    delimiter: str | None = key(
+        meaning(DELIMITERS),
+        'What separates the cells of text; "space" is any white space.',
+        None,
+        default_words="found from the file",
+    )
+    header: bool | None = key(
+        FLAG,
+        "Whether the first line of text names the columns.",
+        None,
+        default_words="found from the file",
+    )
+    skip_rows: int = key(
+        whole(0, 10**6),
+        "Lines above the header or the first row. What a logger writes there is found without it.",
+        0,
+        "lines",
+    )
+    comment: str = key(TEXT, "Lines of text that begin with it are ignored.", "#")
+    decimal: str = key(word((".", ",")), "Decimal sign of text.", ".")
+
+    def layout(self, table: str, columns: Sequence[Column]) -> FileLayout:
+        """Layout of the file of `table`, of which `columns` will be asked for."""
+        wanted = tuple(column for column in columns if isinstance(column, str))
+        written = {f.name: getattr(self, f.name) for f in fields(WrittenFile)}
+        return FileLayout(table, wanted, **written)
+
+
+@dataclass(frozen=True)
+class FileLayout(WrittenFile):
+    """How a file is written, for its reader.
 
     Attributes
     ----------
     table : str
-        Name of that table, "recording" or "dynamic", for messages.
-    format : str or None
-        Name of a format; None finds it from the content.
-    variable : str or None
-        Matrix, sheet, topic or group of a file that holds several.
-    delimiter, header, skip_rows, comment, decimal
-        Of text; None finds delimiter and header.
+        Name of the table that says it, "recording" or "dynamic", for messages.
     wanted : tuple of str
         Names of columns that will be asked for: they tell a header from a remark.
     """
 
     table: str
-    format: str | None = None
-    variable: str | None = None
-    delimiter: str | None = None
-    header: bool | None = None
-    skip_rows: int = 0
-    comment: str = "#"
-    decimal: str = "."
     wanted: tuple[str, ...] = ()
+
+
+def check_units(values: Values, time: Sequence[Column], units: Sequence[str]) -> None:
+    """Refuse `time_unit` with another number of units than there are columns of time."""
+    if len(units) not in {1, max(len(time), 1)}:
+        raise RefusedError(
+            values.where("time_unit"),
+            f"{len(units)} units for {len(time)} columns of time",
+            expected="one unit, or one for each column",
+        )
+
+
+@dataclass(frozen=True)
+class ClockLayout:
+    """Where the times of the rows are.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        Times that are added up, as seconds and nanoseconds, or a date and a time of day; empty
+        where the rows are evenly spaced.
+    units : tuple of str
+        Of `TIME_UNITS`: one for all columns, or one each.
+    rate_hz : float or None
+        Of rows that are evenly spaced.
+    from_first : bool
+        Whether time starts with the first row, so that large stamps keep all their digits.
+    """
+
+    columns: tuple[Column, ...]
+    units: tuple[str, ...]
+    rate_hz: float | None = None
+    from_first: bool = True
+
+    @property
+    def unit_of(self) -> tuple[str, ...]:
+        """Unit of each column."""
+        return self.units * (len(self.columns) if len(self.units) == 1 else 1)

@@ -16,7 +16,8 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import BoolArray, FloatArray
-from triaxcal.readings.samples import Samples
+from triaxcal.readings.samples import READING, TEMP, Samples
+from triaxcal.readings.table import TIME
 
 SMOOTH_S = 60.0
 """Window of the temperature's slope: units warm over minutes, thermometers jitter by tenths."""
@@ -101,7 +102,7 @@ def study(samples: Samples) -> Drift:
     RefusedError
         When there is no temperature, or it does not move.
     """
-    if samples.temp_degc is None:
+    if TEMP not in samples:
         raise RefusedError(
             samples.source,
             "no temperature column",
@@ -116,21 +117,21 @@ def study(samples: Samples) -> Drift:
             f"the temperature stays within {np.ptp(temp):.2g} degC",
             expected=f"a change of {TURN_DEGC:g} degC at least",
         )
-    rows = _rows(samples.reading, temp, rate, halves)
+    reading = samples.part(READING)
+    rows = _rows(reading, temp, rate, halves)
     best = min(row.score for row in rows)
     # A tenth: half-cycles are few, and an rms of three is known to no better than a third.
     chosen = min(
         (row for row in rows if row.score <= 1.1 * best or math.isinf(best)),
         key=lambda row: (row.parameters, row.score),
     )
-    size, where = hysteresis(samples.reading, temp, halves)
+    size, where = hysteresis(reading, temp, halves)
     return Drift(temp, rate, halves, rows, chosen, size, where)
 
 
 def smoothed(samples: Samples) -> tuple[FloatArray, FloatArray]:
     """Temperature and its slope, each (n,), by a straight line in a centred window."""
-    assert samples.temp_degc is not None
-    t, temp = samples.time_s, samples.temp_degc
+    t, temp = samples.part(TIME), samples.part(TEMP)
     half = max(2, round(SMOOTH_S / samples.step_s / 2.0))
     n = len(t)
     low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)

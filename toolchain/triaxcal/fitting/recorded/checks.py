@@ -11,7 +11,8 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import ALIKE_DEG, PoseSet
-from triaxcal.readings.samples import Samples
+from triaxcal.readings.samples import GYRO, READING, Samples
+from triaxcal.readings.spool import SAMPLED
 from triaxcal.unit.recording import SAMPLES, RecordingLayout
 
 CONDITION_MAX = 100.0
@@ -99,12 +100,9 @@ def refuse_left_handed(samples: Samples, layout: RecordingLayout, centre: FloatA
     A force fixed in the world, seen from the turning unit, obeys da/dt = a x w. Over slow movement
     both sides correlate for one way of naming and signing the axes: it must be theirs.
     """
-    if samples.gyro is None or layout.rows != SAMPLES or len(samples.reading) < _MOVING_MIN:
+    if GYRO not in samples or layout.rows != SAMPLES or len(samples) < _MOVING_MIN:
         return _HANDED_UNKNOWN
-    window = max(1, round(0.1 / samples.step_s))
-    force = _smooth(samples.reading - centre, window)
-    rate = _smooth(samples.gyro - np.median(samples.gyro, axis=0), window)
-    change = np.gradient(force, axis=0)
+    force, change, rate = _slow_movement(samples, centre)
     length, speed = np.linalg.norm(force, axis=1), np.linalg.norm(rate, axis=1)
     middle = float(np.median(length))
     # Where |a| is far from 1 g the hand pushes, and it is not gravity that is seen.
@@ -131,6 +129,29 @@ def refuse_left_handed(samples: Samples, layout: RecordingLayout, centre: FloatA
         expected="da/dt = a x w, right-handed axes for both",
         remedy=f"left-handed axes? then {columns}; if only the gyro is turned, leave it out",
     )
+
+
+def _slow_movement(
+    samples: Samples, centre: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Force less its bias, its change a sample, and rate less its own, over 0.1 s, (n, 3) each.
+
+    Of a long recording the four pieces in which the gyro moves most: no more is needed.
+    """
+    parts = [(0, len(samples))]
+    if len(samples) > SAMPLED:
+        moving = sorted(
+            (-float(samples.cut(rows, GYRO).var(axis=0).sum()), first, first + len(rows))
+            for first, rows in samples.pieces()
+        )
+        parts = [(first, last) for _, first, last in moving[:4] if last - first > _MOVING_MIN]
+    window = max(1, round(0.1 / samples.step_s))
+    rates = [samples.part(GYRO, *part) for part in parts]
+    bias = np.median(np.concatenate(rates), axis=0)
+    force = [_smooth(samples.part(READING, *part) - centre, window) for part in parts]
+    change = [np.gradient(part, axis=0) for part in force]
+    rate = [_smooth(part - bias, window) for part in rates]
+    return np.concatenate(force), np.concatenate(change), np.concatenate(rate)
 
 
 def _correlation(change: FloatArray, force: FloatArray, rate: FloatArray) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import groupby
-
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
@@ -11,12 +9,14 @@ from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.fitting.recorded.checks import refuse_wrong_unit
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.thermal.shape import GROUP_GAP_DEGC
-from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
-from triaxcal.readings.samples import Samples
+from triaxcal.readings.samples import READING, TEMP, Samples
+from triaxcal.readings.table import ROW
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import FACES, RecordingLayout
 
+Run = tuple[int, int]
+"""Start and stop of samples, stop excluded."""
 _MOVING = 0.1
 """Of 1 g: a section whose readings scatter by more was not held still."""
 
@@ -34,18 +34,16 @@ def face_measurements(
     RefusedError
         When a face has no section, readings are in another unit, or the unit moved.
     """
-    assert samples.label is not None
-    runs = _runs(samples.label)
-    faces = [(layout.faces[label], part) for label, part in runs if label in layout.faces]
+    labelled = ((samples.label(run[0]), run) for run in samples.runs())
+    faces = [(layout.faces[label], run) for label, run in labelled if label in layout.faces]
     _refuse_missing(unit, layout, samples)
-    means = np.array([samples.reading[part].mean(axis=0) for _, part in faces])
+    means = np.array([samples.mean(READING, *run) for _, run in faces])
     refuse_wrong_unit(samples.source, means, layout)
     one_g = float(np.median(np.linalg.norm(means - means.mean(axis=0), axis=1)))
-    for _, part in faces:
-        _refuse_moving(samples, part, one_g)
+    for _, run in faces:
+        _refuse_moving(samples, run, one_g)
     temps = [
-        unit.t0_degc if samples.temp_degc is None else float(samples.temp_degc[part].mean())
-        for _, part in faces
+        float(samples.mean(TEMP, *run)) if TEMP in samples else unit.t0_degc for _, run in faces
     ]
     cells = _cells([face for face, _ in faces], temps)
     return MeasurementSet(
@@ -55,7 +53,6 @@ def face_measurements(
 
 def _refuse_missing(unit: UnitDescription, layout: RecordingLayout, samples: Samples) -> None:
     """Refuse a face without a section, by the label that it should have."""
-    assert samples.label is not None
     unnamed = [face for face in FACES if face not in layout.faces.values()]
     if unnamed:
         raise RefusedError(
@@ -65,7 +62,7 @@ def _refuse_missing(unit: UnitDescription, layout: RecordingLayout, samples: Sam
             remedy='name the sections in which these axes point up, or leave out faces: "|a| = g" '
             "alone then serves",
         )
-    present = set(samples.label)
+    present = set(samples.table.labels or ())
     for face in FACES:
         labels = [label for label, up in layout.faces.items() if up == face]
         if present.isdisjoint(labels):
@@ -78,15 +75,6 @@ def _refuse_missing(unit: UnitDescription, layout: RecordingLayout, samples: Sam
                 expected="one of each label in [recording] faces",
                 remedy="correct the label in faces, or record that face",
             )
-
-
-def _runs(labels: tuple[str, ...]) -> list[tuple[str, slice]]:
-    runs, start = [], 0
-    for label, part in groupby(labels):
-        stop = start + len(list(part))
-        runs.append((label, slice(start, stop)))
-        start = stop
-    return runs
 
 
 def _cells(faces: list[str], temps: list[float]) -> list[list[int]]:
@@ -102,14 +90,15 @@ def _cells(faces: list[str], temps: list[float]) -> list[list[int]]:
 
 
 def _dwell(
-    samples: Samples, faces: list[tuple[str, slice]], temps: list[float], cell: list[int]
+    samples: Samples, faces: list[tuple[str, Run]], temps: list[float], cell: list[int]
 ) -> Dwell:
-    reading: FloatArray = np.concatenate([samples.reading[faces[k][1]] for k in cell])
+    runs = [faces[k][1] for k in cell]
+    totals = [samples.total(READING, *run) for run in runs]
     return Dwell(
-        row=int(samples.line[faces[cell[0]][1].start]),
+        row=int(samples.one(ROW, runs[0][0])),
         position=position_of(faces[cell[0]][0]),
         temp_degc=float(np.mean([temps[k] for k in cell])),
-        voltage_v=reading.mean(axis=0),
+        voltage_v=np.sum(totals, axis=0) / sum(stop - start for start, stop in runs),
         count=None,
         sd_v=None,
     )
@@ -122,15 +111,14 @@ def position_of(face: str) -> str:
     return next(name for name, force in TEST_POSITIONS.items() if force[axis] == sign)
 
 
-def _refuse_moving(samples: Samples, part: slice, one_g: float) -> None:
-    deviation = samples.reading[part].std(axis=0)
+def _refuse_moving(samples: Samples, run: Run, one_g: float) -> None:
+    deviation = samples.deviation(READING, *run)
     if deviation.max() <= _MOVING * one_g:
         return
     axis = int(deviation.argmax())
-    assert samples.label is not None
     raise RefusedError(
-        f"{samples.source}, line {samples.line[part.start]}",
-        f'section "{samples.label[part.start]}" moves: axis {AXES[axis]} scatters by '
+        samples.place(run[0]),
+        f'section "{samples.label(run[0])}" moves: axis {AXES[axis]} scatters by '
         f"{deviation[axis] / one_g:.2g} g",
         expected=f"at most {_MOVING:g} g while the unit lies on a face",
         remedy="cut the section to where it lies still",

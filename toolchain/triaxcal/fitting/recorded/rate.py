@@ -12,7 +12,9 @@ import numpy as np
 from triaxcal.fitting.core.drift import half_cycles
 from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.poses.poses import PoseSet
-from triaxcal.readings.samples import Samples
+from triaxcal.readings.samples import TEMP, Samples
+from triaxcal.readings.spool import SAMPLED
+from triaxcal.readings.table import TIME
 from triaxcal.unit.recording import SAMPLES, RecordingLayout
 
 WINDOW_S = 60.0
@@ -29,24 +31,34 @@ def pose_rates(samples: Samples, poses: PoseSet, layout: RecordingLayout) -> Flo
     None without temperatures or a clock, and where at no pose the temperature goes as far as one
     step of the thermometer: on plateaus there is no rate to be seen.
     """
-    if samples.temp_degc is None or layout.rows != SAMPLES or len(poses.poses) < 2:
+    if TEMP not in samples or layout.rows != SAMPLES or len(poses.poses) < 2:
         return None
-    t, temp = samples.time_s, samples.temp_degc
+    end_s = samples.one(TIME, len(samples) - 1)
     starts = np.array([p.start_s for p in poses.poses])
     stops = starts + np.array([p.duration_s for p in poses.poses])
-    levels = np.unique(temp.round(_ROUNDING_DECIMALS))
-    step = float(np.diff(levels).min()) if len(levels) > 1 else np.inf
+    step = _thermometer_step(samples)
     rates, moved = [], 0.0
     for k, middle in enumerate((starts + stops) / 2.0):
-        half = max(min(WINDOW_S / 2.0, middle - t[0], t[-1] - middle), _HALF_MIN_S)
-        first, last = np.searchsorted(t, (middle - half, middle + half))
-        if t[last - 1] - t[first] < half:
+        half = max(min(WINDOW_S / 2.0, middle, end_s - middle), _HALF_MIN_S)
+        first, last = samples.first_from(middle - half), samples.first_from(middle + half)
+        if samples.one(TIME, last - 1) - samples.one(TIME, first) < half:
             begin, end = starts[max(k - 1, 0)], stops[min(k + 1, len(stops) - 1)]
-            first, last = np.searchsorted(t, (begin, end))
-        x = t[first:last] - t[first:last].mean()
-        rates.append(float(x @ temp[first:last]) / (float(x @ x) or 1.0))
+            first, last = samples.first_from(begin), samples.first_from(end)
+        t = samples.part(TIME, first, last)
+        x = t - t.mean()
+        rates.append(float(x @ samples.part(TEMP, first, last)) / (float(x @ x) or 1.0))
         moved = max(moved, abs(rates[-1]) * float(x[-1] - x[0]))
     return np.array(rates) if moved >= step else None
+
+
+def _thermometer_step(samples: Samples) -> float:
+    """Least difference of two temperatures, degC; infinite where they are all the same."""
+    levels = np.empty(0)
+    for _, rows in samples.pieces():
+        levels = np.union1d(levels, samples.cut(rows, TEMP).round(_ROUNDING_DECIMALS))
+        if len(levels) > SAMPLED:  # no steps but noise
+            break
+    return float(np.diff(levels).min()) if len(levels) > 1 else np.inf
 
 
 def half_cycle_turns(temps_degc: FloatArray) -> list[tuple[BoolArray, BoolArray]]:

@@ -21,7 +21,7 @@ from triaxcal.model.curves import ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.report.files import all_files
 from triaxcal.report.passport.content import Passport, passport
-from triaxcal.unit.recording import is_in_folder
+from triaxcal.unit.recordingfile import is_in_folder
 
 _GRID = 23
 
