@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.outputs.image import IMAGE_FILE
 from triaxcal.codegen.tryout import model_error_g
-from triaxcal.delivery.firmware import IMAGE_FILE
 from triaxcal.delivery.unit import Delivery
 from triaxcal.model.metrological import exact_gain_and_offset, worst_force_error_g
 from triaxcal.report.files import all_files

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 from collections.abc import Iterator
@@ -21,6 +22,8 @@ from triaxcal.base.registry import Registry
 from triaxcal.batch.run import Series
 from triaxcal.cli.main import main
 from triaxcal.codegen.crosscheck import vector_sets
+from triaxcal.codegen.outputs.output import Output
+from triaxcal.codegen.outputs.registry import OUTPUTS
 from triaxcal.delivery import unit as delivery_module
 from triaxcal.delivery.unit import deliver
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
@@ -37,6 +40,7 @@ from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.series.page import series_files
 from triaxcal.report.series.unit import unit_record
 from triaxcal.report.summary import summary
+from triaxcal.targets.cores.registry import CORES
 from triaxcal.uncertainty.evaluate import uncertainty
 from triaxcal.unit.description import ThermalChoice, read_unit, tilter_file
 
@@ -129,9 +133,23 @@ TOY_METHOD = CompensationMethod(
 )
 
 
+# ---- a toy output: the plan's order as text ----
+
+TOY_OUTPUT = Output(
+    name="toy-text",
+    label="Toy text",
+    doc="The order of the plan's functions.",
+    files=lambda job: {"toy.txt": f"order {job.plan.shape.order}".encode()},
+)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def toys() -> Iterator[None]:
-    with THERMAL_FUNCTIONS.added(TOY_FUNCTION), METHODS.added(TOY_METHOD):
+    with (
+        THERMAL_FUNCTIONS.added(TOY_FUNCTION),
+        METHODS.added(TOY_METHOD),
+        OUTPUTS.added(TOY_OUTPUT),
+    ):
         yield
 
 
@@ -204,6 +222,14 @@ def test_the_json_has_their_names_and_labels(files: dict[str, str]) -> None:
     verification = json.loads(files["verification.json"])
     assert verification["method"] == "toy-frozen"
     assert set(verification["residuals_g"]) == {"before", *METHODS.names}
+
+
+def test_an_output_is_delivered_and_hashed_with_the_others(files: dict[str, str]) -> None:
+    assert files["toy.txt"] == "order 0"
+    digest = hashlib.sha256(b"order 0").hexdigest()
+    assert json.loads(files["verification.json"])["files_sha256"]["toy.txt"] == digest
+    assert json.loads(files["passport.json"])["files_sha256"]["toy.txt"] == digest
+    assert "toy.txt" in files["passport.html"]
 
 
 def test_the_method_is_run_like_the_others(made: Passport) -> None:
@@ -374,9 +400,11 @@ def test_a_file_with_a_broken_entry_is_named_when_it_is_loaded(
         assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("registry", [THERMAL_FUNCTIONS, METHODS, EXTENSIONS], ids=lambda r: r.kind)
+@pytest.mark.parametrize(
+    "registry", [THERMAL_FUNCTIONS, METHODS, EXTENSIONS, OUTPUTS, CORES], ids=lambda r: r.kind
+)
 def test_entries_are_words_for_people(registry: Registry) -> None:  # type: ignore[type-arg]
-    assert len(registry.names) == len(set(registry.names)) >= 3
+    assert len(registry.names) == len(set(registry.names)) >= 2
     for entry in registry:
         assert entry.doc.endswith(".")
         assert entry.doc[0].isupper()

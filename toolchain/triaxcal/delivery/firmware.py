@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.codegen.constants import Provenance, render_constants
-from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.render import render_routine
+from triaxcal.codegen.constants import Provenance
+from triaxcal.codegen.outputs.output import Job
+from triaxcal.codegen.outputs.registry import output_files
 from triaxcal.codegen.tryout import model_error_g
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.fitting.core.calibration import Calibration
@@ -17,8 +17,6 @@ from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.unit.description import UnitDescription
-
-IMAGE_FILE = "triax_calib.bin"
 
 
 @dataclass(frozen=True)
@@ -91,11 +89,7 @@ def _files(fitted: Fitted, compensation: Compensation, plan: Plan) -> dict[str, 
     provenance = Provenance(
         unit.serial, fitted.inputs_sha256, (*summary, *_constants_at_t0(calibration))
     )
-    texts = render_routine(plan)
-    texts |= render_constants(plan, unit.temperature_sensor, provenance)
-    files = {name: text.encode() for name, text in texts.items()}
-    files[IMAGE_FILE] = image_bytes(plan)
-    return files
+    return output_files(Job(plan, unit.temperature_sensor, provenance))
 
 
 def _reading_note(unit: UnitDescription, calibration: Calibration) -> tuple[str, ...]:

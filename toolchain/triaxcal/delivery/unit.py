@@ -18,6 +18,7 @@ from triaxcal.codegen.compiler import Compilation, reference_under_way
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images
+from triaxcal.codegen.outputs.image import IMAGE_FILE
 from triaxcal.codegen.routines import (
     Generated,
     Int32Array,
@@ -27,7 +28,7 @@ from triaxcal.codegen.routines import (
     start_generated,
 )
 from triaxcal.codegen.tryout import MethodResult, run_on_dwells
-from triaxcal.delivery.firmware import IMAGE_FILE, Firmware, compensation_of, make_firmware
+from triaxcal.delivery.firmware import Firmware, compensation_of, make_firmware
 from triaxcal.delivery.fitted import Fitted, fit_folder, refuse_beyond_limits
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.acceptance import dwells_in_range

@@ -11,9 +11,10 @@ from pathlib import Path
 
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.outputs.image import IMAGE_FILE
 from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.templates import names_of
-from triaxcal.delivery.firmware import IMAGE_FILE, compensation_of
+from triaxcal.delivery.firmware import compensation_of
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.gyro import make_gyro_plan

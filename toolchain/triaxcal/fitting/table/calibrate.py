@@ -117,7 +117,7 @@ def _trials(
     return [
         trial
         for trial in one_temperature_trials(shapes[0])
-        if unit.terms == "auto" or (unit.terms == "quadratic") == trial.label.startswith("quadr")
+        if unit.terms == "auto" or (unit.terms == "quadratic") == trial.quadratic
     ]
 
 

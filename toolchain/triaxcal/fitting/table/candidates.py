@@ -102,6 +102,7 @@ class TableTrial:
     solver: Callable[[FloatArray, FloatArray], OrientedFit] | None
     unknowns: int
     gains: int = 1
+    quadratic: bool = False
 
     @property
     def parameters(self) -> int:
@@ -170,8 +171,8 @@ def one_temperature_trials(shape: ThermalShape) -> list[TableTrial]:
         TableTrial("linear (12)", "inverse form", shape, inverse_linear, 12),
         TableTrial("linear (28)", "forward form", shape, _forward, 12),
         TableTrial("nine constants and the turn to the table", "|a| = g", shape, _scalar, 12),
-        TableTrial("quadratic (13)", "inverse form", shape, inverse_quadratic, 27),
-        TableTrial("quadratic (29)", "forward form", shape, _forward_quadratic, 27),
+        TableTrial("quadratic (13)", "inverse form", shape, inverse_quadratic, 27, quadratic=True),
+        TableTrial("quadratic (29)", "forward form", shape, _forward_quadratic, 27, quadratic=True),
     ]
 
 
