@@ -18,6 +18,7 @@ from triaxcal.codegen.crosscheck import vector_sets
 from triaxcal.codegen.routines import Generated, start_generated
 from triaxcal.delivery import unit as delivery_module
 from triaxcal.delivery.unit import deliver
+from triaxcal.fitting.recorded.temperatures import temperature_groups, thermal_shapes
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.metrological import force_from_voltage, voltage_from_force
 from triaxcal.model.positions import TEST_POSITIONS
@@ -228,4 +229,20 @@ def test_the_whole_road_to_proven_c(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert (
         b"thermal model: natural cubic spline, knots -40, -20, 0, 20, 40, 55, 70 degC"
         in delivery.files["triax_calib.h"]
+    )
+
+
+def test_a_recording_tries_nested_functions_only() -> None:
+    """Its constants are fitted with the first functions of a basis, which a spline's are not."""
+    temps = np.linspace(-20.0, 60.0, 40)
+    groups = temperature_groups(temps)
+    order_0 = unit(thermal=ThermalChoice("polynomial", {"order": 0}))
+    assert [s.label for s in thermal_shapes(order_0, temps, groups)] == ["polynomial of order 0"]
+    tried = [s.label for s in thermal_shapes(unit(), temps, groups)]
+    assert tried == [f"polynomial of order {n}" for n in range(4)]
+    with pytest.raises(RefusedError) as caught:
+        thermal_shapes(unit(thermal=ThermalChoice("cubic-spline")), temps, groups)
+    assert str(caught.value) == (
+        'AT-TEST/unit.toml, [thermal] model: "cubic-spline" for a recording; '
+        'expected "polynomial" or "auto"'
     )
