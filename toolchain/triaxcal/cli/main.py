@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import os
 import sys
 from pathlib import Path
@@ -19,39 +20,26 @@ SECTIONS = {
     "Check the generated C": ("verify", "target"),
     "Plan, measure, simulate": ("init", "design", "rig", "simulate", "schema"),
 }
-"""Commands in the order of the help; one that is not named here comes last."""
+"""Every command, in the order of the help. Most are imported from files of their own."""
 
 
 class _Commands(click.Group):
-    """Commands of their own files are imported when they are asked for: `calib` waits for none."""
+    """A command of its own file is imported when it is asked for: `calib` waits for none."""
 
-    OTHERS = (
-        "batch", "crosscoupling", "design", "drift", "dynamic", "history", "init", "poses", "rig",
-        "schema", "target", "verify",
-    )  # fmt: skip
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted([*super().list_commands(ctx), *self.OTHERS])
+    def list_commands(self, _ctx: click.Context) -> list[str]:
+        return list(itertools.chain(*SECTIONS.values()))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in self.OTHERS:
-            return super().get_command(ctx, cmd_name)
-        command = getattr(importlib.import_module(f"triaxcal.cli.{cmd_name}"), cmd_name)
-        assert isinstance(command, click.Command)
-        return command
+        if cmd_name not in self.commands and cmd_name in self.list_commands(ctx):
+            found = getattr(importlib.import_module(f"triaxcal.cli.{cmd_name}"), cmd_name)
+            self.add_command(found, cmd_name)
+        return super().get_command(ctx, cmd_name)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        rest = self.list_commands(ctx)
-        for title, names in {**SECTIONS, "Other commands": tuple(rest)}.items():
-            rows = []
-            for name in (n for n in names if n in rest):
-                command = self.get_command(ctx, name)
-                assert command is not None
-                rows.append((name, command.get_short_help_str(formatter.width)))
-                rest.remove(name)
-            if rows:
-                with formatter.section(title):
-                    formatter.write_dl(rows)
+        for title, names in SECTIONS.items():
+            found = {name: self.get_command(ctx, name) for name in names}
+            with formatter.section(title):
+                formatter.write_dl([(n, c.get_short_help_str(80)) for n, c in found.items() if c])
 
 
 @click.group(

@@ -50,7 +50,7 @@ def test(unit: Path | None, build: Path) -> None:
         if outcome.status != PASSED or done % 10 == 0 or sys.stderr.isatty():
             end = "\r" if sys.stderr.isatty() and outcome.status == PASSED else "\n"
             line = f"{done}/{len(builds)} {outcome.status}: {outcome.build.label}"
-            click.echo(f"{line:100}"[:118] + end, nl=False, err=True)
+            click.echo(f"{line:100}{end}", nl=False, err=True)
 
     outcomes = run_builds(builds, progress)
     publish({"targets.json": matrix_json(outcomes).encode()}, build)
