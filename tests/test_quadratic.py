@@ -26,7 +26,7 @@ from plans import (
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.crosscheck import cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.image_cases import check_images
+from triaxcal.codegen.image_cases import check_images, image_cases
 from triaxcal.codegen.routines import Generated, Reference, start_generated
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import make_plan
@@ -194,4 +194,4 @@ def test_three_implementations_agree_on_a_planned_unit(
     bound = prove(plan)
     assert bound.lsb <= 1.0
     assert 0.8 * bound.lsb <= check.largest_error_lsb <= bound.lsb
-    assert check_images(plan, image, generated, reference) > 300
+    assert check_images(plan, image_cases(plan, image), generated, reference) > 300

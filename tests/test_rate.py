@@ -17,7 +17,7 @@ from triaxcal.codegen.constants import render_constants
 from triaxcal.codegen.crosscheck import cross_check, vector_sets
 from triaxcal.codegen.forces import rates_of
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.image_cases import check_images
+from triaxcal.codegen.image_cases import check_images, image_cases
 from triaxcal.codegen.routines import Reference, routines_of, start_generated
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan, make_plan
@@ -167,7 +167,7 @@ def test_three_implementations_agree(
     check = cross_check(plan, sets, generated, handwritten.routine(image), image)
     bound = prove(plan)
     assert 0.8 * bound.lsb <= check.largest_error_lsb <= bound.lsb
-    assert check_images(plan, image, generated, handwritten) > 300
+    assert check_images(plan, image_cases(plan, image), generated, handwritten) > 300
     (text,) = render_constants(plan, SENSOR, PROVENANCE).values()
     assert "/* rate_max_code: 0.0799999 K/s */" in text  # the last code within 0.08 K/s
     assert "/* rx: 0.021 g for 1 K/s, rounding " in text

@@ -66,14 +66,14 @@ def test_floors() -> None:
 @pytest.mark.parametrize("shape", list(SHAPES))
 def test_delivered_loader(plant: Planter, shape: str) -> None:
     work = plant(shape)
-    assert check_images(work.plan, work.image, *loaded(work)) > 500
+    assert check_images(work.plan, image_cases(work.plan, work.image), *loaded(work)) > 500
 
 
 @pytest.mark.parametrize(("shape", "old", "new"), WRONG)
 def test_a_wrong_loader_is_found(plant: Planter, shape: str, old: str, new: str) -> None:
     work = plant(shape, (old, new))
     with pytest.raises(RefusedError, match="image '"):
-        check_images(work.plan, work.image, *loaded(work))
+        check_images(work.plan, image_cases(work.plan, work.image), *loaded(work))
 
 
 def test_a_loader_that_ignores_the_size_is_found(plant: Planter, tmp_path: Path) -> None:
@@ -82,4 +82,4 @@ def test_a_loader_that_ignores_the_size_is_found(plant: Planter, tmp_path: Path)
         "saturating", ("if (size == TRIAX_IMAGE_SIZE) {", "if (size >= TRIAX_IMAGE_SIZE) {")
     )
     with pytest.raises(RefusedError, match="too long"):
-        check_images(work.plan, work.image, *loaded(work))
+        check_images(work.plan, image_cases(work.plan, work.image), *loaded(work))

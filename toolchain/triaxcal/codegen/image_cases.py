@@ -51,7 +51,9 @@ class ImageCase:
     accepted: bool
 
 
-def check_images(plan: Plan, image: bytes, generated: Generated, reference: Reference) -> int:
+def check_images(
+    plan: Plan, cases: Sequence[ImageCase], generated: Generated, reference: Reference
+) -> int:
     """Load every case, run the accepted ones, and return how many cases there were.
 
     Raises
@@ -59,7 +61,6 @@ def check_images(plan: Plan, image: bytes, generated: Generated, reference: Refe
     RefusedError
         At the first image that is wrongly accepted or refused, or answered in two ways.
     """
-    cases = image_cases(plan, image)
     temp, raw = case_vectors(plan)
     for case in cases:
         status, answers = generated.run_image(case.image, temp, raw)

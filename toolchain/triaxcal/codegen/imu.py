@@ -13,7 +13,7 @@ from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.crosscheck import RANDOM_VECTORS, CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.image_cases import check_images
+from triaxcal.codegen.image_cases import check_images, image_cases
 from triaxcal.codegen.render import render_routine, shape_id
 from triaxcal.codegen.routines import (
     Generated,
@@ -143,7 +143,7 @@ def _check(plan: Plan, routines: tuple[Generated, Reference], count: int) -> Cro
     image = image_bytes(plan)
     generated, reference = routines
     check = cross_check(plan, vector_sets(plan, count), generated, reference.routine(image), image)
-    return replace(check, images=check_images(plan, image, generated, reference))
+    return replace(check, images=check_images(plan, image_cases(plan, image), generated, reference))
 
 
 def _check_both(accel: Plan, gyro: Plan, generated: GeneratedImu, image: bytes) -> int:

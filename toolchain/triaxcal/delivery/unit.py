@@ -17,7 +17,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.compiler import Compilation, reference_under_way
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
-from triaxcal.codegen.image_cases import check_images
+from triaxcal.codegen.image_cases import check_images, image_cases
 from triaxcal.codegen.outputs.image import IMAGE_FILE
 from triaxcal.codegen.routines import (
     Generated,
@@ -114,13 +114,14 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
         stack.callback(compilation.cancel)
         bound = prove(plan)
         sets = vector_sets(plan)
+        image = firmware.files[IMAGE_FILE]
+        cases = image_cases(plan, image)
         if isinstance(reference, Compilation):
             reference = Reference(reference.load())
         generated = Generated(compilation.load())
-        image = firmware.files[IMAGE_FILE]
         tried = routines_of(plan.rate, generated.library, reference.library)
         check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
-        check = replace(check, images=check_images(plan, image, *tried))
+        check = replace(check, images=check_images(plan, cases, *tried))
         _refuse_wrong_bound(unit, bound, check)
         dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
         rates = _rate_codes(unit, dwells)

@@ -192,8 +192,8 @@ def _verdict(made: Passport) -> str:
             ),
             _entry(
                 "cross-check",
-                f"{_thousands(check.total)} vectors: "
-                "Python = reference C = generated C in every bit",
+                f"{_thousands(check.total)} vectors bit for bit: "
+                "Python = reference C = generated C",
             ),
             _entry(
                 "passed" if made.checked else "NOT CHECKED",
