@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from triaxcal.fitting.recorded.trials import (
 )
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import RateTerm, Terms
+from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
 from triaxcal.unit.description import UnitDescription
@@ -104,9 +106,7 @@ class Made:
         known: TermsCovariance,
         findings: list[str],
     ) -> Calibration:
-        fit, t0, shape = self.best.fit, self.unit.t0_degc, self.best.trial.shape
-        thermal = shape.model(constants)
-        basis = shape.basis(t0)
+        fit, shape = self.best.fit, self.best.trial.shape
         dof = len(fit.residual_g) - len(fit.theta)
         result = RecordingFit(
             poses=self.poses,
@@ -123,33 +123,55 @@ class Made:
             findings=tuple(findings),
             terms=known,
         )
-        return Calibration(
-            serial=self.unit.serial,
+        freedom = f"{dof} degree{'s' * (dof != 1)} of freedom"
+        return recorded_calibration(
+            self.unit,
+            self.layout,
+            (shape, constants),
+            result,
+            self.climate.temps_degc,
             estimator=ESTIMATOR,
-            thermal=thermal,
-            shape=shape,
-            range_degc=recording_range(self.unit, self.poses, self.climate.temps_degc),
-            points=(
-                CalibrationPoint(
-                    temp_degc=t0,
-                    constants=thermal.constants_at(t0),
-                    covariance=np.einsum("p,apbq,q->ab", basis, covariance, basis),
-                    position_residual_g=fit.rms_g,
-                    curve_residual_g=fit.rms_g,
-                ),
-            ),
-            parameter_covariance=covariance_blocks(covariance),
-            covariance_source="scatter of |a| - g over the poses, "
-            f"{dof} degree{'s' * (dof != 1)} of freedom",
-            candidates=tuple(
-                row.candidate(ESTIMATOR, chosen=row is self.best) for row in self.rows
-            ),
+            covariance_source=f"scatter of |a| - g over the poses, {freedom}",
+            candidates=tuple(r.candidate(ESTIMATOR, chosen=r is self.best) for r in self.rows),
             selection_reason=self.why,
-            check_dwells=(),
             terms=terms,
-            recording=result,
-            reading_unit=self.layout.acceleration_unit,
         )
+
+
+def recorded_calibration(
+    unit: UnitDescription,
+    layout: RecordingLayout,
+    curves: tuple[ThermalShape, FloatArray],
+    recording: RecordingFit,
+    temps_degc: FloatArray,
+    **more: Any,
+) -> Calibration:
+    """The calibration of a recording, from its fit.
+
+    Parameters
+    ----------
+    curves : tuple of ThermalShape and array, shape (12, P)
+        Functions of temperature, and the constants' parameters in them.
+    more
+        The remaining attributes of `Calibration`.
+    """
+    shape, constants = curves
+    t0, thermal = unit.t0_degc, shape.model(constants)
+    basis, covariance = shape.basis(t0), recording.covariance
+    at_t0 = np.einsum("p,apbq,q->ab", basis, covariance, basis)
+    rms_g = recording.rms_g
+    return Calibration(
+        serial=unit.serial,
+        thermal=thermal,
+        shape=shape,
+        range_degc=recording_range(unit, recording.poses, temps_degc),
+        points=(CalibrationPoint(t0, thermal.constants_at(t0), at_t0, rms_g, rms_g),),
+        parameter_covariance=covariance_blocks(covariance),
+        check_dwells=(),
+        recording=recording,
+        reading_unit=layout.acceleration_unit,
+        **more,
+    )
 
 
 def rate_in_words(rate: RateTerm) -> str:

@@ -8,13 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint
+from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
 from triaxcal.fitting.recorded.calibrate import BEYOND_1_G, pose_dwells
 from triaxcal.fitting.recorded.checks import CONDITION_MAX, refuse_wrong_unit
-from triaxcal.fitting.recorded.made import covariance_blocks
+from triaxcal.fitting.recorded.made import recorded_calibration
 from triaxcal.fitting.recorded.temperatures import (
-    recording_range,
     temperature_findings,
     thermal_shapes,
 )
@@ -200,7 +199,6 @@ def _calibration(
     findings: Sequence[str],
 ) -> Calibration:
     shape, temps = best.fit.shape, known.temps_degc
-    thermal = shape.model(best.fit.constants)
     covariance, terms = _covariance(best, known)
     errors = np.linalg.norm(best.own_g + known.force, axis=1) - unit.gravity_g
     dof = 3 * len(temps) - best.trial.parameters
@@ -220,29 +218,17 @@ def _calibration(
         findings=tuple(findings),
         terms=terms,
     )
-    basis = shape.basis(unit.t0_degc)
-    point = CalibrationPoint(
-        unit.t0_degc,
-        thermal.constants_at(unit.t0_degc),
-        np.einsum("p,apbq,q->ab", basis, covariance, basis),
-        best.fitted_g,
-        best.fitted_g,
-    )
-    return Calibration(
-        serial=unit.serial,
+    return recorded_calibration(
+        unit,
+        layout,
+        (shape, best.fit.constants),
+        recording,
+        temps,
         estimator=best.trial.way,
-        thermal=thermal,
-        shape=shape,
-        range_degc=recording_range(unit, poses, temps),
-        points=(point,),
-        parameter_covariance=covariance_blocks(covariance),
         covariance_source=f"residuals over the poses, {dof} degrees of freedom",
         candidates=tuple(row.candidate(chosen=row is best) for row in rows),
         selection_reason=why,
-        check_dwells=(),
         terms=NO_TERMS if best.fit.quadratic is None else Terms(best.fit.quadratic),
-        recording=recording,
-        reading_unit=layout.acceleration_unit,
     )
 
 
