@@ -12,12 +12,12 @@ from test_tables import AIR, HEADER, wide
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.batch.plan import _order
+from triaxcal.delivery.saved import calibration_json
 from triaxcal.delivery.unit import deliver
 from triaxcal.fitting.pair.cross_coupling import terms_of_pair
 from triaxcal.model.orientation import AIRCRAFT, gravity_direction
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray
-from triaxcal.report.results import calibration_json
 
 KIP_A, KIP_B = 6e-4, -4e-4
 MORE = '[quadratic]\ncross_coupling = "pair.csv"\naxes = ["x", "z"]\n'

@@ -9,9 +9,9 @@ import pytest
 from family_cases import COLUMNS, RATE_HZ, U0, K, directions, log, write_unit
 from test_recordings import calibrated, symmetric_part
 
+from triaxcal.delivery.saved import calibration_json
 from triaxcal.delivery.unit import deliver
 from triaxcal.model.types import FloatArray
-from triaxcal.report.results import calibration_json
 from triaxcal.uncertainty.evaluate import uncertainty
 
 WITH_T = COLUMNS + '\ntemperature = "T"'
