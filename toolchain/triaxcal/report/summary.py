@@ -192,8 +192,7 @@ def _verdict(made: Passport) -> str:
             ),
             _entry(
                 "cross-check",
-                f"{_thousands(check.total)} vectors bit for bit: "
-                "Python = reference C = generated C",
+                f"{_thousands(check.total)} vectors bit for bit: Python = reference = generated C",
             ),
             _entry(
                 "passed" if made.checked else "NOT CHECKED",
