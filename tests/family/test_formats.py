@@ -9,10 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from written import CASES, Case, Times, readings
+from family_cases import UNIT
+from test_recordings import calibrated, found
+from written import AXES, CASES, Case, Times, csv, readings
 
 from recordings import recording
 from triaxcal.base.errors import RefusedError
+from triaxcal.delivery.inputs import files_sha256
+from triaxcal.delivery.unit import deliver
+from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.format import FORMATS
 from triaxcal.readings.opened import RecordingFile
@@ -53,8 +58,8 @@ def read(path: Path, case: Case) -> tuple[FloatArray, FloatArray, RecordingFile]
 @every_format
 def test_readings_and_times_are_those_written(name: str, files: Callable[[str], Path]) -> None:
     t_us, a = readings()
-    time, found, file = read(files(name), CASES[name])
-    assert np.array_equal(found, a)
+    time, values_read, file = read(files(name), CASES[name])
+    assert np.array_equal(values_read, a)
     if CASES[name].unit == "s":
         # Microseconds as doubles of at most 64 s: half a unit of the last place, 4e-15 s.
         assert np.abs(time * 1e6 - (t_us - t_us[0])).max() < 1e-8
@@ -203,6 +208,65 @@ def test_a_package_that_lacks_another_is_named_too(
     monkeypatch.setitem(sys.modules, "lz4.frame", None)
     with pytest.raises(RefusedError, match=r"package lz4 is missing; .*'triaxcal\[ros\]'"):
         RecordingFile(path, LAYOUT)
+
+
+# ---- The same constants ----
+
+
+def unit_of(folder: Path, case: Case, more: str = "") -> Path:
+    """A unit's folder for a recording of a format; without a time where the format has a clock."""
+    folder.mkdir()
+    columns = ", ".join(f'"{column}"' for column in case.columns)
+    time = f'time = "{case.time}"\ntime_unit = "{case.unit}"' if case.time else ""
+    recording = f'acceleration = [{columns}]\nacceleration_unit = "m/s^2"\n{time}\n{more}'
+    toml = UNIT.format(name=folder.name, more="", recording=recording)
+    (folder / "unit.toml").write_text(toml.replace("log.csv", case.file))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def from_csv(tmp_path_factory: pytest.TempPathFactory) -> Calibration:
+    """Calibration of the same readings as text."""
+    case = Case(csv, "log.csv", "text", AXES, "t", "us")
+    folder = unit_of(tmp_path_factory.mktemp("csv") / "SAME", case)
+    csv(folder / case.file, *readings())
+    return calibrated(folder)
+
+
+@every_format
+def test_the_same_constants_to_the_last_digit(
+    name: str, files: Callable[[str], Path], from_csv: Calibration, tmp_path: Path
+) -> None:
+    folder = unit_of(tmp_path / "SAME", CASES[name])
+    (shutil.copytree if name == "ros2" else shutil.copy)(files(name), folder / CASES[name].file)
+    calibration = calibrated(folder)
+    for one, other in zip(found(calibration), found(from_csv), strict=True):
+        assert np.array_equal(one, other)
+    assert calibration.recording is not None
+    assert from_csv.recording is not None
+    assert np.array_equal(calibration.recording.covariance, from_csv.recording.covariance)
+
+
+def test_a_text_has_no_clock_of_its_own(tmp_path: Path) -> None:
+    folder = unit_of(tmp_path / "SAME", Case(csv, "log.csv", "text", AXES, None, ""))
+    csv(folder / "log.csv", *readings())
+    with pytest.raises(RefusedError) as refusal:
+        calibrated(folder)
+    assert str(refusal.value) == (
+        f"{folder}/unit.toml, [recording] time: missing; expected a time column, or sample_rate_hz"
+    )
+
+
+def test_a_bag_that_is_a_folder_reaches_the_c(files: Callable[[str], Path], tmp_path: Path) -> None:
+    folder = unit_of(tmp_path / "SAME", CASES["ros2"])
+    shutil.copytree(files("ros2"), folder / "bag")
+    delivery = deliver(folder)
+    assert delivery.calibration.recording is not None
+    assert len(delivery.calibration.recording.poses.poses) == 12
+    assert delivery.inputs_sha256 == files_sha256((folder / "unit.toml", folder / "bag"), "")
+    with (folder / "bag" / "metadata.yaml").open("a") as file:
+        file.write("\n")
+    assert delivery.inputs_sha256 != files_sha256((folder / "unit.toml", folder / "bag"), "")
 
 
 # ---- Two columns of one name ----

@@ -24,9 +24,12 @@ def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:
 
 
 def files_sha256(paths: Iterable[Path], remedy: str) -> str:
-    """Hash of the hashes of files; `remedy` is what to do where one cannot be read."""
+    """Hash of the hashes of files; `remedy` is what to do where one cannot be read.
+
+    Of a folder, as a bag of ROS 2 is one, all its files count.
+    """
     digest = hashlib.sha256()
-    for path in paths:
+    for path in (f for p in paths for f in (sorted(p.iterdir()) if p.is_dir() else (p,))):
         try:
             with path.open("rb") as file:
                 digest.update(hashlib.file_digest(file, "sha256").digest())

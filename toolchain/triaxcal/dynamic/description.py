@@ -263,12 +263,11 @@ def read_dynamic(folder: Path) -> DynamicDescription:
     tables = imu_file().read(path)
     dynamic, site = tables["dynamic"], tables["site"]
     found = dynamic.record(DynamicTable)
-    if (found.rate_hz is None) == (not found.time_column):
-        raise RefusedError(
-            f"{dynamic.where('time_column')} and rate_hz",
-            "neither given" if found.rate_hz is None else "both given",
-            expected="one of them: a column of times, or the rate of even sampling",
-        )
+    where = f"{dynamic.where('time_column')} and rate_hz"
+    expected = "one of them: a column of times, or the rate of even sampling"
+    absent = RefusedError(where, "neither given", expected=expected)
+    if found.rate_hz is not None and found.time_column:
+        raise RefusedError(where, "both given", expected=expected)
     check_units(dynamic, found.time_column, found.time_unit)
     return DynamicDescription(
         name=folder.absolute().name,
@@ -278,7 +277,9 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         latitude_deg=site[LATITUDE],
         gravity_m_per_s2=site[GRAVITY],
         file=found.layout("dynamic", _names(found)),
-        clock=ClockLayout(found.time_column, found.time_unit, found.rate_hz, from_first=False),
+        clock=ClockLayout(
+            found.time_column, found.time_unit, found.rate_hz, from_first=False, absent=absent
+        ),
         quantities=_quantities(dynamic, found),
         rate_max=None if found.rate_max is None else math.radians(found.rate_max),
         rate_convention=found.rate_samples,

@@ -26,15 +26,14 @@ def read_recording(unit: DynamicDescription) -> ImuRecording:
         As `read_table`; with fewer than three samples; where increments are missing.
     """
     path = unit.recording
-    if not path.is_file():
+    if not path.exists():
         raise RefusedError(
             str(path),
             "no such file",
             expected="the recording that unit.toml names",
             remedy=_how_to_get_it(unit),
         )
-    clocked = bool(unit.clock.columns)
-    table = read_table(path, unit.file, unit.clock, unit.quantities, ordered=clocked)
+    table = read_table(path, unit.file, unit.clock, unit.quantities)
     if len(table.spool) < 3:
         raise RefusedError(str(path), "holds fewer than three samples")
     if INCREMENT in {unit.rate_convention, unit.force_convention} and table.left_out:

@@ -301,8 +301,10 @@ def _wrong_clock(samples: Samples, layout: RecordingLayout) -> str:
     if whole > 4.0 * layout.still_s:
         return ""
     told = f"the whole recording lasts {whole:.3g} s"
-    if not layout.time:
+    if layout.sample_rate_hz is not None:
         return f"{told} at {1.0 / samples.step_s:g} Hz: check sample_rate_hz"
+    if not layout.time:
+        return told
     scale = TIME_UNITS[layout.time_unit[0]]
     near = [
         u for u, s in TIME_UNITS.items() if _STEPS_S[0] < samples.step_s / scale * s < _STEPS_S[1]

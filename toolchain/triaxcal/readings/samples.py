@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -141,14 +141,19 @@ def read_samples(folder: Path, layout: RecordingLayout, sensor: TemperatureSenso
         radians = to_radians(layout.angles.unit)
         quantities.append(Quantity(ANGLES, "the angles", layout.angles.columns, radians))
     label = None if layout.section is None else ("section", layout.section)
-    ordered = layout.clock.columns != () and layout.rows == SAMPLES
+    clock = layout.clock
+    if layout.rows == SAMPLES and not layout.faces:
+        place = f"{folder / 'unit.toml'}, [recording] time"
+        absent = RefusedError(place, "missing", expected="a time column, or sample_rate_hz")
+        clock = replace(clock, absent=absent)
+    ordered = layout.rows == SAMPLES
     table = read_table(
-        folder / layout.file, layout.written, layout.clock, quantities, label, ordered=ordered
+        folder / layout.file, layout.written, clock, quantities, label, ordered=ordered
     )
     samples = Samples(table, table.median_step(), table.findings)
     if TEMP in samples:
         _refuse_implausible(samples, layout)
-    if not ordered:
+    if not (ordered and table.clocked):
         return samples
     return Samples(
         table, samples.step_s, (*table.findings, *_slow_clock(samples, layout), *_gaps(samples))
@@ -156,7 +161,7 @@ def read_samples(folder: Path, layout: RecordingLayout, sensor: TemperatureSenso
 
 
 def _slow_clock(samples: Samples, layout: RecordingLayout) -> tuple[str, ...]:
-    if samples.step_s < _SLOW_S or ISO in layout.time_unit:
+    if samples.step_s < _SLOW_S or not layout.time or ISO in layout.time_unit:
         return ()
     told = f'a sample every {samples.step_s:.4g} s by time_unit = "{", ".join(layout.time_unit)}"'
     return (f"{told}: if that is not so, correct it",)

@@ -7,7 +7,7 @@ without all readings are left out and reported, and the rest goes into a spool o
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +66,8 @@ class ReadTable:
         A row of doubles each.
     columns : mapping
         Columns of the spool by name: `TIME`, `ROW`, those of the quantities, `LABEL`.
+    clocked : bool
+        Whether a clock gives the times, and not a rate.
     labels : tuple of str, or None
         Text of the label that column `LABEL` numbers.
     start_s : float
@@ -81,6 +83,7 @@ class ReadTable:
     row_word: str
     spool: Spool
     columns: Mapping[str, slice]
+    clocked: bool
     labels: tuple[str, ...] | None
     start_s: float
     low: FloatArray
@@ -126,6 +129,8 @@ def read_table(
         without a reading, or more than `clock.LEFT_OUT_MAX` of them out of order in time.
     """
     file = RecordingFile(path, layout)
+    clock = _clock_of(file, clock, quantities)
+    ordered = ordered and clock.columns != ()
     reading = _Reading(file, clock, quantities, label)
     order = Order(str(path), file.source.row_word, layout.table)
     spool = Spool(reading.width)
@@ -144,6 +149,7 @@ def read_table(
         row_word=file.source.row_word,
         spool=spool,
         columns=reading.columns,
+        clocked=clock.columns != (),
         labels=None if label is None else tuple(reading.codes),
         start_s=float(spool.rows(0, 1)[0, 0]),
         low=low,
@@ -151,6 +157,21 @@ def read_table(
         left_out=reading.missing + order.lost,
         findings=findings,
     )
+
+
+def _clock_of(
+    file: RecordingFile, clock: ClockLayout, quantities: Sequence[Quantity]
+) -> ClockLayout:
+    """The clock that is stated, else that of the file's own format."""
+    if clock.columns or clock.rate_hz is not None:
+        return clock
+    source, first = file.source, file.index(quantities[0].columns[0], quantities[0].key)
+    own = source.clocks.get(source.tables[first]) if source.tables else None
+    if own is not None:
+        return replace(clock, columns=(source.names[own[0]],), units=(own[1],))
+    if clock.absent is not None:
+        raise clock.absent
+    return clock
 
 
 class _Reading:

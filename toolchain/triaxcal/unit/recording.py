@@ -275,11 +275,6 @@ def recording_layout(values: Values) -> RecordingLayout | None:
                 remedy="or name a preset: " + ", ".join(PRESETS),
             )
     check_units(values, layout.time, layout.time_unit)
-    clock = layout.time or layout.sample_rate_hz is not None
-    if layout.rows == SAMPLES and not layout.faces and not clock:
-        raise RefusedError(
-            values.where("time"), "missing", expected="a time column, or sample_rate_hz"
-        )
     if layout.section is None and layout.rows == SECTIONS:
         raise RefusedError(
             values.where("section"),

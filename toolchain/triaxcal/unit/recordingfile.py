@@ -183,12 +183,16 @@ class ClockLayout:
         Of rows that are evenly spaced.
     from_first : bool
         Whether time starts with the first row, so that large stamps keep all their digits.
+    absent : RefusedError or None
+        Raised where neither is given and the file has no clock of its own; None where none is
+        needed.
     """
 
     columns: tuple[Column, ...]
     units: tuple[str, ...]
     rate_hz: float | None = None
     from_first: bool = True
+    absent: RefusedError | None = None
 
     @property
     def unit_of(self) -> tuple[str, ...]:
