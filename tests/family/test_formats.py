@@ -9,17 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from family_cases import UNIT
 from test_recordings import calibrated, found
 from written import AXES, CASES, Case, Times, csv, readings
 
 from recordings import recording
 from triaxcal.base.errors import RefusedError
+from triaxcal.cli.main import main
 from triaxcal.delivery.inputs import files_sha256
 from triaxcal.delivery.unit import deliver
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.types import FloatArray
-from triaxcal.readings.format import FORMATS
+from triaxcal.readings.arrays import ArraySource
+from triaxcal.readings.format import FORMATS, Format, starts_with
 from triaxcal.readings.opened import RecordingFile
 from triaxcal.unit.recordingfile import FileLayout
 
@@ -267,6 +270,55 @@ def test_a_bag_that_is_a_folder_reaches_the_c(files: Callable[[str], Path], tmp_
     with (folder / "bag" / "metadata.yaml").open("a") as file:
         file.write("\n")
     assert delivery.inputs_sha256 != files_sha256((folder / "unit.toml", folder / "bag"), "")
+
+
+# ---- A format of one's own ----
+
+
+def _toy(path: Path, layout: FileLayout) -> ArraySource:
+    """Doubles, four a row, behind a word."""
+    rows = np.frombuffer(path.read_bytes()[8:]).reshape(-1, 4)
+    source = ArraySource(str(path), dict(zip(("t", *AXES), rows.T, strict=True)), layout)
+    source.findings = ("one row of the toy was upside down",)
+    return source
+
+
+TOY = Format(
+    name="toy",
+    label="a toy of doubles",
+    doc="Doubles that only a test knows.",
+    open=_toy,
+    sniff=starts_with(b"TOYTOYTO"),
+    package="numpy",
+)
+
+
+def test_a_reader_added_at_run_time_reaches_every_page(tmp_path: Path) -> None:
+    t_us, a = readings()
+    folder = unit_of(tmp_path / "TOY-1", Case(csv, "log.toy", "toy", AXES, "t", "us"))
+    content = np.column_stack([t_us, a])
+    (folder / "log.toy").write_bytes(b"TOYTOYTO" + content.tobytes())
+    run = CliRunner()
+    with FORMATS.added(TOY):
+        poses = run.invoke(main, ["poses", str(folder)])
+        made = run.invoke(main, ["calib", str(folder), "--build", str(tmp_path / "build")])
+        shown = run.invoke(main, ["calib", "--help"])
+        (folder / "log.toy").write_bytes(b"TOYTOYTO" + content.tobytes()[:-3])
+        broken = run.invoke(main, ["poses", str(folder)])
+    assert poses.exit_code == 0, poses.output
+    assert "12 poses" in poses.output
+    assert made.exit_code == 0, made.output
+    built = tmp_path / "build" / "TOY-1"
+    for name in ("passport.html", "calibration.json"):
+        words = " ".join((built / name).read_text(encoding="utf-8").split())
+        assert "ne row of the toy was upside down" in words  # the page begins with a capital
+    assert "toy Doubles that only a test knows." in " ".join(shown.output.split())
+    assert str(broken.exception) == (
+        f"{folder}/log.toy: damaged, or not a toy of doubles: "
+        "buffer size must be a multiple of element size"
+    )
+    without = run.invoke(main, ["poses", str(folder)])
+    assert "log.toy: a binary file; expected " in str(without.exception)
 
 
 # ---- Two columns of one name ----

@@ -83,7 +83,7 @@ class WithKinds(click.Command):
         for title, rows in (
             ("Thermal functions, [thermal] model", [(e.name, e.doc) for e in THERMAL_FUNCTIONS]),
             ("Methods, [compensation] method", [(e.name, e.doc) for e in METHODS]),
-            ("Formats of recordings, besides text", [(e.name, e.label) for e in FORMATS]),
+            ("Formats of recordings, [recording] format", [(e.name, e.doc) for e in FORMATS]),
         ):
             with formatter.section(title):
                 formatter.write_dl(rows)
