@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
+import click
+
+from triaxcal.cli.main import SECTIONS, main
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.reference import reference_markdown
@@ -63,6 +66,26 @@ def _sources() -> str:
     return _table(("`--bus`", "where the frames come from"), rows)
 
 
+def _commands() -> str:
+    """The help of every command, as a terminal of 80 columns shows it."""
+    names = [name for section in SECTIONS.values() for name in section]
+    return "\n\n".join(_help(main, "triaxcal", None, names))
+
+
+def _help(
+    command: click.Command, name: str, above: click.Context | None, order: Iterable[str] = ()
+) -> Iterator[str]:
+    context = click.Context(
+        command, parent=above, info_name=name, terminal_width=80, **command.context_settings
+    )
+    yield f"## {context.command_path}\n\n```text\n{command.get_help(context)}\n```"
+    if isinstance(command, click.Group):
+        for below in order or command.list_commands(context):
+            found = command.get_command(context, below)
+            assert found is not None
+            yield from _help(found, below, context)
+
+
 def _named(entries: Iterable[object]) -> str:
     rows = ((f'`"{e.name}"`', e.label, e.doc) for e in entries)  # type: ignore[attr-defined]
     return _table(("name", "in reports", "what it is"), rows)
@@ -75,6 +98,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "methods": lambda: _named(METHODS),
     "functions": lambda: _named(THERMAL_FUNCTIONS),
     "sources": _sources,
+    "commands": _commands,
 }
 
 
