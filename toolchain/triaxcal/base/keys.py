@@ -3,7 +3,7 @@
 A `Key` has a name, a kind (type and range), a documentation, a unit and a default. A `TableKeys`
 is the keys of one table, a `FileKeys` the tables of one file. `FileKeys.read` checks the keys of a
 whole file and gives a `Values` a table; `values[KEY]` is the checked value, or the default. Where a
-table is nothing but its values, a frozen dataclass declares it: its fields are made by `key`, and
+table is nothing but its values, a frozen dataclass declares it, with fields made by `setting`;
 `values.record(cls)` makes one. The reference, the JSON Schemas and the commented files of
 `triaxcal init` come from the same declarations.
 """
@@ -68,24 +68,6 @@ FORMAT = Key("format", whole(1, 1), "Version of this format.", example="1")
 """Every file has it."""
 
 
-def key(
-    kind: Kind[T],
-    doc: str,
-    default: T = REQUIRED,
-    unit: str = "",
-    *,
-    default_words: str = "",
-    example: str = "",
-) -> T:
-    """A key as a field of a frozen dataclass; its name is the field's. Arguments as of `Key`."""
-    made: dict[str, Any] = {"key": Key("", kind, doc, default, unit, default_words, example)}
-    if default is REQUIRED:
-        return cast("T", field(metadata=made))
-    if default.__class__.__hash__ is None:
-        return field(default_factory=lambda: default, metadata=made)
-    return field(default=default, metadata=made)
-
-
 def setting(
     kind: Kind[T], default: T = REQUIRED, unit: str = "", *, words: str = "", example: str = ""
 ) -> T:
@@ -94,14 +76,21 @@ def setting(
     Its name is the field's; its documentation stands under that name in the section Attributes of
     the class's docstring. `words` are its `default_words`.
     """
-    return key(kind, "", default, unit, default_words=words, example=example)
+    made: dict[str, Any] = {"key": Key("", kind, "", default, unit, words, example)}
+    if default is REQUIRED:
+        return cast("T", field(metadata=made))
+    if default.__class__.__hash__ is None:
+        return field(default_factory=lambda: default, metadata=made)
+    return field(default=default, metadata=made)
 
 
 def keys_of(record: type[Any]) -> tuple[Key[Any], ...]:
     """Keys that the fields of a dataclass declare, in their order."""
-    docs = _documentation(record.__doc__ or "")
+    docs: dict[str, str] = {}
+    for ancestor in reversed(record.__mro__):
+        docs |= _documentation(ancestor.__doc__ or "")
     return tuple(
-        dataclasses.replace(made, name=f.name, doc=made.doc or docs.get(f.name, ""))
+        dataclasses.replace(made, name=f.name, doc=docs.get(f.name, ""))
         for f in dataclasses.fields(record)
         if (made := f.metadata.get("key"))
     )

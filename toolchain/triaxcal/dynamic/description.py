@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import FileKeys, Key, TableKeys, Values, key, keys_of
+from triaxcal.base.keys import FileKeys, Key, TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import TEXT, Kind, listed, number, word
 from triaxcal.base.tomltable import has_table
 from triaxcal.dynamic.blocks.block import StateBlock
@@ -112,86 +112,75 @@ _AXES = {
 
 @dataclass(frozen=True, kw_only=True)
 class _RecordedFile:
-    """The file, before how it is written."""
+    """The file, before how it is written.
 
-    recording: str = key(TEXT, "File of the readings.", example='"recording.csv"')
+    Attributes
+    ----------
+    recording
+        File of the readings.
+    """
+
+    recording: str = setting(TEXT, example='"recording.csv"')
 
 
 @dataclass(frozen=True, kw_only=True)
 class DynamicTable(WrittenFile, _RecordedFile):
-    """[dynamic], as it stands in the file."""
+    """[dynamic], as it stands in the file.
 
-    time_column: tuple[Column, ...] = key(
-        TIMES,
-        "Time of each sample, or a list as `time` of `[recording]`; or `rate_hz`.",
-        (),
-        default_words="none",
-        example='"time_s"',
-    )
-    time_unit: tuple[str, ...] = key(
-        STAMPS,
-        "Unit of the times, as in `[recording]`.",
-        ("s",),
-        default_words='`"s"`',
-        example='"s"',
-    )
-    rate_hz: float | None = key(
-        number(1.0, 1e5), "Rate of even samples, in place of `time_column`.", None, "Hz"
-    )
-    rate_columns: tuple[SignedColumn, ...] = key(
-        SIGNED_COLUMNS, 'Gyros x, y, z; "-gy" turns a sign.', example='["gx", "gy", "gz"]'
-    )
-    rate_unit: str = key(
-        word((*_RATE_UNITS, *_ANGLE_UNITS)),
-        "Unit of the gyros: of instants the first three, of increments the others.",
-        example='"deg/s"',
-    )
-    rate_samples: str = key(
-        word(CONVENTIONS),
-        "What a reading is: of the instant of its stamp, or over the interval that ends there.",
-        example='"instant"',
-    )
-    rate_max: float | None = key(
-        number(1e-3, 1e5),
-        "Full scale of the gyros: a reading beyond 0.999 of it is refused.",
-        None,
-        "deg/s",
-    )
-    force_columns: tuple[SignedColumn, ...] = key(
-        SIGNED_COLUMNS,
-        "Accelerometers x, y, z, on the axes of the gyros.",
-        example='["ax", "ay", "az"]',
-    )
-    force_unit: str = key(
-        word((*_FORCE_UNITS, *_VELOCITY_UNITS)),
-        "Unit of the accelerometers (g of 9.80665 m/s^2): of instants the first three, of "
-        "increments the others.",
-        example='"m/s^2"',
-    )
-    force_samples: str = key(word(CONVENTIONS), "As `rate_samples`.", example='"instant"')
-    force2_columns: tuple[SignedColumn, ...] | None = key(
-        SIGNED_COLUMNS, "A second accelerometer triad, in the same unit.", None
-    )
-    temp_column: Column | None = key(
-        COLUMN, "Temperature; required by the blocks of temperature.", None
-    )
-    temperature_unit: str = key(
-        word(TEMPERATURE_UNITS[:3]), "Unit of `temp_column`.", TEMPERATURE_UNITS[0]
-    )
-    table_angle_column: Column | None = key(
-        COLUMN, "Angle of the table; required by the blocks of the table's angle.", None, "deg"
-    )
-    reference_degc: float = key(
-        number(*PLAUSIBLE_DEGC),
-        "Temperature at which the constants are given, and from which it is counted.",
-        20.0,
-        "degC",
-    )
-    blocks: tuple[str, ...] = key(
-        listed(TEXT, range(100), "a list of names in quotes"),
-        "Extensions that are switched on.",
-        (),
-        default_words="none",
+    Attributes
+    ----------
+    time_column
+        Time of each sample, or a list as `time` of `[recording]`; or `rate_hz`.
+    time_unit
+        Unit of the times, as in `[recording]`.
+    rate_hz
+        Rate of even samples, in place of `time_column`.
+    rate_columns
+        Gyros x, y, z; "-gy" turns a sign.
+    rate_unit
+        Unit of the gyros: of instants the first three, of increments the others.
+    rate_samples
+        What a reading is: of the instant of its stamp, or over the interval that ends there.
+    rate_max
+        Full scale of the gyros: a reading beyond 0.999 of it is refused.
+    force_columns
+        Accelerometers x, y, z, on the axes of the gyros.
+    force_unit
+        Unit of the accelerometers (g of 9.80665 m/s^2): of instants the first three, of
+        increments the others.
+    force_samples
+        As `rate_samples`.
+    force2_columns
+        A second accelerometer triad, in the same unit.
+    temp_column
+        Temperature; required by the blocks of temperature.
+    temperature_unit
+        Unit of `temp_column`.
+    table_angle_column
+        Angle of the table; required by the blocks of the table's angle.
+    reference_degc
+        Temperature at which the constants are given, and from which it is counted.
+    blocks
+        Extensions that are switched on.
+    """
+
+    time_column: tuple[Column, ...] = setting(TIMES, (), words="none", example='"time_s"')
+    time_unit: tuple[str, ...] = setting(STAMPS, ("s",), words='`"s"`', example='"s"')
+    rate_hz: float | None = setting(number(1.0, 1e5), None, "Hz")
+    rate_columns: tuple[SignedColumn, ...] = setting(SIGNED_COLUMNS, example='["gx", "gy", "gz"]')
+    rate_unit: str = setting(word((*_RATE_UNITS, *_ANGLE_UNITS)), example='"deg/s"')
+    rate_samples: str = setting(word(CONVENTIONS), example='"instant"')
+    rate_max: float | None = setting(number(1e-3, 1e5), None, "deg/s")
+    force_columns: tuple[SignedColumn, ...] = setting(SIGNED_COLUMNS, example='["ax", "ay", "az"]')
+    force_unit: str = setting(word((*_FORCE_UNITS, *_VELOCITY_UNITS)), example='"m/s^2"')
+    force_samples: str = setting(word(CONVENTIONS), example='"instant"')
+    force2_columns: tuple[SignedColumn, ...] | None = setting(SIGNED_COLUMNS, None)
+    temp_column: Column | None = setting(COLUMN, None)
+    temperature_unit: str = setting(word(TEMPERATURE_UNITS[:3]), TEMPERATURE_UNITS[0])
+    table_angle_column: Column | None = setting(COLUMN, None, "deg")
+    reference_degc: float = setting(number(*PLAUSIBLE_DEGC), 20.0, "degC")
+    blocks: tuple[str, ...] = setting(
+        listed(TEXT, range(100), "a list of names in quotes"), (), words="none"
     )
 
 

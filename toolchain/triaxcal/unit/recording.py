@@ -13,7 +13,7 @@ from decimal import Decimal
 from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import TableKeys, Values, key, keys_of
+from triaxcal.base.keys import TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import Kind, number, word
 from triaxcal.unit.recordingfile import (
     COLUMN,
@@ -122,101 +122,104 @@ LABELLED_FACES = Kind(
 
 @dataclass(frozen=True, kw_only=True)
 class _RecordedFile:
-    """The file and its rows."""
+    """The file and its rows.
 
-    file: str = key(FILE, "File of the recording, in the unit's folder or below it.")
-    preset: str | None = key(
-        word(tuple(PRESETS)), "Layout of a published recording; other keys override it.", None
-    )
-    rows: str = key(
-        word((SAMPLES, POSES, SECTIONS)),
-        'What a row is. "sections": a sample, and each stretch with one label is a pose.',
-        SAMPLES,
-    )
+    Attributes
+    ----------
+    file
+        File of the recording, in the unit's folder or below it.
+    preset
+        Layout of a published recording; other keys override it.
+    rows
+        What a row is. "sections": a sample, and each stretch with one label is a pose.
+    """
+
+    file: str = setting(FILE)
+    preset: str | None = setting(word(tuple(PRESETS)), None)
+    rows: str = setting(word((SAMPLES, POSES, SECTIONS)), SAMPLES)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingLayout(WrittenFile, _RecordedFile):
-    """[recording]: what a recording's file is; absent optional columns are None."""
+    """[recording]: what a recording's file is; absent optional columns are None.
 
-    acceleration: tuple[SignedColumn, ...] = key(
+    Attributes
+    ----------
+    acceleration
+        Readings of x, y, z, by name or number from 1; "-ay" or -2 turns the sign.
+    acceleration_unit
+        Unit of the readings.
+    time
+        Time of each row; a list is added up, as ["sec", "nanosec"], or put together, as
+        ["date", "time"].
+    time_unit
+        Unit of `time`, or a list of them; "iso" is 2026-03-30T12:00:00.25, 12:00:00.25 or, of
+        two columns, a date and a time of day.
+    sample_rate_hz
+        Rate of even samples, in place of `time`.
+    gyro
+        Rates of x, y, z in any unit: they show stillness and left-handed axes.
+    temperature
+        Temperature of each row.
+    temperature_unit
+        Unit of `temperature`; codes are those of `[temperature_sensor]`.
+    section
+        Label of each row; required with `rows = "sections"`.
+    faces
+        Labels in the column `section`, and the axis that points up in each.
+    angle_unit
+        Unit of the angles.
+    still_s
+        Shortest pose.
+    frame
+        Axes of the result where orientations are unknown.
+    pitch
+        Aircraft angle of each pose, with `rows = "poses"` or "sections".
+    roll
+        The second aircraft angle.
+    yaw
+        Does not change gravity; shows a table that is not level.
+    zenith
+        Inclinometer angle of each pose.
+    tool_face
+        The second inclinometer angle.
+    azimuth
+        As `yaw`.
+    """
+
+    acceleration: tuple[SignedColumn, ...] = setting(
         SIGNED_COLUMNS,
-        'Readings of x, y, z, by name or number from 1; "-ay" or -2 turns the sign.',
         (),
-        default_words="of the preset; required without one",
+        words="of the preset; required without one",
         example='["ax", "ay", "az"]',
     )
-    acceleration_unit: str = key(
+    acceleration_unit: str = setting(
         word(tuple(ACCELERATION_UNITS)),
-        "Unit of the readings.",
         "",
-        default_words="of the preset; required without one",
+        words="of the preset; required without one",
         example='"m/s^2"',
     )
-    time: tuple[Column, ...] = key(
-        TIMES,
-        'Time of each row; a list is added up, as ["sec", "nanosec"], or put together, as '
-        '["date", "time"].',
-        (),
-        default_words="none",
-        example='"time"',
+    time: tuple[Column, ...] = setting(TIMES, (), words="none", example='"time"')
+    time_unit: tuple[str, ...] = setting(STAMPS, ("s",), words='`"s"`', example='"s"')
+    sample_rate_hz: float | None = setting(number(1e-3, 1e6), None, "Hz", example="100")
+    gyro: tuple[Column, ...] | None = setting(COLUMNS, None, example='["gx", "gy", "gz"]')
+    temperature: Column | None = setting(COLUMN, None, example='"temperature"')
+    temperature_unit: str = setting(word(TEMPERATURE_UNITS), "degC")
+    section: Column | None = setting(COLUMN, None, example='"section"')
+    faces: Mapping[str, str] = setting(
+        LABELLED_FACES, {}, words="none", example='{top = "+z", bottom = "-z"}'
     )
-    time_unit: tuple[str, ...] = key(
-        STAMPS,
-        'Unit of `time`, or a list of them; "iso" is 2026-03-30T12:00:00.25, 12:00:00.25 or, of '
-        "two columns, a date and a time of day.",
-        ("s",),
-        default_words='`"s"`',
-        example='"s"',
+    angle_unit: str | None = setting(
+        word(("deg", "rad")), None, words="required with angles", example='"deg"'
     )
-    sample_rate_hz: float | None = key(
-        number(1e-3, 1e6), "Rate of even samples, in place of `time`.", None, "Hz", example="100"
-    )
-    gyro: tuple[Column, ...] | None = key(
-        COLUMNS,
-        "Rates of x, y, z in any unit: they show stillness and left-handed axes.",
-        None,
-        example='["gx", "gy", "gz"]',
-    )
-    temperature: Column | None = key(
-        COLUMN, "Temperature of each row.", None, example='"temperature"'
-    )
-    temperature_unit: str = key(
-        word(TEMPERATURE_UNITS),
-        "Unit of `temperature`; codes are those of `[temperature_sensor]`.",
-        "degC",
-    )
-    section: Column | None = key(
-        COLUMN, 'Label of each row; required with `rows = "sections"`.', None, example='"section"'
-    )
-    faces: Mapping[str, str] = key(
-        LABELLED_FACES,
-        "Labels in the column `section`, and the axis that points up in each.",
-        {},
-        default_words="none",
-        example='{top = "+z", bottom = "-z"}',
-    )
-    angle_unit: str | None = key(
-        word(("deg", "rad")),
-        "Unit of the angles.",
-        None,
-        default_words="required with angles",
-        example='"deg"',
-    )
-    still_s: float = key(number(1e-3, 1e5), "Shortest pose.", STILL_S, "s")
-    frame: str = key(
-        word(("sensor", "case")), "Axes of the result where orientations are unknown.", "sensor"
-    )
-    pitch: Column | None = key(
-        COLUMN, 'Aircraft angle of each pose, with `rows = "poses"` or "sections".', None
-    )
-    roll: Column | None = key(COLUMN, "The second aircraft angle.", None)
-    yaw: Column | None = key(
-        COLUMN, "Does not change gravity; shows a table that is not level.", None
-    )
-    zenith: Column | None = key(COLUMN, "Inclinometer angle of each pose.", None)
-    tool_face: Column | None = key(COLUMN, "The second inclinometer angle.", None)
-    azimuth: Column | None = key(COLUMN, "As `yaw`.", None)
+    still_s: float = setting(number(1e-3, 1e5), STILL_S, "s")
+    frame: str = setting(word(("sensor", "case")), "sensor")
+    pitch: Column | None = setting(COLUMN, None)
+    roll: Column | None = setting(COLUMN, None)
+    yaw: Column | None = setting(COLUMN, None)
+    zenith: Column | None = setting(COLUMN, None)
+    tool_face: Column | None = setting(COLUMN, None)
+    azimuth: Column | None = setting(COLUMN, None)
 
     @property
     def reading_of_1_g(self) -> float | None:

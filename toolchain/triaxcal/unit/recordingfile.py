@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import Values, key
+from triaxcal.base.keys import Values, setting
 from triaxcal.base.kinds import FLAG, TEXT, Kind, checked, listed, meaning, whole, word
 
 DELIMITERS: Mapping[str, str] = MappingProxyType(
@@ -103,37 +103,33 @@ SIGNED_COLUMNS = Kind(
 
 @dataclass(frozen=True, kw_only=True)
 class WrittenFile:
-    """How a file is written."""
+    """How a file is written.
 
-    format: str | None = key(
-        TEXT, "Format of the file, by its name.", None, default_words="found by the content"
-    )
-    variable: str | None = key(
-        TEXT,
-        "Matrix, sheet, topic or group of a file that holds several.",
-        None,
-        default_words="the only one",
-    )
-    delimiter: str | None = key(
-        meaning(DELIMITERS),
-        'What separates the cells of text; "space" is any white space.',
-        None,
-        default_words="found from the file",
-    )
-    header: bool | None = key(
-        FLAG,
-        "Whether the first line of text names the columns.",
-        None,
-        default_words="found from the file",
-    )
-    skip_rows: int = key(
-        whole(0, 10**6),
-        "Lines above the header or the first row. What a logger writes there is found without it.",
-        0,
-        "lines",
-    )
-    comment: str = key(TEXT, "Lines of text that begin with it are ignored.", "#")
-    decimal: str = key(word((".", ",")), "Decimal sign of text.", ".")
+    Attributes
+    ----------
+    format
+        Format of the file, by its name.
+    variable
+        Matrix, sheet, topic or group of a file that holds several.
+    delimiter
+        What separates the cells of text; "space" is any white space.
+    header
+        Whether the first line of text names the columns.
+    skip_rows
+        Lines above the header or the first row. What a logger writes there is found without it.
+    comment
+        Lines of text that begin with it are ignored.
+    decimal
+        Decimal sign of text.
+    """
+
+    format: str | None = setting(TEXT, None, words="found by the content")
+    variable: str | None = setting(TEXT, None, words="the only one")
+    delimiter: str | None = setting(meaning(DELIMITERS), None, words="found from the file")
+    header: bool | None = setting(FLAG, None, words="found from the file")
+    skip_rows: int = setting(whole(0, 10**6), 0, "lines")
+    comment: str = setting(TEXT, "#")
+    decimal: str = setting(word((".", ",")), ".")
 
     def layout(self, table: str, columns: Sequence[Column]) -> FileLayout:
         """Layout of the file of `table`, of which `columns` will be asked for."""
