@@ -84,27 +84,31 @@ class RecordingFile:
         found = meant(column, names, self.layout.variable)
         if len(found) == 1:
             return found[0]
+        raise self._no_column(column, key, found)
+
+    def _no_column(self, column: str, key: str, found: Sequence[int]) -> RefusedError:
+        names = self.source.names
         if found:
             full = sorted({names[k] for k in found})
-            raise RefusedError(
+            return RefusedError(
                 str(self.path),
                 f"{len(found)} columns {shown(column)} ({key})",
                 expected="one of that name" if len(full) == 1 else "one of " + _some(full),
                 remedy="give its number from 1" if len(full) == 1 else "",
             )
         if not any(names) and self.source.row_word != "line":
-            raise RefusedError(
+            return RefusedError(
                 str(self.path), "holds no columns", expected=f"column {shown(column)} ({key})"
             )
         if not any(names):
-            raise RefusedError(
+            return RefusedError(
                 str(self.path),
                 f"no header, so no column {shown(column)} ({key})",
                 expected="column numbers from 1",
                 remedy="give numbers, or header = true if the first line is one",
             )
         hint = did_you_mean(column, names)
-        raise RefusedError(
+        return RefusedError(
             str(self.path),
             f"no column {shown(column)} ({key}){hint}",
             expected="one of " + _some(names),

@@ -118,15 +118,12 @@ def read_table(
     Parameters
     ----------
     label : (key, column) or None
-        A column of text.
-    ordered : bool
-        Whether times must rise: not where a row is a pose.
+    ordered : whether times must rise
 
     Raises
     ------
     RefusedError
-        When the file cannot be read, lacks a column, changes while it is read, has half of its rows
-        without a reading, or more than `clock.LEFT_OUT_MAX` of them out of order in time.
+        As `RecordingFile`, `order.Order`; where half of the rows lack a reading.
     """
     file = RecordingFile(path, layout)
     clock = _clock_of(file, clock, quantities)
