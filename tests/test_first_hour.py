@@ -1,4 +1,4 @@
-"""The tutorials and the README are run as they stand, and must print what they show."""
+"""Code of the tutorials, of one how-to page and of the README runs and prints what they show."""
 
 from __future__ import annotations
 
@@ -79,7 +79,9 @@ def test_the_readme_shows_what_its_first_command_prints() -> None:
 
 
 @pytest.mark.usefixtures("home")
-@pytest.mark.parametrize("page", ["docs/first-hour/python.md"])
+@pytest.mark.parametrize(
+    "page", ["docs/first-hour/python.md", "docs/how-to/python.md", "README.md"]
+)
 def test_the_python_of_a_page_runs_and_prints_what_it_shows(page: str) -> None:
     names: dict[str, object] = {"__name__": "__main__"}
     printed = None
