@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from triaxcal.api.calibration import Calibration, Diagnosis, fit, load
     from triaxcal.api.delivery import Delivered, deliver
+    from triaxcal.api.files import key_schema, write_first_file
     from triaxcal.api.firmware import CompiledFirmware, Firmware, firmware
     from triaxcal.api.imu import (
         Imu,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         load_imu,
         read_imu,
     )
+    from triaxcal.api.series import SeriesResult, calibrate_series
     from triaxcal.api.studies import (
         MeasurementPlan,
         Study,
@@ -55,20 +57,23 @@ __version__ = "0.1.0"
 __all__ = [
     "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "Firmware", "Imu",
     "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "MeasurementPlan", "RefusedError",
-    "Study", "Tested", "Unit", "UsageError", "Verdict", "Verification", "__version__",
-    "compare_history", "cross_coupling", "deliver", "find_poses", "firmware", "firmware_imu", "fit",
-    "fit_imu", "load", "load_imu", "plan_measurements", "plan_motion", "read_imu", "read_unit",
-    "simulate", "simulate_series", "study_drift", "verify_unit",
+    "SeriesResult", "Study", "Tested", "Unit", "UsageError", "Verdict", "Verification",
+    "__version__", "calibrate_series", "compare_history", "cross_coupling", "deliver", "find_poses",
+    "firmware", "firmware_imu", "fit", "fit_imu", "key_schema", "load", "load_imu",
+    "plan_measurements", "plan_motion", "read_imu", "read_unit", "simulate", "simulate_series",
+    "study_drift", "verify_unit", "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
     "triaxcal.api.calibration": ("Calibration", "Diagnosis", "fit", "load"),
     "triaxcal.api.delivery": ("Delivered", "deliver"),
+    "triaxcal.api.files": ("key_schema", "write_first_file"),
     "triaxcal.api.firmware": ("CompiledFirmware", "Firmware", "firmware"),
     "triaxcal.api.imu": (
         "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "firmware_imu",
         "fit_imu", "load_imu", "read_imu",
     ),
+    "triaxcal.api.series": ("SeriesResult", "calibrate_series"),
     "triaxcal.api.studies": (
         "MeasurementPlan", "Study", "compare_history", "cross_coupling", "find_poses",
         "plan_measurements", "plan_motion", "simulate", "simulate_series", "study_drift",

@@ -22,11 +22,13 @@ def toml_text(document: Mapping[str, Any]) -> str:
     RefusedError
         For a value that TOML cannot hold.
     """
-    top = [f"{k} = {_value(k, v)}" for k, v in document.items() if not isinstance(v, Mapping)]
+    top = [
+        f"{k} = {toml_value(v, str(k))}" for k, v in document.items() if not isinstance(v, Mapping)
+    ]
     for name, table in document.items():
         if isinstance(table, Mapping):
             top += ["", f"[{_key(name)}]"]
-            top += [f"{_key(k)} = {_value(f'{name}.{k}', v)}" for k, v in table.items()]
+            top += [f"{_key(k)} = {toml_value(v, f'{name}.{k}')}" for k, v in table.items()]
     return "\n".join(top) + "\n"
 
 
@@ -36,21 +38,27 @@ def _key(name: object) -> str:
     return text if bare else json.dumps(text)
 
 
-def _value(key: str, value: Any) -> str:
+def toml_value(value: Any, place: str = "value") -> str:
+    """One value in TOML; `place` is for messages.
+
+    Raises
+    ------
+    RefusedError
+        For a value that TOML cannot hold.
+    """
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value)  # TOML's basic strings escape as JSON does
-    if isinstance(value, int | Decimal | datetime.date) or (
-        isinstance(value, float) and math.isfinite(value)
-    ):
-        return str(value) if not isinstance(value, float) else repr(value)
+    if isinstance(value, str | bool):
+        return json.dumps(value, ensure_ascii=False)  # TOML's basic strings escape as JSON does
+    if isinstance(value, float) and math.isfinite(value):
+        return repr(value).removesuffix(".0")
+    if isinstance(value, int | Decimal | datetime.date):
+        return str(value)
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(key, item) for item in value) + "]"
+        return "[" + ", ".join(toml_value(item, place) for item in value) + "]"
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_key(k)} = {_value(key, v)}" for k, v in value.items()) + "}"
+        inner = ", ".join(f"{_key(k)} = {toml_value(v, place)}" for k, v in value.items())
+        return "{" + inner + "}"
     raise RefusedError(
-        key, f"found {value!r}", expected="text, a finite number, a date, true, false or a list"
+        place, f"found {value!r}", expected="text, a finite number, a date, true, false or a list"
     )

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import logging
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -18,19 +16,11 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from triaxcal import SeriesResult, calibrate_series
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.publish import renew
-from triaxcal.batch import journal
-from triaxcal.batch.cluster import connect, run_cluster, workers
-from triaxcal.batch.local import cores, run_local
-from triaxcal.batch.order import Make, Order, Outcome, Runner
+from triaxcal.batch.order import Outcome
 from triaxcal.batch.plan import Work, plan_work
-from triaxcal.batch.run import Series, run_series
 from triaxcal.cli.options import UnitFolder, example, say
-from triaxcal.report.files import SOMETIMES
-from triaxcal.report.series.page import PAGE_FILE, series_files
-from triaxcal.report.series.summary import series_summary
-from triaxcal.report.series.unit import make_unit
 
 
 @click.command(
@@ -62,39 +52,17 @@ def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str
     work = plan_work(units, build)
     for path, reason in work.skipped:
         click.echo(f"{path}: {reason}; skipped", err=True)
-    start = time.monotonic()
-    if scheduler is None:
-        width = jobs or cores()
-        series = _run(work, build, _local(width))
-    else:
+    if scheduler is not None:
         # A lost cluster is reported in one line; distributed would log tracebacks beside it.
         logging.disable(logging.CRITICAL)
-        client = connect(scheduler)
-        try:
-            width = workers(client)
-            series = _run(work, build, lambda make, orders: run_cluster(client, make, orders))
-        finally:
-            client.close()
-    seconds = time.monotonic() - start
-    build.mkdir(parents=True, exist_ok=True)
-    if series.made:
-        journal.rewrite(build, ({**journal.read_journal(build), **series.entries}).values())
-    renew(series_files(series), build)
-    page = build / PAGE_FILE
-    say(series_summary(series, len(work.done), seconds, width, str(page)))
-    if series.refused:
+    done = _run(work, build, jobs, scheduler)
+    say(done.summary)
+    if done.refused:
         raise RefusedError(
             "batch",
-            f"{len(series.refused)} of {work.total} units refused",
-            remedy=f"see above or {page}; run again when they are corrected",
+            f"{len(done.refused)} of {done.total} units refused",
+            remedy=f"see above or {done.page}; run again when they are corrected",
         )
-
-
-def _local(jobs: int) -> Runner:
-    def runner(make: Make, orders: list[Order]) -> Iterator[Outcome]:
-        return run_local(make, orders, jobs, _report_finishing)
-
-    return runner
 
 
 def _report_finishing(count: int) -> None:
@@ -104,7 +72,7 @@ def _report_finishing(count: int) -> None:
     )
 
 
-def _run(work: Work, build: Path, runner: Runner) -> Series:
+def _run(work: Work, build: Path, jobs: int | None, scheduler: str | None) -> SeriesResult:
     console = Console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
@@ -117,7 +85,7 @@ def _run(work: Work, build: Path, runner: Runner) -> Series:
     with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("units", total=work.total, completed=len(work.done))
 
-        def tell(outcome: Outcome) -> None:
+        def report(outcome: Outcome) -> None:
             nonlocal made
             made += 1
             bar.advance(task)
@@ -127,7 +95,10 @@ def _run(work: Work, build: Path, runner: Runner) -> Series:
                 )
 
         try:
-            return run_series(work, build, make_unit, runner, sometimes=SOMETIMES, tell=tell)
+            return calibrate_series(
+                work, build, jobs=jobs, scheduler=scheduler, outcome=report,
+                finishing=_report_finishing,
+            )  # fmt: skip
         except KeyboardInterrupt:
             raise RefusedError(
                 "batch",

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
+import triaxcal
 from triaxcal.cli.options import example
 from triaxcal.keytable.catalogue import FILES
-from triaxcal.keytable.starter import write_starter
 
 
 @click.command(
@@ -29,5 +29,5 @@ def init(folder: Path, kind: str) -> None:
     Required keys stand there with an example. The others are commented out, with their defaults.
     No file is overwritten.
     """
-    path, schema = write_starter(folder, kind)
+    path, schema = triaxcal.write_first_file(folder, kind)
     click.echo(f"{path} written; replace its examples. {schema.name} is for your editor.")

@@ -6,9 +6,9 @@ import json
 
 import click
 
+import triaxcal
 from triaxcal.cli.options import example
 from triaxcal.keytable.catalogue import FILES
-from triaxcal.keytable.schema import json_schema
 
 
 @click.command(epilog=example("triaxcal schema tilter"))
@@ -18,4 +18,4 @@ def schema(kind: str) -> None:
 
     Editors and other programs complete and check a file with it.
     """
-    click.echo(json.dumps(json_schema(FILES[kind]()), indent=1))
+    click.echo(json.dumps(triaxcal.key_schema(kind), indent=1))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from triaxcal.base.keys import FileKeys, Key, TableKeys
-from triaxcal.keytable.values import toml
+from triaxcal.base.tomltext import toml_value
 
 HEAD = "| key | type and range | unit | default | meaning |\n|---|---|---|---|---|"
 
@@ -35,4 +35,6 @@ def default_words(key: Key[Any]) -> str:
     """What an absent key means, in words."""
     if key.required:
         return "required"
-    return key.default_words or (toml(key.default) if key.default not in (None, "") else "none")
+    return key.default_words or (
+        toml_value(key.default) if key.default not in (None, "") else "none"
+    )

@@ -10,10 +10,10 @@ from typing import Any
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import REQUIRED, FileKeys, Key, TableKeys
+from triaxcal.base.tomltext import toml_value
 from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.reference import default_words
 from triaxcal.keytable.schema import json_schema
-from triaxcal.keytable.values import toml
 from triaxcal.unit.description import UNIT_FILE, check_unit_name
 
 _WIDTH = 96
@@ -50,7 +50,7 @@ def write_starter(folder: Path, kind: str) -> tuple[Path, Path]:
     schema = path.with_suffix(".schema.json")
     if file.name == UNIT_FILE:
         check_unit_name(folder.absolute().name)
-        serial = {"serial": {"example": toml(folder.absolute().name)}}
+        serial = {"serial": {"example": toml_value(folder.absolute().name)}}
         file = replace(file, tables=(file.tables[0].but(**serial), *file.tables[1:]))
     for there in (path, schema):
         if there.exists():
@@ -88,7 +88,7 @@ def example(key: Key[Any]) -> str:
     """A good value in TOML: the default, where there is one."""
     stated = key.default not in (REQUIRED, None, (), {})
     if stated and (not key.kind.choices or key.default in key.kind.choices):
-        return key.example or toml(key.default)
+        return key.example or toml_value(key.default)
     return key.example or key.kind.example
 
 

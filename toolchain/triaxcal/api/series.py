@@ -1,0 +1,107 @@
+"""`calibrate_series`: many units at once, on this machine's cores or on a Dask cluster."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.base.publish import renew
+from triaxcal.batch import journal
+from triaxcal.batch.cluster import connect, run_cluster, workers
+from triaxcal.batch.local import cores, run_local
+from triaxcal.batch.order import Make, Order, Outcome
+from triaxcal.batch.plan import Work, plan_work
+from triaxcal.batch.run import run_series
+from triaxcal.report.files import SOMETIMES
+from triaxcal.report.series.page import PAGE_FILE, series_files
+from triaxcal.report.series.summary import series_summary
+from triaxcal.report.series.unit import make_unit
+
+
+@dataclass(frozen=True)
+class SeriesResult:
+    """What became of a series.
+
+    Attributes
+    ----------
+    page : Path
+        The page about all units.
+    refused : dict
+        Why units were refused, by name.
+    total : int
+        Units in all.
+    summary : str
+        The text that the command line prints.
+    """
+
+    page: Path
+    refused: dict[str, str]
+    total: int
+    summary: str
+
+
+def calibrate_series(
+    units: Sequence[str | Path] | Work,
+    build: str | Path = "build",
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    outcome: Callable[[Outcome], None] = lambda _: None,
+    finishing: Callable[[int], None] = lambda _: None,
+) -> SeriesResult:
+    """Calibrate many units; those whose files have not changed are not made again.
+
+    Parameters
+    ----------
+    units : paths, or a Work
+        Folders of units, or folders that contain them; or what `plan_work` made of them.
+    build : path
+        Receives a folder for each unit, and the page of the series.
+    jobs : int or None
+        Processes; None is one for each core.
+    scheduler : str or None
+        Address of a Dask scheduler, in place of `jobs`.
+    outcome : callable
+        Called with each unit when its files are in place, or with its refusal.
+    finishing : callable
+        Called at an interrupt with the number of units that are finished before it is raised.
+
+    Raises
+    ------
+    RefusedError
+        When there is no unit, the journal cannot be written, or the cluster is lost.
+    """
+    target = Path(build)
+    work = units if isinstance(units, Work) else plan_work([Path(u) for u in units], target)
+    start = time.monotonic()
+    if scheduler is None:
+        width = jobs or cores()
+
+        def local(make: Make, orders: list[Order]) -> Iterator[Outcome]:
+            return run_local(make, orders, width, finishing)
+
+        series = run_series(work, target, make_unit, local, sometimes=SOMETIMES, tell=outcome)
+    else:
+        client = connect(scheduler)
+        try:
+            width = workers(client)
+            series = run_series(
+                work,
+                target,
+                make_unit,
+                lambda make, orders: run_cluster(client, make, orders),
+                sometimes=SOMETIMES,
+                tell=outcome,
+            )
+        finally:
+            client.close()
+    seconds = time.monotonic() - start
+    target.mkdir(parents=True, exist_ok=True)
+    if series.made:
+        journal.rewrite(target, ({**journal.read_journal(target), **series.entries}).values())
+    renew(series_files(series), target)
+    page = target / PAGE_FILE
+    text = series_summary(series, len(work.done), seconds, width, str(page))
+    return SeriesResult(page, dict(series.refused), work.total, text)
