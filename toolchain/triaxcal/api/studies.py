@@ -120,7 +120,7 @@ def cross_coupling(
 
 
 def compare_history(unit: Unit) -> Study[list[Change]]:
-    """Changes between the calibrations of a unit: history/*.csv, then measurements.csv.
+    """Changes between the calibrations of a unit: `history/*.csv`, then measurements.csv.
 
     Raises
     ------
