@@ -1,4 +1,4 @@
-"""Code of the tutorials, of one how-to page and of the README runs and prints what they show."""
+"""Code of the tutorials, of two how-to pages and of the README runs and prints what they show."""
 
 from __future__ import annotations
 
@@ -80,7 +80,8 @@ def test_the_readme_shows_what_its_first_command_prints() -> None:
 
 @pytest.mark.usefixtures("home")
 @pytest.mark.parametrize(
-    "page", ["docs/first-hour/python.md", "docs/how-to/python.md", "README.md"]
+    "page",
+    ["docs/first-hour/python.md", "docs/how-to/python.md", "docs/how-to/extend.md", "README.md"],
 )
 def test_the_python_of_a_page_runs_and_prints_what_it_shows(page: str) -> None:
     names: dict[str, object] = {"__name__": "__main__"}
