@@ -170,30 +170,54 @@ def _gather(table: NumberArray, index: IntArray) -> NumberArray:
     return np.take(table, index, axis=1, mode="clip").T.reshape(-1, 3, 4)
 
 
+@dataclass(frozen=True)
+class PythonAnswers:
+    """What the integer model answers to each set of vectors, and its largest error, in LSB."""
+
+    answers: list[Answers]
+    largest_error_lsb: float
+
+
+def python_answers(plan: Plan, sets: list[VectorSet]) -> PythonAnswers:
+    """Answers of the integer model; they need no compiled C."""
+    routine = python_routine(plan)
+    answers = [routine(v.temp, v.raw) for v in sets]
+    real = _columns(plan.real_rows())
+    errors = [
+        _largest_error(plan, real, v, found)
+        for v, found in zip(sets, answers, strict=True)
+        if v.exhaustive
+    ]
+    return PythonAnswers(answers, max(errors, default=0.0))
+
+
 def cross_check(
-    plan: Plan, sets: list[VectorSet], generated: Generated, reference: Routine, image: bytes
+    plan: Plan,
+    sets: list[VectorSet],
+    generated: Generated,
+    reference: Routine,
+    image: bytes,
+    *,
+    python: PythonAnswers | None = None,
 ) -> CrossCheck:
     """Run every vector through the three implementations and the image through the loader.
+
+    `python` are the answers of `python_answers`, where they were made while the C was compiled.
 
     Raises
     ------
     RefusedError
         At the first mismatch: its input and both outputs.
     """
-    python = python_routine(plan)
-    largest = 0.0
-    real = _columns(plan.real_rows())
     with ThreadPoolExecutor(2) as pool:
         compiled = [
             (pool.submit(generated.run, v.temp, v.raw), pool.submit(reference, v.temp, v.raw))
             for v in sets
         ]
-        for vectors, (from_generated, from_reference) in zip(sets, compiled, strict=True):
-            expected = python(vectors.temp, vectors.raw)
-            _compare(vectors, "generated C", from_generated.result(), expected)
-            _compare(vectors, "reference C", from_reference.result(), expected)
-            if vectors.exhaustive:
-                largest = max(largest, _largest_error(plan, real, vectors, expected))
+        python = python or python_answers(plan, sets)
+        for vectors, expected, found in zip(sets, python.answers, compiled, strict=True):
+            _compare(vectors, "generated C", found[0].result(), expected)
+            _compare(vectors, "reference C", found[1].result(), expected)
     boundary = next(v for v in sets if v.name == "boundaries")
     loaded, answers = generated.run_image(image, boundary.temp, boundary.raw)
     if loaded != STATUS_OK:
@@ -201,7 +225,7 @@ def cross_check(
     _compare(
         boundary, "generated C with the image", answers, generated.run(boundary.temp, boundary.raw)
     )
-    return CrossCheck({v.name: len(v.temp) for v in sets}, largest)
+    return CrossCheck({v.name: len(v.temp) for v in sets}, python.largest_error_lsb)
 
 
 def _compare(vectors: VectorSet, name: str, found: Answers, expected: Answers) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.compiler import Compilation, reference_under_way
-from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
+from triaxcal.codegen.crosscheck import CrossCheck, cross_check, python_answers, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images, image_cases
 from triaxcal.codegen.outputs.image import IMAGE_FILE
@@ -116,11 +116,12 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
         sets = vector_sets(plan)
         image = firmware.files[IMAGE_FILE]
         cases = image_cases(plan, image)
+        python = python_answers(plan, sets)
         if isinstance(reference, Compilation):
             reference = Reference(reference.load())
         generated = Generated(compilation.load())
         tried = routines_of(plan.rate, generated.library, reference.library)
-        check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
+        check = cross_check(plan, sets, tried[0], tried[1].routine(image), image, python=python)
         check = replace(check, images=check_images(plan, cases, *tried))
         _refuse_wrong_bound(unit, bound, check)
         dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
