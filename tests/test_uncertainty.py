@@ -19,7 +19,7 @@ from triaxcal.readings.measurements import Dwell, MeasurementSet, read_measureme
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.rig import Rig, rotation
 from triaxcal.simulation.truth import Imperfections, Truth, read_truth
-from triaxcal.uncertainty.budget import Line, budget
+from triaxcal.uncertainty.budget import budget
 from triaxcal.uncertainty.coverage import coverage_factor, effective_dof, student_within
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
@@ -27,6 +27,7 @@ from triaxcal.uncertainty.heldout import held_out, thermal_error
 from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance, weights
 from triaxcal.uncertainty.propagation import ROWS, propagation, rows_of
 from triaxcal.uncertainty.scatter import scatter
+from triaxcal.uncertainty.source import NORMAL, Source
 from triaxcal.unit.description import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
 
 UNITS = Path(__file__).parent.parent / "units"
@@ -286,7 +287,7 @@ def test_a_wrong_thermal_function_shows_in_the_budget() -> None:
     assert typical < error.sd_g < 4.0 * typical
     t, d, c = result.worst_component()
     worst = result.force_budget(c, t, DIRECTIONS[d])
-    assert worst.lines[0].key == "thermal_model"
+    assert worst.lines[0].source.key == "thermal_model"
     assert "The thermal model gives 100 % of the uncertainty of a_" in worst.verdict
 
 
@@ -307,7 +308,7 @@ def test_without_held_out_data_or_rival_it_is_unknown() -> None:
     b = result.constant_budget(0, result.t0_index)
     (line,) = b.unknown
     assert line.contribution is None
-    assert line.sd is None
+    assert line.source.sd is None
     assert b.lines[0] is line
     assert "Not in it: the thermal model, which is unknown" in b.verdict
 
@@ -343,8 +344,8 @@ def test_budgets_add_up_and_are_sorted(
         assert b.combined == pytest.approx(math.sqrt(sum(u * u for u in parts)))
         assert b.expanded == pytest.approx(expanded, rel=1e-9)
         for line in b.lines:
-            if line.sensitivity is not None and line.sd is not None:
-                assert line.sensitivity * line.sd == pytest.approx(line.contribution)
+            if line.sensitivity is not None and line.source.sd is not None:
+                assert line.sensitivity * line.source.sd == pytest.approx(line.contribution)
 
 
 def test_the_device_is_in_the_acceleration_only(
@@ -358,7 +359,7 @@ def test_the_device_is_in_the_acceleration_only(
         assert keys[key].force is not None
     assert keys["thermometer"].force is None
     b = result.force_budget(0, 0, np.array([1.0, 0.0, 0.0]))
-    found = {line.key: line.contribution for line in b.lines}
+    found = {line.source.key: line.contribution for line in b.lines}
     assert found["output_lsb"] == pytest.approx(2.0**-24 / math.sqrt(12.0))
     assert found["arithmetic"] == pytest.approx(0.25 * 2.0**-24 / math.sqrt(3.0))
     assert found["method"] == pytest.approx(5e-7 / math.sqrt(3.0))
@@ -371,18 +372,18 @@ def test_a_rotation_moves_no_length_and_gravity_scales_it() -> None:
     _, result = evaluated(unit, measurements)
     arcsec = math.pi / 180.0 / 3600.0
     for n in (np.array([0.0, 0.0, 1.0]), np.array([0.6, 0.8, 0.0])):
-        length = {line.key: line.contribution for line in result.force_budget(3, 3, n).lines}
+        length = {line.source.key: line.contribution for line in result.force_budget(3, 3, n).lines}
         assert length["level"] == pytest.approx(0.0, abs=1e-12)
         assert length["gravity"] == pytest.approx(1e-3 / 9.80665 / unit.gravity_g, rel=1e-6)
     along_x = result.force_budget(0, 3, np.array([0.0, 0.0, 1.0]))
-    level = next(line.contribution for line in along_x.lines if line.key == "level")
+    level = next(line.contribution for line in along_x.lines if line.source.key == "level")
     # Tilts about y move x by the angle; 1e-4 for the shift of the dwells' temperatures.
     assert level == pytest.approx(10.0 * arcsec, rel=1e-4)
 
 
 def test_empty_budget_says_so() -> None:
-    line = Line("a", "the source", 0.0, "V", "normal", 1.0, None, None, 0.0, "", "")
-    assert budget("q", "V", [(line, 0.0)]).verdict == "Nothing that is known contributes."
+    source = Source("a", "the source", "V", "", "", 0.0, NORMAL, 1.0)
+    assert budget("q", "V", [(source, 0.0)]).verdict == "Nothing that is known contributes."
 
 
 def test_fast_variances_are_the_quadratic_forms() -> None:

@@ -121,7 +121,9 @@ def test_a_pair_of_noise_is_told_and_is_in_the_uncertainty(plain: Passport, tmp_
         assert source.sd == pytest.approx(np.sqrt(pair.covariance.max()), rel=1e-12)
         temp, direction = u.worst_length()
         assert u.force_u[temp, direction, 3] > 5.0 * plain.length_budget.expanded
-        assert u.force_budget(3, temp, DIRECTIONS[direction]).lines[0].key == "quadratic_terms"
+        assert (
+            u.force_budget(3, temp, DIRECTIONS[direction]).lines[0].source.key == "quadratic_terms"
+        )
         error = np.einsum("dk,dk->d", DIRECTIONS, products(DIRECTIONS) @ pair.quadratic.T)
         within.append(np.abs(error) <= u.force_u[u.t0_index, :, 3])
         kip = np.abs(pair.quadratic[[0, 1], 3])

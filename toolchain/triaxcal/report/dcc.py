@@ -126,7 +126,7 @@ def _statements(data: ET.Element, p: Passport) -> None:
     for limit in p.acceptance:
         statement = _add(statements, "statement")
         _text(statement, "name", f"| |a| - g | {limit.where}, at most {limit.limit_g:g} g")
-        unknown = "".join(f"; not in it: {line.name}" for line in p.length_budget.unknown)
+        unknown = "".join(f"; not in it: {line.source.name}" for line in p.length_budget.unknown)
         found = (
             f"largest at the dwells {limit.largest_g:.3g} g, expanded uncertainty of |a| "
             f"{limit.uncertainty_g:.3g} g ({LEVEL:.0%}), mostly from {limit.cause}{unknown}"

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from triaxcal.uncertainty.coverage import coverage_factor, effective_dof
+from triaxcal.uncertainty.source import Source
 
 
 @dataclass(frozen=True)
@@ -15,27 +16,23 @@ class Line:
 
     Attributes
     ----------
-    sd : float or None
-        Standard uncertainty of the source in `unit`; None when it is unknown.
-    sensitivity : float or None
-        `contribution` / `sd`: quantity's unit per source's unit.
+    source : Source
     contribution : float or None
-        Standard uncertainty that it gives the quantity, in the quantity's unit.
+        Standard uncertainty that it gives the quantity, in the quantity's unit; None when it is
+        unknown.
     share : float
         Of the combined variance, 0 to 1.
     """
 
-    key: str
-    name: str
-    sd: float | None
-    unit: str
-    distribution: str
-    dof: float
-    sensitivity: float | None
+    source: Source
     contribution: float | None
-    share: float
-    origin: str
-    advice: str
+    share: float = 0.0
+
+    @property
+    def sensitivity(self) -> float | None:
+        """`contribution` / size of the source: quantity's unit per source's unit."""
+        sd = self.source.sd
+        return self.contribution / sd if sd and self.contribution is not None else None
 
 
 @dataclass(frozen=True)
@@ -72,34 +69,34 @@ class Budget:
         return tuple(line for line in self.lines if line.contribution is None)
 
     @property
+    def worst(self) -> Line | None:
+        """The source that contributes most; None where nothing that is known contributes."""
+        return next((line for line in self.lines if line.contribution), None)
+
+    @property
     def verdict(self) -> str:
         """What to improve, in a sentence."""
-        worst = next((line for line in self.lines if line.contribution), None)
-        if worst is None:
-            text = "Nothing that is known contributes."
-        else:
+        text = "Nothing that is known contributes."
+        if self.worst is not None:
+            source, share = self.worst.source, 100 * self.worst.share
             text = (
-                f"{worst.name[0].upper()}{worst.name[1:]} gives {100 * worst.share:.0f} % of the "
-                f"uncertainty of {self.quantity}; to improve it, {worst.advice}."
+                f"{source.name[0].upper()}{source.name[1:]} gives {share:.0f} % of the "
+                f"uncertainty of {self.quantity}; to improve it, {source.advice}."
             )
         for line in self.unknown:
-            text += f" Not in it: {line.name}, which is unknown; {line.advice}."
+            text += f" Not in it: {line.source.name}, which is unknown; {line.source.advice}."
         return text
 
 
-def budget(quantity: str, unit: str, sources: Sequence[tuple[Line, float | None]]) -> Budget:
-    """Combine lines whose contributions stand beside them; None is unknown."""
-    known = [(line, u) for line, u in sources if u is not None]
+def budget(quantity: str, unit: str, sources: Sequence[tuple[Source, float | None]]) -> Budget:
+    """Combine sources whose contributions stand beside them; None is unknown."""
+    known = [(source, u) for source, u in sources if u is not None]
     variance = math.fsum(u * u for _, u in known)
     combined = math.sqrt(variance)
-    dof = effective_dof((u, line.dof) for line, u in known)
+    dof = effective_dof((u, source.dof) for source, u in known)
     lines = [
-        Line(
-            line.key, line.name, line.sd, line.unit, line.distribution, line.dof,
-            u / line.sd if line.sd else None, u, u * u / variance if variance else 0.0,
-            line.origin, line.advice,
-        )
-        for line, u in sorted(known, key=lambda item: -item[1])
-    ]  # fmt: skip
-    unknown = [line for line, u in sources if u is None]
+        Line(source, u, u * u / variance if variance else 0.0)
+        for source, u in sorted(known, key=lambda item: -item[1])
+    ]
+    unknown = [Line(source, None) for source, u in sources if u is None]
     return Budget(quantity, unit, (*unknown, *lines), combined, dof, coverage_factor(dof))

@@ -33,92 +33,68 @@ class Device:
     model_error_g: float
 
 
-def raw_code(p: Curves) -> Source:
-    """Rounding of the reading to a code."""
-    sd = p.unit.adc.volts_per_code / _ROOT_12
-    return Source(
-        key="raw_code",
-        name="the rounding to raw codes",
-        sd=sd,
-        unit="V",
-        distribution=RECTANGULAR,
-        dof=math.inf,
-        origin="one code, ± 1/2",
-        advice="use more of the ADC's bits",
-        constants=None,
-        force=direct(p, p.inverse * sd),
-    )
+def device_sources(p: Curves, device: Device | None) -> list[Source]:
+    """Rounding of the codes, and what is proven of the firmware, where there is one."""
+    code_v = p.unit.adc.volts_per_code / _ROOT_12
+    code_degc = p.unit.temperature_sensor.degc_per_code / _ROOT_12
+    sources = [
+        Source(
+            key="raw_code",
+            name="the rounding to raw codes",
+            unit="V",
+            advice="use more of the ADC's bits",
+            origin="one code, ± 1/2",
+            sd=code_v,
+            distribution=RECTANGULAR,
+            force=direct(p, p.inverse * code_v),
+        ),
+        Source(
+            key="temperature_code",
+            name="the rounding to temperature codes",
+            unit="°C",
+            advice="use a finer temperature code",
+            origin="one code, ± 1/2",
+            sd=code_degc,
+            distribution=RECTANGULAR,
+            force=from_factor(p, p.slopes.reshape(-1, 12, 1) * code_degc)[1],
+        ),
+    ]
+    return sources if device is None else sources + _of_firmware(p, device)
 
 
-def temperature_code(p: Curves) -> Source:
-    """Rounding of the temperature to a code."""
-    sd = p.unit.temperature_sensor.degc_per_code / _ROOT_12
-    return Source(
-        key="temperature_code",
-        name="the rounding to temperature codes",
-        sd=sd,
-        unit="°C",
-        distribution=RECTANGULAR,
-        dof=math.inf,
-        origin="one code, ± 1/2",
-        advice="use a finer temperature code",
-        constants=None,
-        force=from_factor(p, p.slopes.reshape(-1, 12, 1) * sd)[1],
-    )
-
-
-def output_lsb(p: Curves, device: Device) -> Source:
-    """Rounding of the result."""
-    sd = 2.0**-device.output_q / _ROOT_12
-    return Source(
-        key="output_lsb",
-        name="the rounding of the result",
-        sd=sd,
-        unit="g",
-        distribution=RECTANGULAR,
-        dof=math.inf,
-        origin=f"LSB of 2^-{device.output_q} g, ± 1/2",
-        advice="raise compensation.output_q",
-        constants=None,
-        force=_each_axis(p, np.full(3, sd)),
-    )
-
-
-def arithmetic(p: Curves, device: Device) -> Source:
-    """The proven bound of the integer arithmetic, without the final rounding."""
+def _of_firmware(p: Curves, device: Device) -> list[Source]:
+    """Rounding of the result, the proven bound without it, the method's own distance."""
+    lsb_g = 2.0**-device.output_q
     beyond = np.array([max(bound - 0.5, 0.0) for bound in device.bound_lsb])
-    sds = beyond * 2.0**-device.output_q / _ROOT_3
-    return Source(
-        key="arithmetic",
-        name="the integer arithmetic",
-        sd=float(sds.max()),
-        unit="g",
-        distribution=RECTANGULAR,
-        dof=math.inf,
-        origin="proven bound beyond the final rounding",
-        advice="raise compensation.output_q",
-        constants=None,
-        force=_each_axis(p, sds),
+    found = (
+        (
+            "output_lsb",
+            "the rounding of the result",
+            "raise compensation.output_q",
+            f"LSB of 2^-{device.output_q} g, ± 1/2",
+            np.full(3, lsb_g / _ROOT_12),
+        ),
+        (
+            "arithmetic",
+            "the integer arithmetic",
+            "raise compensation.output_q",
+            "proven bound beyond the final rounding",
+            beyond * lsb_g / _ROOT_3,
+        ),
+        (
+            "method",
+            "the compensation method",
+            'lower compensation.model_error_max_micro_g, with method = "matrix"',
+            "largest distance from K(T)^-1 (U - U0(T)) for any raw code",
+            np.full(3, device.model_error_g / _ROOT_3),
+        ),
     )
+    return [
+        Source(key, name, "g", advice, origin, float(sds.max()), RECTANGULAR, force=_axes(p, sds))
+        for key, name, advice, origin, sds in found
+    ]
 
 
-def method(p: Curves, device: Device) -> Source:
-    """The compensation method's own distance from the fitted model."""
-    sd = device.model_error_g / _ROOT_3
-    return Source(
-        key="method",
-        name="the compensation method",
-        sd=sd,
-        unit="g",
-        distribution=RECTANGULAR,
-        dof=math.inf,
-        origin="largest distance from K(T)^-1 (U - U0(T)) for any raw code",
-        advice='lower compensation.model_error_max_micro_g, with method = "matrix"',
-        constants=None,
-        force=_each_axis(p, np.full(3, sd)),
-    )
-
-
-def _each_axis(p: Curves, sds_g: FloatArray) -> FloatArray:
+def _axes(p: Curves, sds_g: FloatArray) -> FloatArray:
     """Covariance of D of independent errors of the three axes."""
     return direct(p, np.broadcast_to(np.diag(sds_g), (len(p.temps_degc), 3, 3)))

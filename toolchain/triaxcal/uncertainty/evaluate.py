@@ -13,29 +13,14 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import MeasurementSet
-from triaxcal.uncertainty.budget import Budget, Line, budget
+from triaxcal.uncertainty.budget import Budget, budget
 from triaxcal.uncertainty.coverage import coverage_factor
-from triaxcal.uncertainty.device_sources import (
-    Device,
-    arithmetic,
-    method,
-    output_lsb,
-    raw_code,
-    temperature_code,
-)
+from triaxcal.uncertainty.device_sources import Device, device_sources
 from triaxcal.uncertainty.model_sources import thermal_model
 from triaxcal.uncertainty.orientation import DIRECTIONS, QUANTITIES, force_variance, weights
 from triaxcal.uncertainty.propagation import ROWS, Curves, propagation
 from triaxcal.uncertainty.recording_sources import recording_sources
-from triaxcal.uncertainty.rig_sources import (
-    gravity,
-    level,
-    noise,
-    repeatability,
-    squareness,
-    thermometer,
-    thermometer_drift,
-)
+from triaxcal.uncertainty.rig_sources import rig_sources
 from triaxcal.uncertainty.scatter import Scatter, scatter
 from triaxcal.uncertainty.source import Source
 from triaxcal.uncertainty.terms_sources import pair_source
@@ -100,27 +85,31 @@ class Uncertainty:
     def constant_budget(self, constant: int, temp: int) -> Budget:
         """Budget of one of the twelve constants at one of the temperatures."""
         row = ROWS[constant]
-        lines: list[tuple[Line, float | None]] = []
-        for s in self.sources:
-            if s.unknown:
-                lines.append((_line(s), None))
-            elif s.constants is not None:
-                lines.append((_line(s), math.sqrt(max(float(s.constants[temp, row, row]), 0.0))))
-        unit = self.units[constant]
-        name = f"{CONSTANT_NAMES[constant]} at {self.temps_degc[temp]:.4g} °C"
-        return budget(name, unit, lines)
+        variances = [
+            None if s.constants is None else float(s.constants[temp, row, row])
+            for s in self.sources
+        ]
+        return self._budget(CONSTANT_NAMES[constant], self.units[constant], temp, variances)
 
     def force_budget(self, quantity: int, temp: int, direction: FloatArray) -> Budget:
         """Budget of a component of the force (0 to 2), or of its length (3), at 1 g."""
-        lines: list[tuple[Line, float | None]] = []
+        variances: list[float | None] = []
         for s in self.sources:
-            if s.unknown:
-                lines.append((_line(s), None))
-            elif s.force is not None:
-                w = weights(direction[None], s.force.shape[-1] // 3)[0, quantity]
-                lines.append((_line(s), math.sqrt(max(float(w @ s.force[temp] @ w), 0.0))))
-        name = f"{QUANTITIES[quantity]} at {self.temps_degc[temp]:.4g} °C"
-        return budget(name, "g", lines)
+            if s.force is None:
+                variances.append(None)
+                continue
+            w = weights(direction[None], s.force.shape[-1] // 3)[0, quantity]
+            variances.append(float(w @ s.force[temp] @ w))
+        return self._budget(QUANTITIES[quantity], "g", temp, variances)
+
+    def _budget(self, quantity: str, unit: str, temp: int, variances: list[float | None]) -> Budget:
+        """Budget from the sources' variances; None where one is unknown or does not act."""
+        found = [
+            (s, None if v is None else math.sqrt(max(v, 0.0)))
+            for s, v in zip(self.sources, variances, strict=True)
+            if s.unknown or v is not None
+        ]
+        return budget(f"{quantity} at {self.temps_degc[temp]:.4g} °C", unit, found)
 
     def worst_component(self) -> tuple[int, int, int]:
         """Temperature, direction and component (0 to 2) with the largest uncertainty."""
@@ -152,37 +141,12 @@ def uncertainty(
     if calibration.recording is not None:
         curves = Curves(unit, measurements, calibration, temps)
         found = recording_sources(curves, calibration.recording)
-        return Uncertainty(
-            temps,
-            t0_index,
-            (*found, *pair_source(curves), *_of_device(curves, device)),
-            None,
-            (),
-            units,
-        )
+        found += [*pair_source(curves), *device_sources(curves, device)]
+        return Uncertainty(temps, t0_index, tuple(found), None, (), units)
     p = propagation(unit, measurements, calibration, temps)
     s = scatter(p)
-    sources = [
-        noise(p, s),
-        repeatability(p, s),
-        squareness(p, s),
-        level(p),
-        gravity(p),
-        thermometer(p),
-        thermometer_drift(p),
-        thermal_model(p, s),
-        *pair_source(p),
-        *_of_device(p, device),
-    ]
+    sources = [*rig_sources(p, s), thermal_model(p, s), *pair_source(p), *device_sources(p, device)]
     return Uncertainty(temps, t0_index, tuple(sources), s, tuple(_warnings(unit, s)), units)
-
-
-def _of_device(p: Curves, device: Device | None) -> list[Source]:
-    """The codes' rounding, and what is proven of the firmware, where there is one."""
-    sources = [raw_code(p), temperature_code(p)]
-    if device is not None:
-        sources += [output_lsb(p, device), arithmetic(p, device), method(p, device)]
-    return sources
 
 
 def _temperatures(unit: UnitDescription, calibration: Calibration) -> FloatArray:
@@ -223,9 +187,3 @@ def _expanded(each: FloatArray, dofs: list[float]) -> FloatArray:
     k = np.array([factors[d] for d in whole]).reshape(dof.shape)
     result: FloatArray = k * np.sqrt(variance)
     return result
-
-
-def _line(s: Source) -> Line:
-    return Line(
-        s.key, s.name, s.sd, s.unit, s.distribution, s.dof, None, None, 0.0, s.origin, s.advice
-    )

@@ -21,7 +21,7 @@ from triaxcal.uncertainty.source import (
     from_factor,
 )
 
-KEY, NAME = "thermal_model", "the thermal model"
+_NAMED = ("thermal_model", "the thermal model", "g")
 _ADVICE = "measure at one more temperature, or check positions at temperatures in between"
 
 
@@ -40,14 +40,12 @@ def thermal_model(p: Propagation, s: Scatter) -> Source:
     if error.sd_g < error.resolution_g:
         seen += f"; below {error.resolution_g * 1e6:.2g} µg it is not told from noise"
     return Source(
-        key=KEY,
-        name=NAME,
-        sd=error.sd_g,
-        unit="g",
-        distribution=STUDENT,
-        dof=error.dof,
-        origin=seen,
-        advice="measure at one more temperature, or choose a better thermal function",
+        *_NAMED,
+        "measure at one more temperature, or choose a better thermal function",
+        seen,
+        error.sd_g,
+        STUDENT,
+        error.dof,
         constants=constants,
         force=direct(p, np.broadcast_to(np.eye(3) * error.sd_g, (n, 3, 3))),
     )
@@ -58,10 +56,10 @@ def _without_held_out(p: Propagation) -> Source:
     rival = _rival(p)
     if rival is None:
         return Source(
-            KEY, NAME, None, "g", "unknown", math.inf,
+            *_NAMED,
+            _ADVICE,
             "unknown: nothing was held out, and no other function fits to compare with",
-            _ADVICE, None, None,
-        )  # fmt: skip
+        )
     parameters = fit_curves(p.data, rival)[0]
     constants = rival.model(parameters).constants_at(p.temps_degc)
     difference = rows_of(constants) - p.rows
@@ -69,17 +67,15 @@ def _without_held_out(p: Propagation) -> Source:
     force = p.force_factor(factor).reshape(-1, 3, 4)
     largest = float(np.max(np.linalg.norm(force, axis=-1)))
     return Source(
-        key=KEY,
-        name=NAME,
-        sd=largest,
-        unit="g",
-        distribution=RECTANGULAR,
-        dof=ASSUMED_DOF,
-        origin=f"not known: nothing was held out; taken from the distance to a {rival.label} "
+        *_NAMED,
+        _ADVICE,
+        f"not known: nothing was held out; taken from the distance to a {rival.label} "
         "through the same readings",
-        advice=_ADVICE,
-        constants=from_factor(p, factor)[0],
-        force=from_factor(p, factor)[1],
+        largest,
+        RECTANGULAR,
+        ASSUMED_DOF,
+        True,
+        *from_factor(p, factor),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.uncertainty.propagation import ROWS, Curves, mapped
-from triaxcal.uncertainty.rig_sources import gravity_by, thermometer, thermometer_drift
+from triaxcal.uncertainty.rig_sources import gravity, thermometer
 from triaxcal.uncertainty.source import STUDENT, Source, direct
 from triaxcal.uncertainty.terms_sources import rate_source, with_quadratic
 
@@ -19,8 +19,7 @@ def recording_sources(p: Curves, recording: RecordingFit) -> list[Source]:
         _poses(p, recording),
         *rate_source(p, recording),
         _gravity(p),
-        thermometer(p),
-        thermometer_drift(p),
+        *thermometer(p),
         _unmodelled(p, recording),
         *([_temperature()] if recording.poses.temps_degc is None else []),
     ]
@@ -30,10 +29,12 @@ def _poses(p: Curves, recording: RecordingFit) -> Source:
     """Scatter of the poses: the covariance of the fit."""
     if not recording.checked:
         return Source(
-            "poses", "the scatter of the poses", None, "g", "unknown", math.inf,
-            "unknown: as many constants as poses", "record more poses, in other orientations",
-            None, None,
-        )  # fmt: skip
+            key="poses",
+            name="the scatter of the poses",
+            unit="g",
+            advice="record more poses, in other orientations",
+            origin="unknown: as many constants as poses",
+        )
     covariance = p.calibration.constants_covariance(p.temps_degc)
     order = np.empty(12, dtype=np.int64)
     order[list(ROWS)] = np.arange(12)
@@ -56,7 +57,7 @@ def _gravity(p: Curves) -> Source:
     """Local gravity: scales K."""
     rows = p.rows.copy()
     rows[:, :, 3] = 0.0
-    return gravity_by(p, rows.reshape(-1, 12, 1))
+    return gravity(p, rows.reshape(-1, 12, 1))
 
 
 def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
@@ -64,9 +65,12 @@ def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
     held_out = recording.held_out_g
     if held_out is None:
         return Source(
-            "model", "the model", None, "g", "unknown", math.inf,
-            "unknown: no pose could be left out", "record more poses", None, None,
-        )  # fmt: skip
+            key="model",
+            name="the model",
+            unit="g",
+            advice="record more poses",
+            origin="unknown: no pose could be left out",
+        )
     sd = math.sqrt(max(held_out**2 - recording.rms_free_g**2, 0.0))
     return Source(
         key="model",
@@ -77,7 +81,6 @@ def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
         dof=float(len(recording.residual_g)),
         origin="held-out |a| - g beyond the scatter of the poses",
         advice="record more poses, in orientations that are not alike",
-        constants=None,
         force=direct(p, np.broadcast_to(np.eye(3) * sd, (len(p.temps_degc), 3, 3))),
     )
 
@@ -85,7 +88,9 @@ def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
 def _temperature() -> Source:
     """Nothing was recorded of the temperature, so nothing is known of what it does."""
     return Source(
-        "temperature", "the change with temperature", None, "g", "unknown", math.inf,
-        "unknown: the recording has no temperature", "record the temperature, and poses at several",
-        None, None,
-    )  # fmt: skip
+        key="temperature",
+        name="the change with temperature",
+        unit="g",
+        advice="record the temperature, and poses at several",
+        origin="unknown: the recording has no temperature",
+    )

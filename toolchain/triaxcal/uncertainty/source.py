@@ -25,14 +25,17 @@ class Source:
         For machines.
     name : str
         For people, as the subject of a sentence.
+    unit : str
+    advice : str
+        What would make it smaller.
+    origin : str
+        Where `sd` comes from, in words.
     sd : float or None
         Standard uncertainty of the source itself, in `unit`; None where it is unknown.
     distribution : str
     dof : float
-    origin : str
-        Where `sd` comes from, in words.
-    advice : str
-        What would make it smaller.
+    assumed : bool
+        Whether `sd` is a guess.
     constants, force : array, shape (n, 12, 12), or None
         Covariance of [K U0] and of D (`uncertainty.propagation`) at the temperatures; None where
         the source does not act. `force` is (n, 30, 30) where D goes on with Q (3 x 6).
@@ -40,14 +43,15 @@ class Source:
 
     key: str
     name: str
-    sd: float | None
     unit: str
-    distribution: str
-    dof: float
-    origin: str
     advice: str
-    constants: FloatArray | None
-    force: FloatArray | None
+    origin: str
+    sd: float | None = None
+    distribution: str = "unknown"
+    dof: float = math.inf
+    assumed: bool = False
+    constants: FloatArray | None = None
+    force: FloatArray | None = None
 
     @property
     def unknown(self) -> bool:
@@ -65,10 +69,3 @@ def direct(p: Curves, factor_g: FloatArray) -> FloatArray:
     blocks = np.zeros((len(p.temps_degc), 3, 4, factor_g.shape[-1]))
     blocks[:, :, 3] = factor_g
     return square(blocks.reshape(len(p.temps_degc), 12, -1))
-
-
-def stated_or(stated: float | None, default: float, key: str) -> tuple[float, float, str]:
-    """Standard uncertainty, degrees of freedom and origin of one that unit.toml may state."""
-    if stated is not None:
-        return stated, math.inf, f"unit.toml, [uncertainty] {key}"
-    return default, ASSUMED_DOF, f"assumed: [uncertainty] {key} says nothing"

@@ -35,7 +35,6 @@ def pair_source(p: Curves) -> list[Source]:
             dof=float(pair.dof),
             origin="scatter of the pair's readings on the dividing head",
             advice="measure the pair in more positions, or leave [quadratic] cross_coupling out",
-            constants=None,
             force=force,
         )
     ]
@@ -58,7 +57,6 @@ def rate_source(p: Curves, recording: RecordingFit) -> list[Source]:
             dof=float(recording.dof),
             origin="scatter of the poses, at the largest dT/dt of the recording",
             advice="record more poses while the temperature changes",
-            constants=None,
             force=direct(p, np.broadcast_to(factor, (len(p.temps_degc), 3, 3))),
         )
     ]

@@ -148,4 +148,6 @@ def _acceptance(
 ) -> Acceptance:
     worst = next(line for line in budget.lines if line.contribution is not None)
     largest = max(abs(r.error_g) for r in residuals)
-    return Acceptance(where, limit_g, largest, budget.expanded, worst.name, worst.advice)
+    return Acceptance(
+        where, limit_g, largest, budget.expanded, worst.source.name, worst.source.advice
+    )

@@ -88,16 +88,16 @@ def _budget(b: Budget) -> dict[str, Any]:
         "verdict": b.verdict,
         "budget": [
             {
-                "key": line.key,
-                "source": line.name,
-                "standard_uncertainty": line.sd,
-                "unit": line.unit,
-                "distribution": line.distribution,
-                "degrees_of_freedom": _finite(line.dof),
+                "key": line.source.key,
+                "source": line.source.name,
+                "standard_uncertainty": line.source.sd,
+                "unit": line.source.unit,
+                "distribution": line.source.distribution,
+                "degrees_of_freedom": _finite(line.source.dof),
                 "sensitivity": line.sensitivity,
                 "contribution": line.contribution,
                 "share_of_variance": line.share,
-                "origin": line.origin,
+                "origin": line.source.origin,
             }
             for line in b.lines
         ],

@@ -137,7 +137,7 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
         value, expanded = with_uncertainty(float(at_t0[c]), budget.expanded, scale)
         if not p.checked:
             expanded = "unknown"
-        worst = next((line for line in budget.lines if line.contribution), None)
+        worst = budget.worst
         rows.append(
             {
                 "symbol": CONSTANT_NAMES[c][0] if c < 9 else "U",
@@ -146,7 +146,7 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
                 "expanded": expanded,
                 "unit": unit,
                 "factor": f"{budget.factor:.2f}",
-                "cause": worst.name.removeprefix("the ") if worst else "",
+                "cause": worst.source.name.removeprefix("the ") if worst else "",
                 "share": percent(worst.share) if worst else "",
                 "group_end": c in (2, 5, 8),
             }
@@ -173,26 +173,26 @@ def _budget(b: Budget, title: str, orientation: str) -> dict[str, Any]:
 
 
 def _line(line: Line, unit: str) -> dict[str, Any]:
-    known = line.contribution is not None
+    source, known = line.source, line.contribution is not None
     sensitivity = "" if line.share < _NEGLIGIBLE else _sensitivity(line, unit)
     return {
-        "name": line.name.removeprefix("the "),
-        "origin": line.origin,
-        "sd": in_unit(line.sd, line.unit) if line.sd is not None else "unknown",
-        "distribution": line.distribution,
-        "dof": _dof(line.dof),
+        "name": source.name.removeprefix("the "),
+        "origin": source.origin,
+        "sd": in_unit(source.sd, source.unit) if source.sd is not None else "unknown",
+        "distribution": source.distribution,
+        "dof": _dof(source.dof),
         "sensitivity": sensitivity,
         "contribution": in_unit(line.contribution or 0.0, unit) if known else "unknown",
         "share": percent(line.share) if known else "?",
         "width": round(100 * line.share, 1),
-        "assumed": line.origin.startswith(("assumed", "unknown", "not known")),
+        "assumed": source.assumed or source.unknown,
     }
 
 
 def _sensitivity(line: Line, unit: str) -> str:
-    above, below = handy(unit), handy(line.unit)
+    above, below = handy(unit), handy(line.source.unit)
     value = significant((line.sensitivity or 0.0) * above[1] / below[1])
-    if unit == line.unit:
+    if unit == line.source.unit:
         return value
     divisor = f"({below[0]})" if "/" in below[0] else below[0]
     return f"{value} {above[0]}/{divisor}"

@@ -115,9 +115,8 @@ def coefficients(thermal: ThermalModel, range_degc: tuple[float, float]) -> Floa
 
 
 def _worst_source(made: Passport) -> str:
-    budget = made.length_budget
-    worst = next((line for line in budget.lines if line.contribution), None)
-    return worst.name if worst else ""
+    worst = made.length_budget.worst
+    return worst.source.name if worst else ""
 
 
 def _shape(delivery: Delivery) -> str:
