@@ -11,7 +11,11 @@ from triaxcal.model.metrological import pack_constants, voltage_from_force
 from triaxcal.model.positions import TEST_POSITIONS, specific_force_g
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
-from triaxcal.unit.description import Adc, Limits, TemperatureSensor, ThermalChoice, UnitDescription
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.limits import Limits
+from triaxcal.unit.thermal import ThermalChoice
+from triaxcal.unit.thermometer import TemperatureSensor
 
 AUTO = ThermalChoice("auto")
 

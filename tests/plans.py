@@ -18,7 +18,11 @@ from triaxcal.fixedpoint.inversion import InverseShifts
 from triaxcal.fixedpoint.plan import Plan, Shape
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.methods.method import DIRECT, INVERSE
-from triaxcal.unit.description import Adc, Limits, TemperatureSensor, ThermalChoice, UnitDescription
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.limits import Limits
+from triaxcal.unit.thermal import ThermalChoice
+from triaxcal.unit.thermometer import TemperatureSensor
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 ROW_LIMIT, ROW_LIMIT_QUADRATIC = 2**32 - 8, 3 * 2**30

@@ -38,7 +38,8 @@ from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.tilts import truth_force_g
 from triaxcal.simulation.truth import Plan, Truth, read_truth
-from triaxcal.unit.description import ThermalChoice, UnitDescription
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.thermal import ThermalChoice
 
 UNITS = Path(__file__).parent.parent / "units"
 TABLES = read_toml(UNITS / "AT-CHERNIAK" / "tables.toml")["constants"]

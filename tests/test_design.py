@@ -33,7 +33,8 @@ from triaxcal.rig.plan import read_plan
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.truth import Imperfections, Plan, read_truth
 from triaxcal.uncertainty.orientation import DIRECTIONS
-from triaxcal.unit.description import ThermalChoice, read_unit
+from triaxcal.unit.description import read_unit
+from triaxcal.unit.thermal import ThermalChoice
 
 ROOT = Path(__file__).resolve().parents[1]
 QUESTION = ROOT / "rig" / "design.toml"

@@ -27,7 +27,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.curves import relative_coefficients
 from triaxcal.readings.measurements import MeasurementSet
-from triaxcal.unit.description import ThermalChoice
+from triaxcal.unit.thermal import ThermalChoice
 
 EPS = np.finfo(float).eps
 CUBIC = ThermalChoice("polynomial", {"order": 3})

@@ -19,7 +19,7 @@ from triaxcal.fitting.tilter.curves import (
 from triaxcal.fitting.tilter.estimators import constants_of, estimator_operators
 from triaxcal.model.thermal.piecewise_linear import PiecewiseLinearShape
 from triaxcal.model.thermal.polynomial import PolynomialShape
-from triaxcal.unit.description import ESTIMATORS
+from triaxcal.unit.choices import ESTIMATORS
 
 EPS = np.finfo(float).eps
 

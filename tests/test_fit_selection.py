@@ -24,7 +24,8 @@ from triaxcal.fitting.tilter.selection import PREFERENCE
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.readings.measurements import MeasurementSet
-from triaxcal.unit.description import ESTIMATORS, ThermalChoice
+from triaxcal.unit.choices import ESTIMATORS
+from triaxcal.unit.thermal import ThermalChoice
 
 BETWEEN = (-30.0, -10.0, 10.0, 30.0, 62.0)
 

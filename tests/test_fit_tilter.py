@@ -19,7 +19,7 @@ from triaxcal.fitting.tilter.estimators import (
 )
 from triaxcal.model.metrological import CONSTANT_NAMES, unpack_constants, voltage_from_force
 from triaxcal.model.positions import TEST_POSITIONS
-from triaxcal.unit.description import ESTIMATORS
+from triaxcal.unit.choices import ESTIMATORS
 
 EPS = np.finfo(float).eps
 FORCES = np.array(list(TEST_POSITIONS.values()), dtype=float)

@@ -27,7 +27,9 @@ from triaxcal.uncertainty.history import (
     read_history,
     repeatability,
 )
-from triaxcal.unit.description import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
+from triaxcal.unit.description import UnitDescription, read_unit
+from triaxcal.unit.thermal import ThermalChoice
+from triaxcal.unit.uncertainty import StatedUncertainty
 
 WARNING = re.compile(
     r"warning: calibration (?P<name>\S+) contradicts (?P<before>\S+): (?P<constant>\w+) at "

@@ -30,7 +30,8 @@ from triaxcal.model.methods.imu import (
     constants_from_errors,
 )
 from triaxcal.model.terms import EXAMPLE_TERMS, NO_TERMS, Terms
-from triaxcal.unit.description import Adc, TemperatureSensor
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.thermometer import TemperatureSensor
 
 RANGE = (-40.0, 85.0)
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)

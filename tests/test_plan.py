@@ -28,7 +28,8 @@ from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.methods.method import DIRECT, INVERSE
 from triaxcal.model.methods.registry import METHODS
-from triaxcal.unit.description import TemperatureSensor, UnitDescription
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.thermometer import TemperatureSensor
 
 SQUARES = [1e-2 * slope for slope in TABLE_SLOPES]
 EPS = np.finfo(np.float64).eps

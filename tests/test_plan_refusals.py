@@ -23,7 +23,8 @@ from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.methods.method import DIRECT
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import TemperatureSensor, UnitDescription
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.thermometer import TemperatureSensor
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 """45 codes from -40 to 70 degC: few enough for fractions."""

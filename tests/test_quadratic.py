@@ -33,7 +33,8 @@ from triaxcal.fixedpoint.plan import make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.terms import EXAMPLE_TERMS, Terms
-from triaxcal.unit.description import TemperatureSensor, UnitDescription
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.thermometer import TemperatureSensor
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 """45 codes from -40 to 70 degC: few enough for fractions."""

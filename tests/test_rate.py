@@ -24,7 +24,8 @@ from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, RateTerm, Terms
-from triaxcal.unit.description import TemperatureSensor, UnitDescription
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.thermometer import TemperatureSensor
 
 COARSE = TemperatureSensor(degc_per_code=2.5, degc_at_zero=0.0)
 TERM = EXAMPLE_RATE

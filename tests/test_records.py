@@ -11,14 +11,11 @@ from hypothesis import strategies as st
 from triaxcal.base.errors import RefusedError
 from triaxcal.readings.measurements import Dwell, read_measurements, volts, write_measurements
 from triaxcal.readings.measurements_csv import DEVIATIONS, READINGS
-from triaxcal.unit.description import (
-    Adc,
-    Limits,
-    TemperatureSensor,
-    ThermalChoice,
-    UnitDescription,
-    read_unit,
-)
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.description import UnitDescription, read_unit
+from triaxcal.unit.limits import Limits
+from triaxcal.unit.thermal import ThermalChoice
+from triaxcal.unit.thermometer import TemperatureSensor
 
 REPO = Path(__file__).parent.parent
 UNIT = UnitDescription(

@@ -42,7 +42,8 @@ from triaxcal.report.series.unit import unit_record
 from triaxcal.report.summary import summary
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.uncertainty.evaluate import uncertainty
-from triaxcal.unit.description import ThermalChoice, read_unit, tilter_file
+from triaxcal.unit.description import read_unit, tilter_file
+from triaxcal.unit.thermal import ThermalChoice
 
 UNITS = Path(__file__).parent.parent / "units"
 

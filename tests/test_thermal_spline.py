@@ -24,7 +24,7 @@ from triaxcal.model.metrological import force_from_voltage, voltage_from_force
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.model.thermal.cubic_spline import CubicSplineShape
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import ThermalChoice
+from triaxcal.unit.thermal import ThermalChoice
 
 UNITS = Path(__file__).parent.parent / "units"
 EPS = np.finfo(float).eps

@@ -28,7 +28,9 @@ from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance, weights
 from triaxcal.uncertainty.propagation import ROWS, propagation, rows_of
 from triaxcal.uncertainty.scatter import scatter
 from triaxcal.uncertainty.source import NORMAL, Source
-from triaxcal.unit.description import StatedUncertainty, ThermalChoice, UnitDescription, read_unit
+from triaxcal.unit.description import UnitDescription, read_unit
+from triaxcal.unit.thermal import ThermalChoice
+from triaxcal.unit.uncertainty import StatedUncertainty
 
 UNITS = Path(__file__).parent.parent / "units"
 DEVICE = Device(24, (0.75, 0.75, 0.75), 5e-7)

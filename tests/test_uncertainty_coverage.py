@@ -16,7 +16,9 @@ from triaxcal.simulation.rig import Rig
 from triaxcal.simulation.truth import Imperfections, read_truth
 from triaxcal.uncertainty.evaluate import uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS
-from triaxcal.unit.description import StatedUncertainty, ThermalChoice, read_unit
+from triaxcal.unit.description import read_unit
+from triaxcal.unit.thermal import ThermalChoice
+from triaxcal.unit.uncertainty import StatedUncertainty
 
 AT_SIM = Path(__file__).parent.parent / "units" / "AT-SIM"
 TEMPS = np.array([-35.0, -5.0, 20.0, 48.0, 66.0])

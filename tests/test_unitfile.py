@@ -11,17 +11,12 @@ from hypothesis import strategies as st
 
 from strategies import unit_names
 from triaxcal.base.errors import RefusedError
-from triaxcal.unit.description import (
-    Adc,
-    Limits,
-    TemperatureSensor,
-    ThermalChoice,
-    UnitDescription,
-    check_unit_name,
-    find_unit,
-    list_units,
-    read_unit,
-)
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.description import UnitDescription, read_unit
+from triaxcal.unit.folder import check_unit_name, find_unit, list_units
+from triaxcal.unit.limits import Limits
+from triaxcal.unit.thermal import ThermalChoice
+from triaxcal.unit.thermometer import TemperatureSensor
 
 REPO = Path(__file__).parent.parent
 MINIMAL = """\

@@ -63,7 +63,7 @@ def deliver(
     unit = Path(folder)
     with reference_under_way() as reference:  # gcc works while numpy is imported
         from triaxcal.base.tomltable import has_table  # noqa: PLC0415
-        from triaxcal.unit.description import find_unit  # noqa: PLC0415
+        from triaxcal.unit.folder import find_unit  # noqa: PLC0415
 
         if not has_table(find_unit(unit), "dynamic"):
             return _deliver_unit(unit, Path(build), reference)

@@ -25,7 +25,7 @@ from triaxcal.dynamic.layout import Layout
 from triaxcal.model.methods.imu import ImuModel
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 Progress = Callable[[str, float], None]
 

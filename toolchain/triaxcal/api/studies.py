@@ -27,8 +27,8 @@ from triaxcal.report.history import history_text
 from triaxcal.simulation.series import write_series
 from triaxcal.simulation.unit import write_simulated_unit
 from triaxcal.uncertainty.history import Change, changes, read_history, repeatability
-from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
 from triaxcal.unit.recording import RecordingLayout
+from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 T = TypeVar("T")
 

@@ -9,8 +9,9 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import renew
 from triaxcal.base.tomltable import has_table
 from triaxcal.base.tomltext import toml_text
-from triaxcal.unit.description import FORMAT, UNIT_FILE, UnitDescription, find_unit, unit_of_text
+from triaxcal.unit.description import UnitDescription, unit_of_text
 from triaxcal.unit.description import read_unit as read_description
+from triaxcal.unit.folder import UNIT_FILE, UNIT_FORMAT, find_unit
 
 
 class Unit:
@@ -48,7 +49,7 @@ class Unit:
     folder: Path | None
 
     def __init__(self, name: str, *, serial: str, **tables: Any) -> None:
-        text = toml_text({"format": FORMAT, "serial": serial, **tables})
+        text = toml_text({"format": UNIT_FORMAT, "serial": serial, **tables})
         self._set(unit_of_text(name, text, f"Unit({name!r})"), text, None)
 
     @classmethod

@@ -17,7 +17,7 @@ from triaxcal.report.dynamicpage import dynamic_page
 from triaxcal.report.files import SOMETIMES, all_files, passport_files
 from triaxcal.report.imuc import C_FILES, refuse_no_device
 from triaxcal.report.passport.content import passport
-from triaxcal.unit.description import find_unit
+from triaxcal.unit.folder import find_unit
 from triaxcal.verify.campaign import delivery_outcomes, exit_code, verify_files
 from triaxcal.verify.imu import imu_delivery_outcomes, verify_imu
 from triaxcal.verify.outcome import Outcome

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.kinds import Kind, WrongItemError, whole
+from triaxcal.base.kinds import TEXT, Kind, WrongItemError, whole
 from triaxcal.base.tomltable import did_you_mean, key_name, read_toml, shown
 
 T = TypeVar("T")
@@ -66,6 +66,7 @@ class Key(Generic[T_co]):
 
 FORMAT = Key("format", whole(1, 1), "Version of this format.", example="1")
 """Every file has it."""
+DESCRIPTION = Key("description", TEXT, "For people; nothing is made of it.", "")
 
 
 def setting(
@@ -163,12 +164,6 @@ class Values:
             remedy=declared.kind.remedy,
         )
 
-    def optional(self, key: Key[T]) -> T | None:
-        """Value of a key, None where it is absent."""
-        if key not in self:
-            return None
-        return self[key]
-
     def record(self, cls: type[T], **others: object) -> T:
         """Dataclass of keys with these values; `others` are its fields that are no keys."""
         return cls(**{k.name: self[k] for k in keys_of(cls)}, **others)
@@ -199,10 +194,10 @@ class TableKeys:
     optional: bool = False
 
     @classmethod
-    def of(cls, name: str, record: type[Any], optional: bool = False) -> TableKeys:
+    def of(cls, record: type[Any], optional: bool = False) -> TableKeys:
         """Table of a dataclass of keys, whose docstring begins with "[name]: what it is."."""
-        doc = (record.__doc__ or "").partition("\n")[0].partition("]: ")[2]
-        return cls(name, doc[:1].upper() + doc[1:], keys_of(record), optional)
+        name, _, doc = (record.__doc__ or "").partition("\n")[0].partition("]: ")
+        return cls(name[1:], doc[:1].upper() + doc[1:], keys_of(record), optional)
 
     def but(self, *others: Key[Any], **changes: Mapping[str, Any]) -> TableKeys:
         """Same table with more keys, or with attributes of its keys changed, by name of the key."""

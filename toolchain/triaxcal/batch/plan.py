@@ -14,7 +14,7 @@ from triaxcal.batch import journal
 from triaxcal.batch.order import Order, Outcome, planned, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.readings.measurements import MEASUREMENTS_FILE
-from triaxcal.unit.description import UNIT_FILE, find_unit, list_units
+from triaxcal.unit.folder import UNIT_FILE, find_unit, list_units
 from triaxcal.unit.recordingfile import is_in_folder
 
 

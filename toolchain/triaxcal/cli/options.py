@@ -46,7 +46,7 @@ class UnitFolder(click.ParamType[Path]):
         self, _ctx: click.Context, _param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Names in units/; the shell adds the folders there are."""
-        from triaxcal.unit.description import list_units  # noqa: PLC0415
+        from triaxcal.unit.folder import list_units  # noqa: PLC0415
 
         names = [CompletionItem(n) for n in list_units(UNITS) if n.startswith(incomplete)]
         return names or [CompletionItem(incomplete, type="dir")]

@@ -14,7 +14,7 @@ from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
 from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.unit.description import TemperatureSensor
+from triaxcal.unit.thermometer import TemperatureSensor
 
 CONSTANTS_FILE = "triax_calib.h"
 

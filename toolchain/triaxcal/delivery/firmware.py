@@ -61,13 +61,11 @@ def make_firmware(fitted: Fitted) -> Firmware:
 
 def compensation_of(unit: UnitDescription, calibration: Calibration, method: str) -> Compensation:
     """The functions that the device evaluates for one method."""
-    adc = unit.adc
-    voltage_max_v = max(abs(adc.code_min), abs(adc.code_max)) * adc.volts_per_code
     return compensate(
         calibration.thermal,
         method,
         calibration.range_degc,
-        voltage_max_v,
+        unit.adc.largest_v,
         unit.model_error_max_micro_g * 1e-6,
         terms=calibration.terms,
     )

@@ -22,7 +22,8 @@ from triaxcal.readings.measurements import (
     measurements_of,
     read_measurements,
 )
-from triaxcal.unit.description import UNIT_FILE, UnitDescription
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.folder import UNIT_FILE
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from triaxcal.model.methods.compensation import Compensation
 from triaxcal.model.methods.imu import ImuCompensation, ImuModel, compensate_imu
 from triaxcal.model.metrological import exact_gain_and_offset, worst_force_error_g
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import Adc
+from triaxcal.unit.adc import Adc
 
 METHOD = "matrix"
 ACCEL_MODEL_ERROR_MAX_G = 1e-6
@@ -97,7 +97,7 @@ def _imu_c(done: DynamicUnit, device: Device, inputs: str) -> ImuC:
     adcs = device.accel_adc, device.gyro_adc
     limits = ACCEL_MODEL_ERROR_MAX_G, math.radians(GYRO_MODEL_ERROR_MAX_DEG_PER_H / 3600)
     functions = compensate_imu(
-        model, METHOD, device.range_degc, (_largest(adcs[0]), _largest(adcs[1])), limits
+        model, METHOD, device.range_degc, (adcs[0].largest_v, adcs[1].largest_v), limits
     )
     name, sensor = done.unit.name, device.temperature_sensor
     triads = (
@@ -109,10 +109,6 @@ def _imu_c(done: DynamicUnit, device: Device, inputs: str) -> ImuC:
     errors = _model_errors(model, functions, device, build.accel)
     _refuse_model_errors(done.unit, errors)
     return ImuC(device, model, build, *errors, omitted)
-
-
-def _largest(adc: Adc) -> float:
-    return max(abs(adc.code_min), abs(adc.code_max)) * adc.volts_per_code
 
 
 def _provenance(
@@ -150,7 +146,7 @@ def _triad_error(
     thermal: ThermalModel, functions: Compensation, temps: FloatArray, adc: Adc
 ) -> FloatArray:
     exact = exact_gain_and_offset(thermal.constants_at(temps))
-    return worst_force_error_g(functions.gain_and_offset(temps), exact, _largest(adc))
+    return worst_force_error_g(functions.gain_and_offset(temps), exact, adc.largest_v)
 
 
 def _refuse_model_errors(unit: DynamicDescription, errors: tuple[float, float]) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.readings.measurements import MEASUREMENTS_FILE
-from triaxcal.unit.description import UNIT_FILE, UnitDescription
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.folder import UNIT_FILE
 
 
 def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:
@@ -16,7 +17,7 @@ def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:
     recorded = MEASUREMENTS_FILE
     if unit is not None and unit.recording is not None:
         recorded = unit.recording.file
-    pair = () if unit is None or unit.pair is None else (folder / unit.pair.file,)
+    pair = () if unit is None or unit.pair is None else (folder / unit.pair.cross_coupling,)
     return files_sha256(
         (folder / UNIT_FILE, folder / recorded, *pair),
         "put it there, or correct its name in unit.toml",

@@ -10,7 +10,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import Fitted, refuse_beyond_limits
 from triaxcal.fitting.tilter.acceptance import dwells_in_range
 from triaxcal.model.metrological import force_from_voltage
-from triaxcal.unit.description import near_t0
+from triaxcal.unit.thermal import near_t0
 
 
 @dataclass(frozen=True)

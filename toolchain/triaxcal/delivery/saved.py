@@ -26,7 +26,8 @@ from triaxcal.model.terms import NO_TERMS, PRODUCT_NAMES, RateTerm, Terms
 from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.readings.measurements import MeasurementSet
-from triaxcal.unit.description import Adc, unit_of_text
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.description import unit_of_text
 
 FORMAT = 1
 _ELSEWHERE = ("points", "parameter_covariance", "candidates")

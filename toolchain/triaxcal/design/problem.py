@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import FORMAT, FileKeys, TableKeys, Values, setting
+from triaxcal.base.keys import DESCRIPTION, FORMAT, FileKeys, TableKeys, Values, setting
 from triaxcal.base.kinds import listed, number, rising, three, whole, word
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
-from triaxcal.unit.description import DESCRIPTION, T0_TOLERANCE_DEGC
+from triaxcal.unit.thermal import T0_TOLERANCE_DEGC
 
 CANDIDATES_MAX = 16
 """Every subset of the candidates is tried: 2^13 of them at most, the ends and T0 being fixed."""
@@ -132,12 +132,12 @@ PROBLEM = FileKeys(
     "The question to `triaxcal design`",
     (
         TableKeys("", "", (FORMAT, DESCRIPTION)),
-        TableKeys.of("noise", _Noise),
-        TableKeys.of("rig", _Rig),
-        TableKeys.of("chamber", _Chamber),
-        TableKeys.of("candidates", _Candidates),
-        TableKeys.of("curves", _Curves),
-        TableKeys.of("target", _Target),
+        TableKeys.of(_Noise),
+        TableKeys.of(_Rig),
+        TableKeys.of(_Chamber),
+        TableKeys.of(_Candidates),
+        TableKeys.of(_Curves),
+        TableKeys.of(_Target),
     ),
 )
 

@@ -23,7 +23,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.design.problem import Problem
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import T0_TOLERANCE_DEGC
+from triaxcal.unit.thermal import T0_TOLERANCE_DEGC
 
 COVERAGE = 1.96
 """k of 95 %: a dwell has thousands of readings."""

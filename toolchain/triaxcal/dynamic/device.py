@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from triaxcal.base.keys import TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import interval, number, whole
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
-from triaxcal.unit.description import OUTPUT_Q_RANGE, Adc, TemperatureSensor
+from triaxcal.unit.adc import Adc, whole_adc
+from triaxcal.unit.choices import OUTPUT_Q_RANGE
+from triaxcal.unit.thermometer import TemperatureSensor
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,12 @@ class Device:
     @property
     def accel_adc(self) -> Adc:
         """Codes of the accelerometers; "V" is g of 9.80665 m/s^2."""
-        return _adc(self.accel_bits, self.accel_full_scale_g)
+        return whole_adc(self.accel_bits, self.accel_full_scale_g)
 
     @property
     def gyro_adc(self) -> Adc:
         """Codes of the gyros; "V" is rad/s."""
-        return _adc(self.gyro_bits, math.radians(self.gyro_full_scale_deg_per_s))
+        return whole_adc(self.gyro_bits, math.radians(self.gyro_full_scale_deg_per_s))
 
 
 DEVICE = TableKeys(
@@ -70,8 +72,3 @@ def device_of(values: Values) -> Device | None:
     if not values:
         return None
     return values.record(Device, temperature_sensor=values.record(TemperatureSensor))
-
-
-def _adc(bits: int, full_scale: float) -> Adc:
-    half = 2 ** (bits - 1)
-    return Adc(bits, full_scale, -half, half - 1)

@@ -15,7 +15,7 @@ from triaxcal.dynamic.window import gamma_matrix
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.methods.imu import ImuModel, constants_from_errors
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 IN_MODEL = (
     "accelerometer-bias",

@@ -17,10 +17,11 @@ MICRO_G = 9.80665e-6
 
 @dataclass(frozen=True)
 class DataSheet:
-    """[noise]: white noise of both triads; a mean over t seconds scatters by N / sqrt(t).
+    """[noise]: white noise, as data sheets state it.
 
-    Data sheets write the velocity random walk N, micro-g sqrt(s), in micro-g/sqrt(Hz). (A
-    one-sided spectral density is sqrt(2) times N.)
+    Of both triads; a mean over t seconds scatters by N / sqrt(t). Data sheets write the velocity
+    random walk N, micro-g sqrt(s), in micro-g/sqrt(Hz). (A one-sided spectral density is sqrt(2)
+    times N.)
 
     Attributes
     ----------

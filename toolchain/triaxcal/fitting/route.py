@@ -17,7 +17,8 @@ from triaxcal.fitting.table.calibrate import calibrate_table
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.readings.samples import READING, TEMP, Samples, read_samples
-from triaxcal.unit.description import Adc, UnitDescription
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import RecordingLayout
 
 _WIDTHS = (16, 17, 20, 24, 25, 32)

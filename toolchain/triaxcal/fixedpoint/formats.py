@@ -17,7 +17,7 @@ from triaxcal.fixedpoint.inversion import (
 )
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.unit.description import OUTPUT_Q_RANGE
+from triaxcal.unit.choices import OUTPUT_Q_RANGE
 
 MAX_SPARE_BITS = 16
 MIN_SPARE_BITS = -4

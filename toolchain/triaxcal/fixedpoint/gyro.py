@@ -16,7 +16,8 @@ from triaxcal.model.curves import PiecewisePolynomial
 from triaxcal.model.methods.imu import ImuCompensation
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import Adc, TemperatureSensor
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.thermometer import TemperatureSensor
 
 SENSITIVITY_LIMIT = 2**29
 """A row's words sum to this at most: the largest int32 of specific force then comes to 1/8 of the

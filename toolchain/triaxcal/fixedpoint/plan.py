@@ -27,7 +27,8 @@ from triaxcal.fixedpoint.shape import Shape
 from triaxcal.model.methods.compensation import Compensation
 from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.unit.description import Adc, TemperatureSensor
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.thermometer import TemperatureSensor
 
 MAX_TEMPERATURE_CODES = 2**17
 """Proof and cross-check visit every temperature code: this many take some seconds."""

@@ -14,7 +14,7 @@ from triaxcal.base.tomltext import toml_value
 from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.reference import default_words
 from triaxcal.keytable.schema import json_schema
-from triaxcal.unit.description import UNIT_FILE, check_unit_name
+from triaxcal.unit.folder import UNIT_FILE, check_unit_name
 
 _WIDTH = 96
 

@@ -24,7 +24,8 @@ from triaxcal.readings.measurements_csv import (
     rows_of,
     write_measurements,
 )
-from triaxcal.unit.description import Adc, UnitDescription
+from triaxcal.unit.adc import Adc
+from triaxcal.unit.description import UnitDescription
 
 __all__ = ["Dwell", "MeasurementSet", "read_measurements", "volts", "write_measurements"]
 

@@ -14,9 +14,9 @@ from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.table import LABEL, ROW, TIME, Quantity, ReadTable, read_table, signed
 from triaxcal.readings.units import to_degc, to_radians
-from triaxcal.unit.description import TemperatureSensor
 from triaxcal.unit.recording import SAMPLES, RecordingLayout
 from triaxcal.unit.recordingfile import ISO
+from triaxcal.unit.thermometer import TemperatureSensor
 
 READING, GYRO, TEMP, ANGLES = "reading", "gyro", "temp_degc", "angles_rad"
 _WIDE = frozenset({READING, GYRO, ANGLES})

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import TemperatureSensor
+from triaxcal.unit.thermometer import TemperatureSensor
 
 Conversion = Callable[[FloatArray], FloatArray]
 

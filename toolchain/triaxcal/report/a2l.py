@@ -21,7 +21,7 @@ from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
 from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.positions import AXES
-from triaxcal.unit.description import TemperatureSensor
+from triaxcal.unit.thermometer import TemperatureSensor
 
 SYMBOL = "TRIAX_CALIB"
 _WORD = 4

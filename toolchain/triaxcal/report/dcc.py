@@ -19,7 +19,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.report.passport.content import Passport
 from triaxcal.uncertainty.coverage import LEVEL
 from triaxcal.unit.certificate import CertificateDetails
-from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"

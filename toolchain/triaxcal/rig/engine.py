@@ -15,7 +15,8 @@ from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.samples import SampleDecoder
 from triaxcal.rig.session import Session
 from triaxcal.rig.simulator import serial_crc
-from triaxcal.unit.description import UnitDescription, list_units, read_unit
+from triaxcal.unit.description import UnitDescription, read_unit
+from triaxcal.unit.folder import list_units
 
 
 @dataclass(frozen=True)

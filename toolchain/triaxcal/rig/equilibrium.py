@@ -11,7 +11,7 @@ import numpy as np
 
 from triaxcal.rig.blocks import Block
 from triaxcal.rig.plan import Thermal
-from triaxcal.unit.description import TemperatureSensor
+from triaxcal.unit.thermometer import TemperatureSensor
 
 _COVERED = 0.9
 """Share of the window's seconds that must have a temperature."""

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import FORMAT, FileKeys, TableKeys, Values, setting
+from triaxcal.base.keys import DESCRIPTION, FORMAT, FileKeys, TableKeys, Values, setting
 from triaxcal.base.kinds import FLAG, number, rising, three, whole, word
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
-from triaxcal.unit.description import DESCRIPTION, UnitDescription
+from triaxcal.unit.description import UnitDescription
 
 
 @dataclass(frozen=True)
@@ -198,10 +198,10 @@ SESSION_PLAN = FileKeys(
     "The plan of a session at the rig",
     (
         TableKeys("", "", (FORMAT, DESCRIPTION)),
-        TableKeys.of("rig", _Rig),
-        TableKeys.of("steps", _Steps),
-        TableKeys.of("stillness", Stillness),
-        TableKeys.of("thermal", Thermal),
+        TableKeys.of(_Rig),
+        TableKeys.of(_Steps),
+        TableKeys.of(Stillness),
+        TableKeys.of(Thermal),
     ),
 )
 

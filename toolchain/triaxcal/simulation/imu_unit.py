@@ -26,7 +26,8 @@ from triaxcal.simulation.imu_motion import (
 )
 from triaxcal.simulation.imu_truth import ARCSEC
 from triaxcal.simulation.truth import SEED, check_seed
-from triaxcal.unit.description import GRAVITY, LATITUDE, find_unit
+from triaxcal.unit.folder import find_unit
+from triaxcal.unit.site import TurningSite
 
 IMU_TRUTH_FILE = "imu_truth.toml"
 RECORDING_FILE = "recording.csv"
@@ -113,8 +114,8 @@ IMU_TRUTH = FileKeys(
     "What a simulated IMU is, and how it is moved",
     (
         TableKeys("", "", (FORMAT,)),
-        TableKeys.of("unit", _Unit),
-        TableKeys.of("motion", _Motion),
+        TableKeys.of(_Unit),
+        TableKeys.of(_Motion),
     ),
     ("minutes_per_axis",),
 )
@@ -171,10 +172,12 @@ def _plan(folder: Path, values: Values) -> ImuMotion:
         temperature=motion.temperature,
         moves=motion.moves,
     )
-    return replace(plan, latitude_deg=site[LATITUDE], gravity_m_per_s2=site[GRAVITY])
+    return replace(
+        plan, latitude_deg=site.latitude_deg, gravity_m_per_s2=site.local_gravity_m_per_s2
+    )
 
 
-def _site(path: Path) -> Values:
+def _site(path: Path) -> TurningSite:
     """[site] of a unit.toml."""
     site = read_toml(path).get("site")
     values = site if isinstance(site, dict) else {}
@@ -185,7 +188,7 @@ def _site(path: Path) -> Values:
             "missing " + " and ".join(missing),
             expected="the place where the unit is simulated",
         )
-    return Values(str(path), "site", values)
+    return Values(str(path), "site", values).record(TurningSite)
 
 
 def _columns(recording: ImuRecording) -> tuple[str, ...]:

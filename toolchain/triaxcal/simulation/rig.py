@@ -12,7 +12,7 @@ from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.tilts import truth_force_g
 from triaxcal.simulation.truth import Imperfections
-from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 _RADIANS = np.pi / 180.0 / 3600.0
 _STREAM = 1

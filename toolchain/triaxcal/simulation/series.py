@@ -28,7 +28,8 @@ from triaxcal.simulation.truth import (
     read_truth,
 )
 from triaxcal.simulation.unit import write_simulated_unit
-from triaxcal.unit.description import UNIT_FILE, read_unit
+from triaxcal.unit.description import read_unit
+from triaxcal.unit.folder import UNIT_FILE
 
 COUNT_MAX = 9999
 FIRST_DAY = datetime.date(2026, 1, 5)

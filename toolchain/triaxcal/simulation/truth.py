@@ -15,7 +15,7 @@ from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.metrological import CONSTANT_NAMES, voltage_from_force
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.unit.description import Adc
+from triaxcal.unit.adc import Adc
 
 TRUTH_FILE = "truth.toml"
 SEED_MAX = 2**63 - 1
@@ -164,9 +164,9 @@ TRUTH = FileKeys(
         TableKeys("", "", (FORMAT,)),
         TableKeys("curves", "The constants over temperature.", (T0, *CURVES)),
         TableKeys("noise", "Noise of the readings.", keys_of(Truth)),
-        TableKeys.of("plan", Plan),
-        TableKeys.of("imperfections", Imperfections),
-        TableKeys.of("series", Spread, optional=True),
+        TableKeys.of(Plan),
+        TableKeys.of(Imperfections),
+        TableKeys.of(Spread, optional=True),
     ),
 )
 

@@ -12,7 +12,8 @@ from triaxcal.simulation.dwells import simulate_codes
 from triaxcal.simulation.imu_unit import IMU_TRUTH_FILE, write_simulated_recording
 from triaxcal.simulation.published import TABLES_FILE, write_published_measurements
 from triaxcal.simulation.truth import TRUTH_FILE, check_seed, read_truth
-from triaxcal.unit.description import find_unit, read_unit
+from triaxcal.unit.description import read_unit
+from triaxcal.unit.folder import find_unit
 
 
 def write_simulated_unit(folder: Path, seed: int | None = None) -> Path:

@@ -12,7 +12,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.propagation import RADIANS_PER_ARCSEC, Curves, Propagation, mapped
 from triaxcal.uncertainty.scatter import Scatter
 from triaxcal.uncertainty.source import ASSUMED_DOF, NORMAL, STUDENT, Source, from_factor
-from triaxcal.unit.description import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 LEVEL_ARCSEC = 20.0
 GRAVITY_M_PER_S2 = 5e-5

@@ -5,13 +5,13 @@ from __future__ import annotations
 import datetime
 from dataclasses import dataclass
 
-from triaxcal.base.keys import TableKeys, Values, keys_of, setting
+from triaxcal.base.keys import TableKeys, Values, setting
 from triaxcal.base.kinds import DATE, line, pattern
 
 
 @dataclass(frozen=True)
 class CertificateDetails:
-    """Administrative data of a certificate.
+    """[certificate]: what only people know, for the Digital Calibration Certificate.
 
     Attributes
     ----------
@@ -46,12 +46,7 @@ class CertificateDetails:
     end: datetime.date = setting(DATE, example="2026-03-31")
 
 
-CERTIFICATE = TableKeys(
-    "certificate",
-    "What only people know, for the Digital Calibration Certificate.",
-    keys_of(CertificateDetails),
-    optional=True,
-)
+CERTIFICATE = TableKeys.of(CertificateDetails, optional=True)
 
 
 def certificate_details(values: Values) -> CertificateDetails | None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import datetime
 from dataclasses import dataclass
 
-from triaxcal.base.keys import TableKeys, keys_of, setting
+from triaxcal.base.keys import TableKeys, setting
 from triaxcal.base.kinds import DATE, line
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Rig and day of the measurements; None where the file does not say.
+    """[measured]: when and on which rig the unit was measured.
+
+    None where the file does not say.
 
     Attributes
     ----------
@@ -30,4 +32,4 @@ class Measured:
         return " ".join(str(part) for part in (self.rig, self.date) if part) or None
 
 
-MEASURED = TableKeys("measured", "When and on which rig the unit was measured.", keys_of(Measured))
+MEASURED = TableKeys.of(Measured)

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from decimal import Decimal
 from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import TableKeys, Values, keys_of, setting
+from triaxcal.base.keys import TableKeys, Values, setting
 from triaxcal.base.kinds import Kind, number, word
+from triaxcal.unit.presets import PRESETS
 from triaxcal.unit.recordingfile import (
     COLUMN,
     COLUMNS,
@@ -36,10 +36,6 @@ ACCELERATION_UNITS: Mapping[str, float | None] = MappingProxyType(
     {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3, "count": None, "V": None, "mV": None}
 )
 """Readings of 1 g, where the unit says it."""
-DEFAULT_LSB: Mapping[str, float] = MappingProxyType(
-    {"m/s^2": 2.0**-16, "g": 2.0**-20, "mg": 2.0**-10, "count": 1.0, "V": 2.0**-22, "mV": 2.0**-12}
-)
-"""Reading of one raw code where [adc] says nothing: at 24 bits +-128 m/s^2, +-8 g, +-2 V."""
 AIRCRAFT, INCLINOMETER = "aircraft", "inclinometer"
 ANGLE_NAMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {AIRCRAFT: ("pitch", "roll", "yaw"), INCLINOMETER: ("zenith", "tool_face", "azimuth")}
@@ -48,43 +44,6 @@ ANGLE_NAMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 STILL_S = 2.0
 """Shortest pose by itself: 200 samples at 100 Hz, 0.07 of their noise."""
-
-PRESETS: Mapping[str, Mapping[str, object]] = MappingProxyType(
-    {
-        "mikoff-mpu9150": {
-            "acceleration": [1, 2, 3],
-            "acceleration_unit": "m/s^2",
-            "gyro": [4, 5, 6],
-            "sample_rate_hz": 100,
-        },
-        "imucal-annotated": {
-            "acceleration": ["acc_x", "acc_y", "acc_z"],
-            "acceleration_unit": "count",
-            "sample_rate_hz": 100,
-            "section": "part",
-            "faces": {"x_p": "+x", "x_a": "-x", "y_p": "+y", "y_a": "-y", "z_p": "+z", "z_a": "-z"},
-        },
-        "imucal-session": {
-            "acceleration": ["acc_x", "acc_y", "acc_z"],
-            "acceleration_unit": "m/s^2",
-            "gyro": ["gyr_x", "gyr_y", "gyr_z"],
-            "sample_rate_hz": Decimal("102.4"),
-        },
-        "tofupilot-thermal": {
-            "acceleration": ["imu.acc.x", "imu.acc.y", "imu.acc.z"],
-            "acceleration_unit": "m/s^2",
-            "time": "timestamp",
-            "time_unit": "us",
-            "temperature": "imu.temperature",
-        },
-        "imu-tk": {
-            "time": 1,
-            "time_unit": "s",
-            "acceleration": [2, 3, 4],
-            "acceleration_unit": "count",
-        },
-    }
-)
 
 
 @dataclass(frozen=True)
@@ -141,7 +100,9 @@ class _RecordedFile:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingLayout(WrittenFile, _RecordedFile):
-    """[recording]: what a recording's file is; absent optional columns are None.
+    """[recording]: a recording of samples or poses. A unit with it has no measurements.csv.
+
+    Absent optional columns are None.
 
     Attributes
     ----------
@@ -249,11 +210,7 @@ class RecordingLayout(WrittenFile, _RecordedFile):
         return None
 
 
-RECORDING = TableKeys(
-    "recording",
-    "A recording of samples or poses. A unit with it has no measurements.csv.",
-    keys_of(RecordingLayout),
-)
+RECORDING = TableKeys.of(RecordingLayout)
 
 
 def recording_layout(values: Values) -> RecordingLayout | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from triaxcal.codegen.constants import Provenance
 from triaxcal.fixedpoint.plan import Plan
-from triaxcal.unit.description import TemperatureSensor
+from triaxcal.unit.thermometer import TemperatureSensor
 
 
 @dataclass(frozen=True)

@@ -190,9 +190,9 @@ def stated_pair(unit: UnitDescription, folder: Path) -> PairTerms | None:
     """
     if unit.pair is None:
         return None
-    path = folder / unit.pair.file
+    path = folder / unit.pair.cross_coupling
     fit = fit_pair(str(path), *read_pair(path), unit.gravity_g)
-    return pair_terms(unit.pair.file, fit, unit.pair.axes)
+    return pair_terms(unit.pair.cross_coupling, fit, unit.pair.axes)
 
 
 def pair_terms(file: str, fit: PairFit, axes: tuple[int, int]) -> PairTerms:

@@ -15,7 +15,7 @@ from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
-from triaxcal.unit.description import near_t0
+from triaxcal.unit.thermal import near_t0
 
 LENGTH = 3
 

@@ -9,7 +9,7 @@ from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import MethodResult
 from triaxcal.delivery.unit import Delivery
 from triaxcal.report.words.temperatures import by_temperature, degrees, position_order, with_room
-from triaxcal.unit.description import Limits
+from triaxcal.unit.limits import Limits
 
 WIDTH = 960.0
 LEFT, RIGHT, TOP, GAP = 64.0, 16.0, 84.0, 8.0

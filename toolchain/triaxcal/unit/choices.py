@@ -1,0 +1,82 @@
+"""[fit], [sensor] and [compensation] of unit.toml: how constants are fitted and evaluated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from triaxcal.base.keys import TableKeys, setting
+from triaxcal.base.kinds import TEXT, checked, number, three, whole, word
+from triaxcal.model.methods.registry import METHODS
+
+ESTIMATORS = ("equation-10", "least-squares", "half-sum")
+TERMS = ("auto", "linear", "quadratic")
+LOSSES = ("linear", "huber", "cauchy")
+OUTPUT_Q_RANGE = (8, 30)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """[fit]: how the constants are fitted.
+
+    Attributes
+    ----------
+    estimator
+        How K and U0 come from six positions: P1 (10); least squares; (10) with the bias from an
+        axis' own two positions.
+    terms
+        Of a recording: which candidates are tried.
+    loss
+        Of a recording: how far a pose that stands out may pull.
+    """
+
+    estimator: str = setting(word(("auto", *ESTIMATORS)), "auto")
+    terms: str = setting(word(TERMS), "auto")
+    loss: str = setting(word(LOSSES), "linear")
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """[sensor]: the sensor itself.
+
+    Attributes
+    ----------
+    polarity
+        Signs of Kxx, Kyy, Kzz, where they differ.
+    """
+
+    polarity: tuple[int, int, int] | None = setting(
+        three(
+            checked(lambda v: type(v) is int and abs(v) == 1, "a sign", {"enum": [1, -1]}, "1"),
+            "a list of three signs, each 1 or -1",
+        ),
+        None,
+        words="all alike",
+    )
+
+
+@dataclass(frozen=True)
+class Compensation:
+    """[compensation]: what the firmware computes.
+
+    Attributes
+    ----------
+    method
+        What the firmware evaluates.
+    output_q
+        The LSB of the result is 2^-output_q g.
+    model_error_max_micro_g
+        How far the firmware's functions may be from the fitted model.
+    """
+
+    method: str = setting(TEXT, METHODS.names[0])
+    output_q: int = setting(whole(*OUTPUT_Q_RANGE), 24)
+    model_error_max_micro_g: float = setting(number(1e-3, 1e6), 1.0, "micro-g")
+
+
+FIT, SENSOR = TableKeys.of(Fit), TableKeys.of(Sensor)
+
+
+def compensation_table() -> TableKeys:
+    """Keys of [compensation], with the methods that there are."""
+    method = {"kind": word(METHODS.names), "doc": METHODS.explained}
+    return TableKeys.of(Compensation).but(method=method)
