@@ -83,5 +83,4 @@ def _finish(axis: Axes, title: str) -> None:
     axis.set_title(title, fontsize=10)
     axis.set_xlabel("temperature, °C")
     axis.grid(visible=True, alpha=0.3)
-    axis.margins(y=0.2)
-    axis.legend(fontsize=8, ncols=3)
+    axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))  # beside, not over, lines
