@@ -132,7 +132,9 @@ def test_three_implementations_agree(
     built: dict[str, Built], reference: Reference, sets: dict[str, list[VectorSet]], name: str
 ) -> None:
     b = built[name]
-    check = cross_check(b.plan, sets[name], b.generated, reference.routine(b.image), b.image)
+    check = cross_check(
+        b.plan, sets[name], lambda: b.generated, lambda: reference.routine(b.image), b.image
+    )
     assert list(check.vectors) == NAMES
     assert check.total == sum(len(v.temp) for v in sets[name])
     assert 0.4 < check.largest_error_lsb <= prove(b.plan).lsb
@@ -182,7 +184,13 @@ def test_a_corrupted_constant_of_the_header_is_refused(
     header.write_text(text.replace("-1223585409,", "-1223585408,"), encoding="utf-8")
     wrong = Generated(start_generated(tmp_path, tmp_path).load())
     with pytest.raises(RefusedError) as refusal:
-        cross_check(b.plan, sets["direct-checked"], wrong, reference.routine(b.image), b.image)
+        cross_check(
+            b.plan,
+            sets["direct-checked"],
+            lambda: wrong,
+            lambda: reference.routine(b.image),
+            b.image,
+        )
     assert "generated C gives" in str(refusal.value)
     assert "of 380295 vectors differ: do not use this build, report it" in str(refusal.value)
     temp, raw, out, status, expected, good = parse(refusal.value)
@@ -206,7 +214,9 @@ def test_a_fault_in_the_routine_is_refused(
     routine.write_text(text.replace("code >= calib", "code > calib"), encoding="utf-8")
     wrong = Generated(start_generated(tmp_path, tmp_path).load())
     with pytest.raises(RefusedError) as refusal:
-        cross_check(b.plan, sets[b.folder.name], wrong, reference.routine(b.image), b.image)
+        cross_check(
+            b.plan, sets[b.folder.name], lambda: wrong, lambda: reference.routine(b.image), b.image
+        )
     temp, raw, out, status, expected, good = parse(refusal.value)
     assert temp in [s.first_code for s in b.plan.segments[1:]]
     assert oracle.run(b.plan, temp, raw) == (expected, good)
@@ -226,7 +236,7 @@ def test_a_wrong_reference_is_refused_as_such(
         return accel, status
 
     with pytest.raises(RefusedError, match="reference C gives") as refusal:
-        cross_check(b.plan, sets["inverse-saturating"], b.generated, wrong, b.image)
+        cross_check(b.plan, sets["inverse-saturating"], lambda: b.generated, lambda: wrong, b.image)
     assert "1 of 380295 vectors differ" in str(refusal.value)
     assert "cross-check, vector 190147 of 'every temperature code'" in str(refusal.value)
     _, _, found, status, expected, good_status = parse(refusal.value)
@@ -246,8 +256,8 @@ def test_an_image_of_other_constants_is_refused(
         cross_check(
             b.plan,
             sets["direct-checked"],
-            b.generated,
-            reference.routine(b.image),
+            lambda: b.generated,
+            lambda: reference.routine(b.image),
             image_bytes(other),
         )
 
@@ -260,8 +270,8 @@ def test_an_image_that_does_not_load_is_refused(
         cross_check(
             b.plan,
             sets["direct-checked"],
-            b.generated,
-            reference.routine(b.image),
+            lambda: b.generated,
+            lambda: reference.routine(b.image),
             b.image[:-1] + bytes([b.image[-1] ^ 1]),
         )
 
@@ -276,7 +286,13 @@ def test_a_fault_of_the_integer_model_is_refused(
     coefficients[0, 0] += 1
     other: Plan = replace(b.plan, segments=(replace(segment, coefficients=coefficients),))
     with pytest.raises(RefusedError, match="generated C gives"):
-        cross_check(other, sets["direct-checked"], b.generated, reference.routine(b.image), b.image)
+        cross_check(
+            other,
+            sets["direct-checked"],
+            lambda: b.generated,
+            lambda: reference.routine(b.image),
+            b.image,
+        )
 
 
 def test_covering_shapes_agree_on_random_int32(

@@ -7,6 +7,7 @@ triax_calib.h, and from the image through triax_calib_load) answer the same vect
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
@@ -170,39 +171,17 @@ def _gather(table: NumberArray, index: IntArray) -> NumberArray:
     return np.take(table, index, axis=1, mode="clip").T.reshape(-1, 3, 4)
 
 
-@dataclass(frozen=True)
-class PythonAnswers:
-    """What the integer model answers to each set of vectors, and its largest error, in LSB."""
-
-    answers: list[Answers]
-    largest_error_lsb: float
-
-
-def python_answers(plan: Plan, sets: list[VectorSet]) -> PythonAnswers:
-    """Answers of the integer model; they need no compiled C."""
-    routine = python_routine(plan)
-    answers = [routine(v.temp, v.raw) for v in sets]
-    real = _columns(plan.real_rows())
-    errors = [
-        _largest_error(plan, real, v, found)
-        for v, found in zip(sets, answers, strict=True)
-        if v.exhaustive
-    ]
-    return PythonAnswers(answers, max(errors, default=0.0))
-
-
 def cross_check(
     plan: Plan,
     sets: list[VectorSet],
-    generated: Generated,
-    reference: Routine,
+    generated: Callable[[], Generated],
+    reference: Callable[[], Routine],
     image: bytes,
-    *,
-    python: PythonAnswers | None = None,
 ) -> CrossCheck:
     """Run every vector through the three implementations and the image through the loader.
 
-    `python` are the answers of `python_answers`, where they were made while the C was compiled.
+    `generated` and `reference` give the compiled C. They may wait for the compiler: Python answers
+    meanwhile.
 
     Raises
     ------
@@ -210,22 +189,44 @@ def cross_check(
         At the first mismatch: its input and both outputs.
     """
     with ThreadPoolExecutor(2) as pool:
-        compiled = [
-            (pool.submit(generated.run, v.temp, v.raw), pool.submit(reference, v.temp, v.raw))
-            for v in sets
-        ]
-        python = python or python_answers(plan, sets)
-        for vectors, expected, found in zip(sets, python.answers, compiled, strict=True):
-            _compare(vectors, "generated C", found[0].result(), expected)
-            _compare(vectors, "reference C", found[1].result(), expected)
+        compiled = (
+            pool.submit(lambda: _answers(generated().run, sets)),
+            pool.submit(lambda: _answers(reference(), sets)),
+        )
+        python = _answers(python_routine(plan), sets)
+        largest = _largest_errors(plan, sets, python)
+        for vectors, expected, *found in zip(
+            sets, python, *(future.result() for future in compiled), strict=True
+        ):
+            _compare(vectors, "generated C", found[0], expected)
+            _compare(vectors, "reference C", found[1], expected)
     boundary = next(v for v in sets if v.name == "boundaries")
-    loaded, answers = generated.run_image(image, boundary.temp, boundary.raw)
+    built = generated()
+    loaded, answers = built.run_image(image, boundary.temp, boundary.raw)
     if loaded != STATUS_OK:
         raise RefusedError("triax_calib_load", f"refused its own image with status {loaded}")
     _compare(
-        boundary, "generated C with the image", answers, generated.run(boundary.temp, boundary.raw)
+        boundary,
+        "generated C with the image",
+        answers,
+        generated().run(boundary.temp, boundary.raw),
     )
-    return CrossCheck({v.name: len(v.temp) for v in sets}, python.largest_error_lsb)
+    return CrossCheck({v.name: len(v.temp) for v in sets}, largest)
+
+
+def _answers(routine: Routine, sets: list[VectorSet]) -> list[Answers]:
+    return [routine(v.temp, v.raw) for v in sets]
+
+
+def _largest_errors(plan: Plan, sets: list[VectorSet], answers: list[Answers]) -> float:
+    """Largest |integer - real| in LSB over the exhaustive sets."""
+    real = _columns(plan.real_rows())
+    errors = [
+        _largest_error(plan, real, vectors, found)
+        for vectors, found in zip(sets, answers, strict=True)
+        if vectors.exhaustive
+    ]
+    return max(errors, default=0.0)
 
 
 def _compare(vectors: VectorSet, name: str, found: Answers, expected: Answers) -> None:

@@ -9,13 +9,14 @@ import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.compiler import Compilation, reference_under_way
-from triaxcal.codegen.crosscheck import CrossCheck, cross_check, python_answers, vector_sets
+from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images, image_cases
 from triaxcal.codegen.outputs.image import IMAGE_FILE
@@ -116,21 +117,29 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
         sets = vector_sets(plan)
         image = firmware.files[IMAGE_FILE]
         cases = image_cases(plan, image)
-        python = python_answers(plan, sets)
-        if isinstance(reference, Compilation):
-            reference = Reference(reference.load())
-        generated = Generated(compilation.load())
-        tried = routines_of(plan.rate, generated.library, reference.library)
-        check = cross_check(plan, sets, tried[0], tried[1].routine(image), image, python=python)
+        # Loaded by the thread that asks first, when the compiler is done.
+        ours = cache(compilation.load)
+        theirs = cache(reference.load) if isinstance(reference, Compilation) else reference.loaded
+        check = cross_check(
+            plan,
+            sets,
+            lambda: routines_of(plan.rate, ours(), ours())[0],
+            lambda: routines_of(plan.rate, theirs(), theirs())[1].routine(image),
+            image,
+        )
+        tried = routines_of(plan.rate, ours(), theirs())
         check = replace(check, images=check_images(plan, cases, *tried))
         _refuse_wrong_bound(unit, bound, check)
         dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
         rates = _rate_codes(unit, dwells)
-        own = routines_of(plan.rate, generated.library, reference.library, rates)[0]
-        routines = {unit.method: own.run, **_other_routines(unit, calibration, reference, rates)}
+        own = routines_of(plan.rate, ours(), theirs(), rates)[0]
+        routines = {
+            unit.method: own.run,
+            **_other_routines(unit, calibration, Reference(theirs()), rates),
+        }
         source = fitted.measurements.source
         methods = run_on_dwells(unit, calibration.thermal, source, dwells, routines)
-        compiler = generated.compiler
+        compiler = Generated(ours()).compiler
     parts = unit, fitted.measurements, fitted.inputs_sha256, calibration, fitted.unit_toml
     delivery = Delivery(*parts, firmware, bound, check, methods, compiler)
     _refuse_beyond_limits(delivery)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from triaxcal.delivery.saved import calibration_json
 from triaxcal.delivery.unit import Delivery
 from triaxcal.report.a2l import calib_a2l
-from triaxcal.report.dcc import certificate_xml
 from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.passport.document import passport_json
 from triaxcal.report.passport.page import passport_html
@@ -28,8 +27,11 @@ def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, byt
     `made` is the delivery's passport, where there is one already.
     """
     unit_passport = made or passport(delivery, {})
-    details = delivery.unit.certificate
-    certificate = {CERTIFICATE: certificate_xml(unit_passport, details)} if details else {}
+    certificate = {}
+    if details := delivery.unit.certificate:
+        from triaxcal.report.dcc import certificate_xml  # noqa: PLC0415  XML only when needed
+
+        certificate[CERTIFICATE] = certificate_xml(unit_passport, details)
     return {
         **delivery.files,
         "calibration.json": calibration_json(delivery),
