@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal.base.arrays import finite, int32
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.publish import publish, renew
 from triaxcal.codegen.imu import ImuBuild, imu_answers
 from triaxcal.codegen.routines import Int32Array, UInt32Array
@@ -305,8 +305,7 @@ def load_imu(path: str | Path) -> ImuCalibration:
             raise KeyError("kind")
         return ImuCalibration(document)
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise RefusedError(str(path), f"cannot be read: {reason}") from error
+        raise refused_by_system(path, "read", error) from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise RefusedError(
             str(path),

@@ -50,6 +50,19 @@ class RefusedError(Exception):
         return _again, (type(self), self.place, self.found, self.expected, self.remedy)
 
 
+def refused_by_system(
+    place: object, what: str, error: OSError, *, expected: str = "", remedy: str = ""
+) -> RefusedError:
+    """Error of a file that "cannot be" read or written (`what`), for the system's reason."""
+    found = f"cannot be {what}: {reason_of(error)}"
+    return RefusedError(str(place), found, expected=expected, remedy=remedy)
+
+
+def reason_of(error: OSError) -> str:
+    """Why the operating system refused."""
+    return (error.strerror or str(error)).lower()
+
+
 class UsageError(RefusedError):
     """The command line is wrong in a way that click cannot know."""
 

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 
 
 def publish(files: Mapping[str, bytes], target: Path, sometimes: Collection[str] = ()) -> None:
@@ -110,10 +110,9 @@ def _umask() -> int:
 
 
 def _refusal(where: Path, error: OSError) -> RefusedError:
-    reason = (error.strerror or str(error)).lower()
     remedy = "check its permissions, or name another folder with --build"
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         remedy = "free some space, or name another folder with --build"
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         remedy = "a file is in the way: move it, or name another folder with --build"
-    return RefusedError(str(where), f"cannot be written: {reason}", remedy=remedy)
+    return refused_by_system(where, "written", error, remedy=remedy)

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import refused_by_system
 from triaxcal.base.publish import renew
 from triaxcal.batch.order import Outcome
 
@@ -29,9 +29,7 @@ def read_journal(build: Path) -> dict[str, dict[str, Any]]:
     except FileNotFoundError:
         return {}
     except OSError as error:
-        raise RefusedError(
-            str(build / JOURNAL_FILE), f"cannot be read: {(error.strerror or str(error)).lower()}"
-        ) from error
+        raise refused_by_system(build / JOURNAL_FILE, "read", error) from error
     found: dict[str, dict[str, Any]] = {}
     for line in text.splitlines():
         try:
@@ -73,9 +71,7 @@ def append(build: Path, entry: dict[str, Any]) -> None:
                     file.write(b"\n")
             file.write(_line(entry))
     except OSError as error:
-        raise RefusedError(
-            str(path), f"cannot be written: {(error.strerror or str(error)).lower()}"
-        ) from error
+        raise refused_by_system(path, "written", error) from error
 
 
 def rewrite(build: Path, entries: Iterable[dict[str, Any]]) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,7 @@ def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise RefusedError(
-            str(path), f"cannot be read: {(error.strerror or str(error)).lower()}"
-        ) from error
+        raise refused_by_system(path, "read", error) from error
 
 
 def refused(order: Order, why: RefusedError | str) -> Outcome:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.shipped import shipped
 
 WARNINGS = (
@@ -107,11 +107,8 @@ def compile_library(
             env=os.environ | {"TMPDIR": str(library.parent)},
         )
     except OSError as error:
-        raise RefusedError(
-            command[0],
-            f"cannot be run: {(error.strerror or str(error)).lower()}",
-            remedy="install gcc: sudo apt-get install gcc libc6-dev",
-        ) from error
+        remedy = "install gcc: sudo apt-get install gcc libc6-dev"
+        raise refused_by_system(command[0], "run", error, remedy=remedy) from error
     return Compilation(process, library)
 
 

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import refused_by_system
 from triaxcal.readings.measurements import MEASUREMENTS_FILE
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.folder import UNIT_FILE
@@ -35,9 +35,5 @@ def files_sha256(paths: Iterable[Path], remedy: str) -> str:
             with path.open("rb") as file:
                 digest.update(hashlib.file_digest(file, "sha256").digest())
         except OSError as error:
-            raise RefusedError(
-                str(path),
-                f"cannot be read: {(error.strerror or str(error)).lower()}",
-                remedy=remedy,
-            ) from error
+            raise refused_by_system(path, "read", error, remedy=remedy) from error
     return digest.hexdigest()

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal import __version__
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.base.plaindata import Custom, plain, rebuilt
 from triaxcal.delivery.fitted import Fitted
@@ -181,10 +181,7 @@ def read_saved(path: Path) -> Saved:
     try:
         document = json.loads(path.read_bytes())
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise RefusedError(
-            str(path), f"cannot be read: {reason}", expected="a calibration.json"
-        ) from error
+        raise refused_by_system(path, "read", error, expected="a calibration.json") from error
     except (ValueError, RecursionError) as error:
         raise RefusedError(
             str(path), f"not JSON: {error}", expected="a calibration.json"

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.keys import REQUIRED, FileKeys, Key, TableKeys
 from triaxcal.base.tomltext import toml_value
 from triaxcal.keytable.catalogue import FILES
@@ -62,8 +62,7 @@ def write_starter(folder: Path, kind: str) -> tuple[Path, Path]:
         path.write_text(starter_text(file, schema.name), encoding="utf-8")
         schema.write_text(json.dumps(json_schema(file), indent=1) + "\n", encoding="utf-8")
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise RefusedError(str(folder), f"cannot be written: {reason}") from error
+        raise refused_by_system(folder, "written", error) from error
     return path, schema
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.tomltable import did_you_mean, shown
 
 READING_UNITS = ("v", "mv", "code")
@@ -178,12 +178,8 @@ def _text(path: Path) -> str:
     try:
         data = path.read_bytes()
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise RefusedError(
-            str(path),
-            f"cannot be read: {reason}",
-            remedy="put the dwells there, as docs/how-to/add-a-unit.md tells",
-        ) from error
+        remedy = "put the dwells there, as docs/how-to/add-a-unit.md tells"
+        raise refused_by_system(path, "read", error, remedy=remedy) from error
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

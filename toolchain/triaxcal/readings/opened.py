@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.readings.format import FORMATS, Block, Format, Source
 from triaxcal.readings.names import meant
@@ -183,11 +183,8 @@ def _stamp(path: Path, layout: FileLayout) -> list[tuple[int, int, int]]:
 
 def _unreadable(path: Path, layout: FileLayout, error: OSError) -> RefusedError:
     key = "file" if layout.table == "recording" else "recording"
-    return RefusedError(
-        str(path),
-        f"cannot be read: {(error.strerror or str(error)).lower()}",
-        remedy=f"put the recording there, or correct [{layout.table}] {key}",
-    )
+    remedy = f"put the recording there, or correct [{layout.table}] {key}"
+    return refused_by_system(path, "read", error, remedy=remedy)
 
 
 def _format_of(path: Path, layout: FileLayout) -> Format:

@@ -10,7 +10,7 @@ from pathlib import Path
 import can
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.rig.canbus import messages_of
 from triaxcal.rig.candump import NS_PER_US, read_log
 from triaxcal.rig.export_columns import mf4_writer, parquet_writer
@@ -102,6 +102,5 @@ def export_log(log: Path, target: Path, told: Callable[[int], None]) -> int:
         finally:
             aside.unlink(missing_ok=True)
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise RefusedError(str(target), f"cannot be written: {reason}") from error
+        raise refused_by_system(target, "written", error) from error
     return count

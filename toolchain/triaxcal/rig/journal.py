@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 
 Record = Mapping[str, Any]
 
@@ -150,9 +150,5 @@ def sync_folder(folder: Path) -> None:
 
 def disk_refusal(path: Path, error: OSError) -> RefusedError:
     """Error of a disk that refuses."""
-    reason = (error.strerror or str(error)).lower()
-    return RefusedError(
-        str(path),
-        f"cannot be written: {reason}",
-        remedy="what was acknowledged is safe; free some space, then `triaxcal rig resume`",
-    )
+    remedy = "what was acknowledged is safe; free some space, then `triaxcal rig resume`"
+    return refused_by_system(path, "written", error, remedy=remedy)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.truth import (
@@ -74,9 +74,7 @@ def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Itera
             own_truth = truth_text(truth, plan, coefficients, *seeds)
             (folder / TRUTH_FILE).write_text(own_truth, encoding="utf-8")
         except OSError as error:
-            raise RefusedError(
-                str(folder), f"cannot be written: {(error.strerror or str(error)).lower()}"
-            ) from error
+            raise refused_by_system(folder, "written", error) from error
         write_simulated_unit(folder)
         yield folder
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.verify.outcome import Outcome
 
@@ -66,11 +66,8 @@ def record(target: Path, section: Mapping[str, Any]) -> None:
         finally:
             Path(name).unlink(missing_ok=True)
     except OSError as error:
-        raise RefusedError(
-            str(path),
-            f"cannot be written: {(error.strerror or str(error)).lower()}",
-            remedy="free some space or name another folder",
-        ) from error
+        remedy = "free some space or name another folder"
+        raise refused_by_system(path, "written", error, remedy=remedy) from error
 
 
 def _load(content: bytes, path: Path) -> dict[str, Any]:
