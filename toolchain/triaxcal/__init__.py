@@ -26,13 +26,12 @@ if TYPE_CHECKING:
         Imu,
         ImuCalibration,
         ImuConstants,
-        ImuFirmware,
         ImuState,
-        firmware_imu,
         fit_imu,
         load_imu,
         read_imu,
     )
+    from triaxcal.api.imufirmware import ImuFirmware, firmware_imu
     from triaxcal.api.series import SeriesResult, calibrate_series
     from triaxcal.api.studies import (
         MeasurementPlan,
@@ -70,9 +69,9 @@ _MODULES = {
     "triaxcal.api.files": ("key_schema", "write_first_file"),
     "triaxcal.api.firmware": ("CompiledFirmware", "Firmware", "firmware"),
     "triaxcal.api.imu": (
-        "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "firmware_imu",
-        "fit_imu", "load_imu", "read_imu",
+        "Imu", "ImuCalibration", "ImuConstants", "ImuState", "fit_imu", "load_imu", "read_imu",
     ),
+    "triaxcal.api.imufirmware": ("ImuFirmware", "firmware_imu"),
     "triaxcal.api.series": ("SeriesResult", "calibrate_series"),
     "triaxcal.api.studies": (
         "MeasurementPlan", "Study", "compare_history", "cross_coupling", "find_poses",

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from triaxcal.base.progress import Progress
 from triaxcal.codegen.compiler import Compilation, reference_under_way
 
 if TYPE_CHECKING:
     from triaxcal.api.calibration import Calibration
     from triaxcal.api.imu import ImuCalibration
-
-Progress = Callable[[str, float], None]
-"""Called with the name of a step and the part of it that is done, 0 to 1."""
 
 
 @dataclass(frozen=True)

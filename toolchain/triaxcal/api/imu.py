@@ -1,9 +1,8 @@
-"""`read_imu`, `fit_imu`, `ImuCalibration`, `load_imu`, `firmware_imu`: the same for a whole IMU."""
+"""`read_imu`, `fit_imu`, `ImuCalibration`, `load_imu`: the same for a whole IMU."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from triaxcal.base.arrays import finite, int32
+from triaxcal.base.arrays import finite
 from triaxcal.base.errors import RefusedError, refused_by_system
-from triaxcal.base.publish import publish, renew
-from triaxcal.codegen.imu import ImuBuild, imu_answers
-from triaxcal.codegen.routines import Int32Array, UInt32Array
+from triaxcal.base.progress import Progress
+from triaxcal.base.publish import renew
 from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
@@ -26,8 +24,6 @@ from triaxcal.model.methods.imu import ImuModel
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -205,59 +201,6 @@ class ImuCalibration:
         return self._delivery.c
 
 
-class ImuFirmware:
-    """The fixed-point routines of both triads, in Python's integers: the bits that the C gives.
-
-    Attributes
-    ----------
-    build : ImuBuild
-        Plans, proven bounds and what was cross-checked.
-    files : dict
-        Name and content of the C and the image.
-    """
-
-    def __init__(self, build: ImuBuild) -> None:
-        self.build = build
-        self.files = build.files
-
-    def apply(
-        self, raw_accel: Any, raw_gyro: Any, temp_codes: Any
-    ) -> tuple[Int32Array, Int32Array, UInt32Array]:
-        """What `triax_imu_apply` answers.
-
-        Parameters
-        ----------
-        raw_accel, raw_gyro : array_like of whole numbers, shape (n, 3)
-        temp_codes : array_like of whole numbers, shape () or (n,)
-
-        Returns
-        -------
-        accel, rate : arrays of int32, shape (n, 3)
-            In 2^-output_q g and deg/s.
-        status : array of uint32, shape (n,)
-
-        Raises
-        ------
-        RefusedError
-            For another shape, or a number that int32 does not hold.
-        """
-        accel, gyro = int32("raw_accel", raw_accel, 3), int32("raw_gyro", raw_gyro, 3)
-        temp = int32("temp_codes", temp_codes)
-        if accel.ndim != 2 or gyro.shape != accel.shape or temp.shape not in ((), (len(accel),)):
-            raise RefusedError(
-                "raw_accel, raw_gyro, temp_codes",
-                f"found the shapes {accel.shape}, {gyro.shape}, {temp.shape}",
-                expected="(n, 3), (n, 3), (n,)",
-            )
-        temp = np.ascontiguousarray(np.broadcast_to(temp, (len(accel),)))
-        return imu_answers(self.build.accel, self.build.gyro, temp, accel, gyro)
-
-    def write(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write the C and the image, all of them or none, into a folder of their own."""
-        publish(self.files, Path(folder))
-        return tuple(Path(folder) / name for name in self.files)
-
-
 def read_imu(folder: str | Path) -> Imu:
     """IMU in a folder, from its unit.toml with [dynamic].
 
@@ -278,17 +221,6 @@ def fit_imu(imu: Imu, progress: Progress | None = None) -> ImuCalibration:
         When the recording cannot be read, or carries no calibration.
     """
     return ImuCalibration.of(deliver_imu(imu.folder, progress))
-
-
-def firmware_imu(calibration: ImuCalibration) -> ImuFirmware:
-    """Firmware of an IMU whose unit has [device].
-
-    Raises
-    ------
-    RefusedError
-        Where there is none.
-    """
-    return ImuFirmware(calibration.c.build)
 
 
 def load_imu(path: str | Path) -> ImuCalibration:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from triaxcal.base.publish import renew
 from triaxcal.batch import journal
 from triaxcal.batch.cluster import connect, run_cluster, workers
 from triaxcal.batch.local import cores, run_local
-from triaxcal.batch.order import Make, Order, Outcome
+from triaxcal.batch.order import Outcome, Runner
 from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import run_series
 from triaxcal.report.files import SOMETIMES
@@ -76,27 +77,8 @@ def calibrate_series(
     target = Path(build)
     work = units if isinstance(units, Work) else plan_work([Path(u) for u in units], target)
     start = time.monotonic()
-    if scheduler is None:
-        width = jobs or cores()
-
-        def local(make: Make, orders: list[Order]) -> Iterator[Outcome]:
-            return run_local(make, orders, width, finishing)
-
-        series = run_series(work, target, make_unit, local, sometimes=SOMETIMES, tell=outcome)
-    else:
-        client = connect(scheduler)
-        try:
-            width = workers(client)
-            series = run_series(
-                work,
-                target,
-                make_unit,
-                lambda make, orders: run_cluster(client, make, orders),
-                sometimes=SOMETIMES,
-                tell=outcome,
-            )
-        finally:
-            client.close()
+    with _runner(jobs, scheduler, finishing) as (run, width):
+        series = run_series(work, target, make_unit, run, sometimes=SOMETIMES, tell=outcome)
     seconds = time.monotonic() - start
     target.mkdir(parents=True, exist_ok=True)
     if series.made:
@@ -105,3 +87,19 @@ def calibrate_series(
     page = target / PAGE_FILE
     text = series_summary(series, len(work.done), seconds, width, str(page))
     return SeriesResult(page, dict(series.refused), work.total, text)
+
+
+@contextmanager
+def _runner(
+    jobs: int | None, scheduler: str | None, finishing: Callable[[int], None]
+) -> Iterator[tuple[Runner, int]]:
+    """What makes the units of a series, here or on a cluster, and how many at a time."""
+    if scheduler is None:
+        width = jobs or cores()
+        yield (lambda make, orders: run_local(make, orders, width, finishing)), width
+        return
+    client = connect(scheduler)
+    try:
+        yield (lambda make, orders: run_cluster(client, make, orders)), workers(client)
+    finally:
+        client.close()

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from triaxcal.api.delivery import Progress
 from triaxcal.api.unit import Unit
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.progress import Progress
 from triaxcal.design.imu import plan_unit
 from triaxcal.design.problem import Problem, read_problem
 from triaxcal.design.search import Design, best, usual

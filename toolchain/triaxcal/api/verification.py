@@ -6,7 +6,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.api.delivery import Progress
+from triaxcal.base.progress import Progress
 from triaxcal.base.publish import publish, renew
 from triaxcal.base.tomltable import has_table
 from triaxcal.delivery.imu import deliver_imu

@@ -129,8 +129,8 @@ class Values:
     given: Mapping[str, object]
     keys: Mapping[str, Key[Any]] = field(default_factory=dict)
 
-    def __contains__(self, key: Key[Any] | str) -> bool:
-        return _name(key) in self.given
+    def __contains__(self, name: str) -> bool:
+        return name in self.given
 
     def __bool__(self) -> bool:
         return bool(self.given)
@@ -147,7 +147,7 @@ class Values:
         kind = declared.kind
         if key.name not in self.given:
             if declared.required:
-                raise RefusedError(self.where(key), "missing", expected=kind.expected)
+                raise RefusedError(self.where(key.name), "missing", expected=kind.expected)
             return declared.default
         found = self.given[key.name]
         try:
@@ -158,7 +158,7 @@ class Values:
             pass
         hint = did_you_mean(found, kind.choices) if isinstance(found, str) else ""
         raise RefusedError(
-            self.where(key),
+            self.where(key.name),
             f"found {shown(found)}{hint}",
             expected=declared.kind.expected,
             remedy=declared.kind.remedy,
@@ -168,14 +168,14 @@ class Values:
         """Dataclass of keys with these values; `others` are its fields that are no keys."""
         return cls(**{k.name: self[k] for k in keys_of(cls)}, **others)
 
-    def where(self, key: Key[Any] | str) -> str:
+    def where(self, name: str) -> str:
         """Place of a key as messages name it."""
-        return f"{self.file}, {key_name(self.name, _name(key))}"
+        return f"{self.file}, {key_name(self.name, name)}"
 
-    def refuse(self, key: Key[Any] | str, expected: str, remedy: str = "") -> RefusedError:
-        """Error that names the value of `key` and what should be there."""
-        found = f"found {shown(self.given[_name(key)])}"
-        return RefusedError(self.where(key), found, expected=expected, remedy=remedy)
+    def refuse(self, name: str, expected: str, remedy: str = "") -> RefusedError:
+        """Error that names the value of a key and what should be there."""
+        found = f"found {shown(self.given[name])}"
+        return RefusedError(self.where(name), found, expected=expected, remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -206,8 +206,7 @@ class TableKeys:
 
     def relaxed(self) -> TableKeys:
         """Same table without required keys."""
-        keys = (dataclasses.replace(k, default=None) if k.required else k for k in self.keys)
-        return dataclasses.replace(self, keys=tuple(keys))
+        return self.but(**{k.name: {"default": None} for k in self.keys if k.required})
 
 
 @dataclass(frozen=True)
@@ -253,9 +252,10 @@ class FileKeys:
                 remedy="another format needs a triaxcal that knows it",
             )
         names = {table.name for table in self.tables}
+        top = {name: value for name, value in document.items() if name not in names}
         given: dict[str, Mapping[str, object]] = {}
         for table in self.tables:
-            values = document.get(table.name, {}) if table.name else _top(document, names)
+            values = document.get(table.name, {}) if table.name else top
             if not isinstance(values, dict):
                 raise RefusedError(
                     f"{source}, {table.name}",
@@ -265,10 +265,8 @@ class FileKeys:
             given[table.name] = values
         self._refuse_wrong_keys(source, given, document)
         return {
-            table.name: Values(
-                source, table.name, given[table.name], {k.name: k for k in table.keys}
-            )
-            for table in self.tables
+            name: Values(source, name, given[name], {k.name: k for k in table.keys})
+            for name, table in zip(given, self.tables, strict=True)
         }
 
     def _refuse_wrong_keys(
@@ -288,9 +286,8 @@ class FileKeys:
                 for name in given[table.name]
                 if name not in known
             ]
-        parts = ["missing: " + ", ".join(missing)] if missing else []
-        parts += ["unknown: " + ", ".join(unexpected)] if unexpected else []
-        if parts:
+        found = {"missing": missing, "unknown": unexpected}
+        if parts := [f"{what}: {', '.join(keys)}" for what, keys in found.items() if keys]:
             raise RefusedError(source, "; ".join(parts))
 
     def _near(self, table: TableKeys, name: str) -> str:
@@ -301,11 +298,3 @@ class FileKeys:
                 return f" (it belongs to {place})"
         tables = [] if table.name else [t.name for t in self.tables if t.name]
         return did_you_mean(name, [k.name for k in table.keys] + tables)
-
-
-def _name(key: Key[Any] | str) -> str:
-    return key if isinstance(key, str) else key.name
-
-
-def _top(document: Mapping[str, object], names: set[str]) -> dict[str, object]:
-    return {name: value for name, value in document.items() if name not in names}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import click
 from click.termui import progressbar
 
 from triaxcal import deliver
+from triaxcal.base.progress import Progress
 from triaxcal.cli.options import say
 
 
@@ -25,7 +26,7 @@ def calibrate(unit: Path, build: Path) -> None:
 
 
 @contextmanager
-def bar() -> Iterator[Callable[[str, float], None]]:
+def bar() -> Iterator[Progress]:
     """Progress on the screen, by the name of a step and the part of it that is done."""
     with ExitStack() as stack:
         bars: list[Any] = []

@@ -6,13 +6,13 @@ Nothing is written here; `triaxcal.base.publish` puts the files in place.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.progress import Progress
 from triaxcal.codegen.compiler import find_compiler
 from triaxcal.codegen.constants import Provenance
 from triaxcal.codegen.imu import ImuBuild, build_imu
@@ -69,7 +69,7 @@ class ImuDelivery:
     c: ImuC | None
 
 
-def deliver_imu(folder: Path, progress: Callable[[str, float], None] | None = None) -> ImuDelivery:
+def deliver_imu(folder: Path, progress: Progress | None = None) -> ImuDelivery:
     """Calibrate the IMU in `folder` and, where its unit.toml has [device], make and check its C.
 
     Raises

@@ -7,9 +7,9 @@ the noise of the data sheet.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
+from triaxcal.base.progress import Progress
 from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.observability import observability
@@ -19,7 +19,7 @@ from triaxcal.simulation.imu_truth import ImuTruth, SecondTriad
 from triaxcal.simulation.imu_unit import planned_motion
 
 
-def plan_unit(folder: Path, progress: Callable[[str, float], None]) -> DynamicUnit:
+def plan_unit(folder: Path, progress: Progress) -> DynamicUnit:
     """Standard deviations that the unit in `folder` will have after the motion it plans.
 
     The motion is that of [motion] in imu_truth.toml, everything else of unit.toml; the recording

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from triaxcal.base.progress import Progress
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.missing import Effect, missing_effects
@@ -35,9 +35,7 @@ class DynamicUnit:
     findings: tuple[str, ...]
 
 
-def calibrate_unit(
-    folder: Path, progress: Callable[[str, float], None] | None = None
-) -> DynamicUnit:
+def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUnit:
     """Calibrate the unit in `folder` from the recording that its unit.toml names.
 
     Raises

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
+from triaxcal.poses.steady import Steady
 from triaxcal.poses.stillness import Stillness, duration_s, find_stillness
 from triaxcal.readings.samples import ANGLES, READING, TEMP, Samples
 from triaxcal.readings.table import ROW, TIME
@@ -17,14 +18,10 @@ from triaxcal.unit.recording import POSES, SECTIONS, RecordingLayout
 from triaxcal.unit.recordingfile import TIME_UNITS
 
 BATCHES = 8
-_DRIFT_MAX = 6.0
-"""Of its standard error: how far the two halves of a pose may differ."""
 _STEPS_S = (5e-4, 0.5)
 """Between samples of a logger: what tells seconds from milliseconds."""
 _SAME_RAD = 1e-6
 """Angles of one pose are written alike in all its rows."""
-_MOVING = 0.1
-"""Of 1 g: a pose whose readings scatter by more was not held still."""
 ALIKE_DEG = 5.0
 """Poses nearer than this to each other are one orientation."""
 
@@ -107,23 +104,6 @@ class PoseSet:
         return np.array(temps) if len(temps) == len(self.poses) and temps else None
 
 
-@dataclass(frozen=True)
-class _Scale:
-    """Lowest and highest readings of the file, shape (3,), and about what 1 g reads."""
-
-    low: FloatArray
-    high: FloatArray
-    one_g: float
-
-    @staticmethod
-    def of(samples: Samples, layout: RecordingLayout) -> _Scale:
-        low, high = samples.extremes(READING)
-        # Counts do not say: half of what nine tenths of the samples span on the widest axis.
-        rows = np.concatenate(samples.table.spool.stretches())
-        spans = np.ptp(np.percentile(samples.cut(rows, READING), [5.0, 95.0], axis=0), axis=0)
-        return _Scale(low, high, layout.reading_of_1_g or float(spans.max()) / 2.0)
-
-
 def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     """Poses of samples: one a row, one a section or labelled face, or found by stillness.
 
@@ -137,20 +117,29 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     if layout.rows == SECTIONS or layout.faces:
         return _section_poses(samples, layout)
     stillness = find_stillness(samples, layout.still_s)
-    scale = _Scale.of(samples, layout)
+    steady = Steady(samples, layout)
+    poses, refused = _sorted_out(
+        (_pose(samples, run, number), steady.reason(run))
+        for number, run in enumerate(stillness.runs, start=1)
+    )
+    if not poses:
+        raise _no_poses(samples, layout, refused)
+    return PoseSet(samples.source, poses, refused, stillness, samples.findings)
+
+
+def _sorted_out(
+    judged: Iterable[tuple[Pose, str]],
+) -> tuple[tuple[Pose, ...], tuple[RefusedPose, ...]]:
+    """Poses, and still stretches for which there is a reason not to be one."""
     poses: list[Pose] = []
     refused: list[RefusedPose] = []
-    for number, run in enumerate(stillness.runs, start=1):
-        pose = _pose(samples, run, number)
-        reason = _reason(samples, run, pose, layout, scale)
+    for pose, reason in judged:
         if reason:
-            told = RefusedPose(number, pose.line, pose.start_s, pose.duration_s, reason)
+            told = RefusedPose(pose.number, pose.line, pose.start_s, pose.duration_s, reason)
             refused.append(told)
         else:
             poses.append(pose)
-    if not poses:
-        raise _no_poses(samples, layout, refused)
-    return PoseSet(samples.source, tuple(poses), tuple(refused), stillness, samples.findings)
+    return tuple(poses), tuple(refused)
 
 
 def _row_poses(samples: Samples) -> tuple[Pose, ...]:
@@ -174,30 +163,30 @@ def _row_poses(samples: Samples) -> tuple[Pose, ...]:
     )
 
 
-def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
-    """Each stretch of rows with one label is a pose; without a label it is what lies between.
+def _sections(samples: Samples, layout: RecordingLayout) -> Iterator[tuple[Pose, str]]:
+    """Each stretch of rows with one label, and why it is no pose.
 
-    With `faces` only their labels count.
+    Without a label it is what lies between poses; with `faces` only their labels count.
     """
-    scale = _Scale.of(samples, layout)
-    poses: list[Pose] = []
-    refused: list[RefusedPose] = []
+    steady = Steady(samples, layout)
+    number = 0
     for run in samples.runs():
         label = samples.label(run[0])
         if not label.strip() or (layout.faces and label not in layout.faces):
             continue
-        pose = _pose(samples, run, len(poses) + len(refused) + 1)
-        reason = _moves(samples.deviation(READING, *run), layout, scale)
+        number += 1
+        pose = _pose(samples, run, number)
+        reason = steady.moves(samples.deviation(READING, *run))
         if ANGLES in samples:
             angles = samples.part(ANGLES, *run)
             pose = replace(pose, angles_rad=angles[0])
             if np.ptp(angles, axis=0).max() > _SAME_RAD:
                 reason = "its angles change within the section"
-        if reason:
-            told = RefusedPose(pose.number, pose.line, pose.start_s, pose.duration_s, reason)
-            refused.append(told)
-        else:
-            poses.append(pose)
+        yield pose, reason
+
+
+def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
+    poses, refused = _sorted_out(_sections(samples, layout))
     if not poses:
         first = f": pose {refused[0].number}: {refused[0].reason}" if refused else ""
         labels = ""
@@ -208,7 +197,7 @@ def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
             f"no section is a pose{first}{labels}",
             expected="sections held still" + ", labelled as in [recording] faces" * bool(labels),
         )
-    return PoseSet(samples.source, tuple(poses), tuple(refused), None, samples.findings)
+    return PoseSet(samples.source, poses, refused, None, samples.findings)
 
 
 def _pose(samples: Samples, run: tuple[int, int], number: int) -> Pose:
@@ -232,56 +221,8 @@ def _pose(samples: Samples, run: tuple[int, int], number: int) -> Pose:
     )
 
 
-def _reason(
-    samples: Samples,
-    run: tuple[int, int],
-    pose: Pose,
-    layout: RecordingLayout,
-    scale: _Scale,
-) -> str:
-    """Why a still stretch is no pose; "" when it is one."""
-    if pose.duration_s < layout.still_s:
-        return f"{pose.duration_s:.1f} s still, needs {layout.still_s:.1f}"
-    start, stop = run
-    deviation = samples.deviation(READING, start, stop)
-    first = samples.part(READING, start, start + 1)[0]
-    for axis in range(3):
-        moves = scale.low[axis] < scale.high[axis]
-        stuck = moves and deviation[axis] == 0.0 and (np.delete(deviation, axis) > 0.0).any()
-        if stuck and first[axis] in (scale.low[axis], scale.high[axis]):
-            return (
-                f"axis {AXES[axis]} is clipped: it stays at {first[axis]:g}, the end of what "
-                "the file shows; measure with a wider range"
-            )
-    moves_by = _moves(deviation, layout, scale)
-    if moves_by:
-        return moves_by
-    half = start + (stop - start) // 2
-    drift = np.abs(samples.mean(READING, half, stop) - samples.mean(READING, start, half))
-    assert pose.sd_mean is not None
-    # Halves of independent noise differ by 2 standard errors of the mean.
-    noise = 2.0 * deviation / np.sqrt(stop - start)
-    worst = int(np.argmax(drift - _DRIFT_MAX * noise))
-    if drift[worst] > _DRIFT_MAX * noise[worst] and drift[worst] > deviation[worst]:
-        return (
-            f"axis {AXES[worst]} drifts by {drift[worst]:.3g} {layout.acceleration_unit} between "
-            "its halves: it is still turning"
-        )
-    return ""
-
-
-def _moves(deviation: FloatArray, layout: RecordingLayout, scale: _Scale) -> str:
-    if deviation.max() <= _MOVING * scale.one_g:
-        return ""
-    axis = int(deviation.argmax())
-    return (
-        f"axis {AXES[axis]} scatters by {deviation[axis]:.3g} {layout.acceleration_unit}: "
-        "it is not held still"
-    )
-
-
 def _no_poses(
-    samples: Samples, layout: RecordingLayout, refused: list[RefusedPose]
+    samples: Samples, layout: RecordingLayout, refused: Sequence[RefusedPose]
 ) -> RefusedError:
     longest = max((r.duration_s for r in refused), default=0.0)
     first = f"; pose {refused[0].number}: {refused[0].reason}" if refused else ""

@@ -68,7 +68,7 @@ def write_published_measurements(folder: Path, unit: UnitDescription) -> Path:
     columns = [constants[key] for key in CONSTANTS]
     for key, column in zip(CONSTANTS, columns, strict=True):
         if len(column) != len(temps_degc):
-            raise constants.refuse(key, f"a list of {len(temps_degc)} numbers")
+            raise constants.refuse(key.name, f"a list of {len(temps_degc)} numbers")
     rows = [
         (position, f"{temp:g}", *(format(u, "f") for u in _voltage_v(list(values), position)))
         for temp, values in zip(temps_degc, zip(*columns, strict=True), strict=True)

@@ -70,10 +70,10 @@ def thermal_choice(values: Values) -> ThermalChoice:
     name = values[model]
     keys = () if name == AUTO else THERMAL_FUNCTIONS[name].keys
     for other in settings:
-        if other in values and other.name not in {own.name for own in keys}:
+        if other.name in values and other.name not in {own.name for own in keys}:
             models = " or ".join(f'"{f.name}"' for f in owners(other.name))
             raise RefusedError(
-                values.where(other),
+                values.where(other.name),
                 f'given with model = "{name}"',
                 expected=f"it with model = {models} only",
                 remedy="remove it, or choose that model",
