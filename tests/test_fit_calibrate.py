@@ -267,7 +267,7 @@ def test_a_singular_unit_is_refused_with_its_rows():
     constants[3:6] = constants[:3]
     message = refusal(readings(lambda _: constants, (20.0,)))
     assert message.startswith("measurements.csv, rows 2, 3, 4, 5, 6, 7: K at 20 degC")
-    assert "outputs Ux and Uy look alike" in message
+    assert "outputs Ux and Uy respond alike" in message
 
 
 def test_exchanged_positions_are_told_before_the_condition_number():

@@ -146,7 +146,7 @@ def test_outputs_that_look_alike_are_named(pair, size):
     constants[3 * b + b] += size
     with pytest.raises(RefusedError) as caught:
         refuse_ill_conditioned("m.csv, rows 1 to 6", 20.0, constants)
-    names = f"outputs U{'xyz'[a]} and U{'xyz'[b]} look alike"
+    names = f"outputs U{'xyz'[a]} and U{'xyz'[b]} respond alike"
     assert names in str(caught.value)
     assert str(caught.value).startswith("m.csv, rows 1 to 6: K at 20 degC has condition number")
 
@@ -154,7 +154,7 @@ def test_outputs_that_look_alike_are_named(pair, size):
 def test_three_outputs_along_one_plane():
     constants = np.zeros(12)
     constants[:9] = [1, 0, 0, 0, 1, 0, 0.7, 0.7, 1e-4]
-    with pytest.raises(RefusedError, match="the three outputs look along one plane"):
+    with pytest.raises(RefusedError, match="the three sensing axes lie in one plane"):
         refuse_ill_conditioned("m.csv", 20.0, constants)
 
 

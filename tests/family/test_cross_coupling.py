@@ -95,7 +95,7 @@ def test_the_result_enters_the_quadratic_model() -> None:
 
 def test_too_few_positions_and_half_a_turn_are_refused() -> None:
     a, b = readings(0, 0.0, 0.0)
-    with pytest.raises(RefusedError, match=r"pair.csv: 8 positions; expected 9 at least"):
+    with pytest.raises(RefusedError, match=r"pair.csv: 8 positions; expected at least 9"):
         fit_pair("pair.csv", THETA[:8], a[:8], b[:8], 1.0)
     near = THETA[0] + np.radians(np.arange(28.0))
     with pytest.raises(RefusedError, match=r"the angles, 5 to 32 deg, leave coefficients open"):
@@ -144,4 +144,4 @@ def test_a_wrong_cell_is_named() -> None:
     b[6] += 1e-4
     found = fit_pair("p", THETA, a, b, 1.0).doubtful
     # Z changes by b times the error; b is 0.99 at 83 deg.
-    assert found.startswith("position 7 is 9.9e-05 g^2 in Z from what the others say")
+    assert found.startswith("position 7 differs by 9.9e-05 g^2 in Z from the fit of the others")

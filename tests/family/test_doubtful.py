@@ -62,17 +62,22 @@ def test_a_row_of_angles_that_is_wrong_is_refused_by_its_line(tmp_path: Path) ->
     with pytest.raises(RefusedError) as refusal:
         calibrated(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
     told = str(refusal.value)
-    assert "log.csv, line 8: pose 7 contradicts the others: pitch -15, roll -5 deg stand" in told
+    assert (
+        "log.csv, line 8: pose 7 contradicts the others: the file has pitch -15, roll -5 deg"
+        in told
+    )
     # 10 deg at a pitch of 15 deg: 2 sin 5 deg cos 15 deg.
-    assert re.search(r"readings say pitch -15\.?\d*, roll -1[45]\.?\d* deg, 168 mg away", told)
-    assert "expected at most 20 mg (limits.at_t0_g); look at its angles and readings" in told
+    assert re.search(
+        r"others gives pitch -15\.?\d*, roll -1[45]\.?\d* deg; the difference is 168 mg", told
+    )
+    assert "expected at most 20 mg (limits.at_t0_g); check its angles and readings" in told
 
 
 def test_a_row_within_the_limit_is_told_and_passes(tmp_path: Path) -> None:
     rows = rows_of(table())
     rows[6, 1] += 0.5
     told = findings(write_unit(tmp_path / "U", rows, AIR, header=HEADER))
-    assert "pose 7 contradicts the others: pitch -15, roll -14.5 deg stand there" in told
+    assert "pose 7 contradicts the others: the file has pitch -15, roll -14.5 deg" in told
     assert "contradicts" not in findings(
         write_unit(tmp_path / "V", rows_of(table()), AIR, header=HEADER)
     )
@@ -92,18 +97,22 @@ def test_a_pose_whose_length_is_wrong_is_told(tmp_path: Path) -> None:
     poses[8] *= 1.004
     told = findings(write_unit(tmp_path / "U", log(poses)))
     # 4 mg, by a pose that the rest determine to 0.2 mg.
-    size = re.search(r"pose 9 \(line \d+\) stands out: \|a\| is \+([\d.]+) mg off by", told)
+    size = re.search(
+        r"pose 9 \(line \d+\) is an outlier: \|a\| differs by \+([\d.]+) mg from", told
+    )
     assert size is not None
     assert float(size[1]) == pytest.approx(4.0, abs=0.6)
-    assert "stands out" not in findings(write_unit(tmp_path / "V", log(directions(20))))
+    assert "outlier" not in findings(write_unit(tmp_path / "V", log(directions(20))))
 
 
 def test_a_wrong_pose_that_makes_a_small_model_win_is_told(tmp_path: Path) -> None:
-    """14 poses, one 1 % too long: six constants are chosen, in which it does not stand out."""
+    """14 poses, one 1 % too long: six constants are chosen, in which it is no outlier."""
     poses = directions(14)
     poses[9] *= 1.01
     told = findings(write_unit(tmp_path / "U", log(poses)))
-    size = re.search(r"pose 10 \(line \d+\) stands out: \|a\| is \+([\d.]+) mg off by", told)
+    size = re.search(
+        r"pose 10 \(line \d+\) is an outlier: \|a\| differs by \+([\d.]+) mg from", told
+    )
     assert size is not None
     assert float(size[1]) == pytest.approx(10.0, abs=1.5)
 
@@ -120,7 +129,7 @@ def told_by_cauchy(folder: Path, poses: FloatArray, seed: int) -> str:
 def test_sound_poses_are_not_told_by_a_robust_fit(tmp_path: Path) -> None:
     """A loss that gives up a pose makes the others fit by themselves: that proves nothing of it."""
     for seed in (5, 9, 10, 13):
-        assert "stands out" not in told_by_cauchy(tmp_path / f"{seed}", directions(14, seed), seed)
+        assert "outlier" not in told_by_cauchy(tmp_path / f"{seed}", directions(14, seed), seed)
 
 
 def test_a_robust_loss_is_not_advised_where_it_is_set(tmp_path: Path) -> None:
@@ -128,7 +137,8 @@ def test_a_robust_loss_is_not_advised_where_it_is_set(tmp_path: Path) -> None:
     poses[8] *= 1.02
     told = told_by_cauchy(tmp_path / "U", poses, 1)
     size = re.search(
-        r"pose 9 \(line 10\) stands out: \|a\| is \+([\d.]+) mg off .* look at it, or take", told
+        r"pose 9 \(line 10\) is an outlier: \|a\| differs by \+([\d.]+) mg .* check it, or remove",
+        told,
     )
     assert size is not None
     # 20 mg, by a pose that the rest determine to 1 mg, each being good to 1 mg.
@@ -204,10 +214,10 @@ def test_columns_are_given_as_they_should_stand(tmp_path: Path) -> None:
 
 def test_what_length_alone_cannot_tell_is_told_once(tmp_path: Path) -> None:
     told = findings(write_unit(tmp_path / "U", log(directions(12))))
-    assert told.count("left-handed axes and with all signs turned, so neither can be seen") == 1
+    assert told.count("left-handed axes and with all signs reversed, so neither is detected") == 1
     rows = left_handed()
     told = findings(write_unit(tmp_path / "V", rows, WITH_GYRO, header="t,ax,ay,az,wx,wy,wz"))
-    assert "the axes turn as the gyro says; that all three signs are turned cannot" in told
+    assert "the axes agree with the gyro, but three reversed signs are not detected" in told
 
 
 def test_readings_that_are_no_counts_are_refused(tmp_path: Path) -> None:
@@ -228,7 +238,7 @@ def test_poses_in_a_plane_are_called_so(tmp_path: Path, noise: float, normal: in
     poses = np.roll(flat, normal + 1, axis=0).T
     rows = np.column_stack([poses @ K.T + U0])
     recording = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "m/s^2"'
-    with pytest.raises(RefusedError, match="13 poses, which lie near one plane, leave"):
+    with pytest.raises(RefusedError, match="13 poses lie near one plane"):
         calibrated(write_unit(tmp_path / "U", rows, recording, header="a,b,c"))
 
 

@@ -249,7 +249,7 @@ def test_hundreds_of_single_readings_all_round(tmp_path: Path) -> None:
     text = "\n".join("\t".join(f"{v:.0f}" for v in row) for row in counts)
     recording = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "count"'
     calibration = calibrated(write_unit(tmp_path / "U", text, recording))
-    assert "in 60 bundles left out in turn" in calibration.selection_reason
+    assert "in 60 groups held out in turn" in calibration.selection_reason
     assert calibration.recording is not None
     # 16 counts of 16384 are 0.98 mg.
     assert calibration.recording.left_out_length_g == pytest.approx(0.98e-3, rel=0.15)

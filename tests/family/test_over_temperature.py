@@ -155,7 +155,7 @@ def test_what_is_told_as_left_out_are_orientations_and_not_temperatures(tmp_path
         more=more + "[limits]\nat_t0_g = 0.1\nover_range_g = 0.1\n",
     )
     calibration = calibrated(folder)
-    assert "12 orientations and 3 temperatures left out" in calibration.selection_reason
+    assert "12 orientations and 3 temperatures held out" in calibration.selection_reason
     recording = calibration.recording
     assert recording is not None
     gains = (next(c.parameters for c in calibration.candidates if c.chosen) - 6) // 6

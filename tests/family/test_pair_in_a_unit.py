@@ -51,7 +51,7 @@ def test_poses_of_a_log_are_fitted_with_what_the_pair_says(tmp_path: Path) -> No
     folder = unit_with_pair(tmp_path / "U", rows)
     delivery = deliver(folder)
     calibration = delivery.calibration
-    told = "cross-coupling of pair.csv is taken off: KipA 0.0006"
+    told = "cross-coupling of pair.csv is subtracted: KipA 0.0006"
     assert any(f.startswith(told) for f in calibration.findings)
     Q = calibration.terms.quadratic_per_g
     expected = terms_of_pair(KIP_A, KIP_B, (0, 2)).quadratic_per_g

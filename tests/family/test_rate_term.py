@@ -48,7 +48,7 @@ def test_a_slow_ramp_is_fitted_over_temperature_with_its_rate(tmp_path: Path) ->
     folder = write_unit(tmp_path / "U", slow_ramp(), WITH_T, header="t,ax,ay,az,T", more=more)
     calibration = calibrated(folder)
     assert {c.shape.order for c in calibration.candidates} == {1}
-    assert "4 half-cycles left out in turn" in calibration.selection_reason
+    assert "4 half-cycles held out in turn" in calibration.selection_reason
     rate = calibration.terms.rate
     assert rate is not None
     expected = -np.linalg.solve(symmetric_part(K), 30.0 * PER_RATE)
@@ -65,7 +65,7 @@ def test_a_term_that_wins_on_half_cycles_left_out_reaches_the_compiled_c(tmp_pat
     delivery = deliver(unit_with(tmp_path / "U", PER_RATE))
     calibration = delivery.calibration
     assert "and dT/dt" in calibration.selection_reason
-    assert "4 half-cycles left out in turn" in calibration.selection_reason
+    assert "4 half-cycles held out in turn" in calibration.selection_reason
     rate = calibration.terms.rate
     assert rate is not None
     expected = -np.linalg.solve(symmetric_part(K), PER_RATE)
@@ -144,7 +144,7 @@ def test_nothing_judges_a_rate_where_no_orientation_can_be_spared(tmp_path: Path
     rows[:, 1:] += 5.0 * np.pi / half_s * np.sin(phase)[:, None] * PER_RATE
     rows = np.column_stack([rows, 20.0 - 5.0 * np.cos(phase)])[:: round(RATE_HZ / 10)]
     calibration = calibrated(write_unit(tmp_path / "U", rows, WITH_T, header="t,ax,ay,az,T"))
-    assert "single poses, alike ones staying in" in calibration.selection_reason
+    assert "single poses, those of equal orientation kept" in calibration.selection_reason
     assert "half-cycles" not in calibration.selection_reason
     assert not any("dT/dt" in c.label for c in calibration.candidates)
     assert calibration.terms.rate is None

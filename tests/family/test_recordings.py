@@ -193,23 +193,24 @@ def test_a_crowd_of_alike_poses_is_told_and_counts_once(tmp_path: Path) -> None:
     told = [f for f in calibration.recording.findings if "look alike" in f]
     assert len(told) == 1
     assert "together they count as one orientation" in told[0]
-    assert "(10 orientations left out in turn)" in calibration.selection_reason
+    assert "(10 orientations held out in turn)" in calibration.selection_reason
 
 
 def test_six_faces_twice_are_judged_by_single_poses(tmp_path: Path) -> None:
-    """No orientation can be spared of six; each face was taken twice."""
+    """No orientation of six can be held out; each face was taken twice."""
     faces = directions(6)
     calibration = calibrated(write_unit(tmp_path / "U", log(np.concatenate([faces, faces]))))
     assert calibration.selection_reason.startswith("bias and scale factors: held-out error")
     assert (
-        "12 single poses, alike ones staying in, left out in turn" in calibration.selection_reason
+        "12 single poses, those of equal orientation kept, held out in turn"
+        in calibration.selection_reason
     )
 
 
 def test_six_faces_once_determine_six_constants_and_nothing_checks_them(tmp_path: Path) -> None:
     calibration = calibrated(write_unit(tmp_path / "U", log(directions(6))))
     assert calibration.selection_reason.startswith(
-        "bias and scale factors: no pose can be spared to check on"
+        "bias and scale factors: the fit needs every pose, so none is held out"
     )
     assert calibration.recording is not None
     assert calibration.recording.held_out_g is None
@@ -261,12 +262,12 @@ REFUSED = {
     "too-few": (
         log(directions(3)),
         {},
-        "3 poses in 3 orientations; expected 4 different orientations at least, 9 for all",
+        "3 poses in 3 orientations; expected at least 4 different orientations, 9 for all",
     ),
     "coplanar": (
         log(np.array([[np.cos(t), np.sin(t), 0.0] for t in np.arange(0, 6.2, 0.5)])),
         {},
-        "poses, which lie near one plane, leave ",
+        "poses lie near one plane ",
     ),
     "m/s^2-for-g": (
         log(directions(12)),
@@ -279,7 +280,7 @@ REFUSED = {
             "recording": WITH_GYRO.replace('"ax"', '"-ax"'),
             "header": "t,ax,ay,az,wx,wy,wz",
         },
-        "the readings turn with the gyro as x, y, z = -x, y, z would (correlation 1.00; ",
+        "the readings agree with the gyro if x, y, z are -x, y, z (correlation 1.00; ",
     ),
     "time-back": (BACK, {}, "line 902: time runs back by 4.98 s; "),
     "coarse-clock": (COARSE, {}, "rows repeat the time of the row before"),
@@ -305,7 +306,7 @@ REFUSED = {
     "all-moving": (
         log(directions(12), 0.4),
         {},
-        "m/s^2: it is not held still; expected poses of 2 s at least",
+        "m/s^2: it is not held still; expected poses of at least 2 s",
     ),
     "adc-too-narrow": (
         log(directions(12)),
@@ -334,7 +335,7 @@ def test_quadratic_terms_that_cannot_be_scored_do_not_end_in_a_fault(tmp_path: P
     poses = random / np.linalg.norm(random, axis=1, keepdims=True)
     folder = write_unit(tmp_path / "U", log(poses), more='[fit]\nterms = "quadratic"\n')
     told = calibrated(folder).selection_reason
-    assert "nine constants and squares: no pose can be spared to check on" in told
+    assert "nine constants and squares: the fit needs every pose, so none is held out" in told
 
 
 def test_a_stray_quotation_mark_is_refused_with_its_line(tmp_path: Path) -> None:

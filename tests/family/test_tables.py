@@ -193,7 +193,7 @@ def test_full_turns_are_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("azimuth_error", "told"),
     [
-        (0.0, "azimuth does not matter"),
+        (0.0, "the residuals do not depend on azimuth"),
         (60.0, "check (b): the table's plane is out of level by 5"),
     ],
 )
@@ -237,18 +237,18 @@ REFUSED = {
     "left-handed": (
         GOOD * [1, 1, -1, 1, 1],
         AIR,
-        "the outputs look x along -x, y along +y, z along +z of the table; expected x along x",
+        "the sensing axes lie x along -x, y along +y, z along +z of the table; expected x along x",
     ),
     "exchanged": (
         GOOD[:, [0, 1, 3, 2, 4]],
         AIR,
-        "the outputs look x along +y, y along +x, z along +z of the table",
+        "the sensing axes lie x along +y, y along +x, z along +z of the table",
     ),
-    "too-few": (GOOD[:5], AIR, "5 poses with angles; expected 6 at least"),
+    "too-few": (GOOD[:5], AIR, "5 poses with angles; expected at least 6"),
     "one-angle-only": (
         rows_of(np.stack([np.zeros(12), np.radians(np.arange(0.0, 360.0, 30.0))], axis=1)),
         AIR,
-        "leave constants open (condition number",
+        "do not determine all constants (condition number",
     ),
 }
 
@@ -294,7 +294,7 @@ def test_angles_at_several_temperatures_end_in_c(tmp_path: Path) -> None:
     delivery = deliver(folder)
     calibration = delivery.calibration
     assert calibration.range_degc == (-20.0, 60.0)
-    assert "each pose and 3 temperatures left out in turn" in calibration.selection_reason
+    assert "each pose and 3 temperatures held out in turn" in calibration.selection_reason
     assert calibration.shape.order == 1
     d = np.array([-40.0, -10.0, 15.0, 40.0])[:, None]
     found = calibration.thermal.constants_at(20.0 + d[:, 0])
@@ -326,7 +326,7 @@ def test_quadratic_terms_of_too_few_poses_are_refused_not_a_fault(tmp_path: Path
         tmp_path / "U", GOOD[:22:3][:7], AIR, header=HEADER, more='[fit]\nterms = "quadratic"\n'
     )
     with pytest.raises(
-        RefusedError, match=r'leave constants open; .* leave out terms = "quadratic"'
+        RefusedError, match=r'do not determine all constants; .* remove terms = "quadratic"'
     ):
         calibrated(folder)
 
@@ -349,8 +349,9 @@ def test_one_pose_that_all_hangs_on_is_told_by_what_is_left_without_it(tmp_path:
     with pytest.raises(RefusedError) as refusal:
         calibrated(folder)
     told = re.search(
-        r"the 6 poses leave constants open when some are left out \(condition number (\S+)\); "
-        "expected 1000 at most, with each pose left out in turn; add poses over both angles",
+        r"the 6 poses do not determine all constants when some are held out "
+        r"\(condition number (\S+)\); "
+        "expected at most 1000, with each pose held out in turn; add poses over both angles",
         str(refusal.value),
     )
     assert told is not None

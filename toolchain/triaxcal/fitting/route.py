@@ -55,8 +55,8 @@ def calibrate_recording(
         measurements, calibration = calibrate_poses(unit, layout, samples, known)
     recording = calibration.recording
     assert recording is not None
-    told = () if pair is None else pair.findings
-    recording = replace(recording, findings=(*recording.findings, *told))
+    of_pair = () if pair is None else pair.findings
+    recording = replace(recording, findings=(*recording.findings, *of_pair))
     return unit, measurements, replace(calibration, recording=recording, pair=pair)
 
 
@@ -90,7 +90,7 @@ def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Sample
 
 
 def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) -> None:
-    """P1 (13) at the poses; the compiled C is asked again afterwards."""
+    """P1 (13) at the poses; the compiled C is checked again afterwards."""
     recording = calibration.recording
     if recording is None:
         return
@@ -108,6 +108,6 @@ def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) 
         f"| |a| - g | = {abs(errors[worst]) * 1e3:.4g} mg in pose {pose.number}, rms over "
         f"the poses {recording.rms_g * 1e3:.3g} mg",
         expected=f"at most {limits[worst] * 1e3:g} mg ({key})",
-        remedy="look at that pose with `triaxcal poses`; if it is sound, state the limit that "
+        remedy="check that pose with `triaxcal poses`; if it is good, state the limit that "
         "this sensor keeps",
     )

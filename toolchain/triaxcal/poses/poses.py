@@ -229,7 +229,7 @@ def _no_poses(
     return RefusedError(
         samples.source,
         f"no pose found: the longest still stretch has {longest:.3g} s{first}",
-        expected=f"poses of {layout.still_s:g} s at least",
+        expected=f"poses of at least {layout.still_s:g} s",
         remedy=_wrong_clock(samples, layout)
         or "hold each pose longer, or lower [recording] still_s; "
         "`triaxcal poses` shows what was found",

@@ -128,7 +128,7 @@ def _refuse_drift(source: str, cluster: list[Dwell]) -> None:
 
 
 def check_position_dwells(measurements: MeasurementSet) -> tuple[Dwell, ...]:
-    """Dwells in check positions, in the order of the file; each stands by itself."""
+    """Dwells in check positions, in the order of the file; each alone."""
     return tuple(d for d in measurements.dwells if d.position in CHECK_POSITIONS)
 
 

@@ -1,13 +1,13 @@
 """Poses that the others contradict: externally studentised residuals.
 
-With e the residual of pose k in the fit and d its error when it is left out, e.d is what the
+With e the residual of pose k in the fit and d its held-out error, e.d is what the
 squares of the fit lose without it (exactly for least squares). Of n poses of c components and p
 constants, pose k alone being good,
 
     F = (e.d / c) / ((sum e^2 - e.d) / (c (n - 1) - p))
 
-follows Fisher's F with c and c (n - 1) - p degrees of freedom. A pose is told when its chance,
-times the number of poses that were looked at (Bonferroni), is below `CHANCE`.
+follows Fisher's F with c and c (n - 1) - p degrees of freedom. A pose is reported when its chance,
+times the number of poses that were tested (Bonferroni), is below `CHANCE`.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ import numpy as np
 from triaxcal.model.types import FloatArray
 
 CHANCE = 1e-3
-"""With which a sound recording has a pose told."""
+"""Probability that a pose of a good recording is reported."""
 _NEVER = 5.0
 """An F below this has a chance above `CHANCE` with up to three components: chi2(3) / 3 is 5.4."""
 _MOST_TERMS = 10_000
 """Of the continued fraction: about the square root of the degrees of freedom are needed."""
 _ALIKE = 0.9
-"""Of the largest loss: poses that cannot be told from the worst, as opposite faces."""
+"""Share of the largest loss: poses as suspect as the worst, such as the opposite face."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Outlier:
     Attributes
     ----------
     indices : tuple of int
-        The worst first; more than one where the poses cannot tell which it is.
+        The worst first; more than one if the poses do not show which it is.
     chance : float
-        With which a sound recording has as bad a pose.
+        Probability that a good recording has as bad a pose.
     others : float
-        Rms residual a component without it, in the residuals' unit.
+        Rms residual of a component without it, in the residuals' unit.
     """
 
     indices: tuple[int, ...]
@@ -50,19 +50,19 @@ class Outlier:
 
 
 def left_out_residuals(own: FloatArray, jacobian: FloatArray) -> FloatArray:
-    """Residuals (n,) of least squares with each row of the Jacobian (n, p) left out in turn."""
+    """Residuals (n,) of least squares with each row of the Jacobian (n, p) held out in turn."""
     leverage = (np.linalg.qr(jacobian)[0] ** 2).sum(axis=1)
     result: FloatArray = own / np.maximum(1.0 - leverage, 1e-9)
     return result
 
 
 def worst_outlier(own: FloatArray, left_out: FloatArray, parameters: int) -> Outlier | None:
-    """The pose that fits worst, when that is no chance.
+    """The pose that fits worst, if it does so significantly.
 
     Parameters
     ----------
     own, left_out : arrays, shape (n, c)
-        Residuals in the fit of all poses, and with each pose left out in turn.
+        Residuals in the fit of all poses, and with each pose held out in turn.
     parameters : int
         Constants of the fit.
     """
@@ -72,7 +72,7 @@ def worst_outlier(own: FloatArray, left_out: FloatArray, parameters: int) -> Out
         return None
     loss = np.maximum((own * left_out).sum(axis=1), 0.0)
     total = float((own**2).sum())
-    # Of residuals that are all rounding nothing is left; the tiniest part stands for it.
+    # Residuals that are only rounding would leave 0: the smallest share is kept.
     rest = np.maximum(total - loss, 1e-24 * total)
     worst = int(loss.argmax())
     if not loss[worst] > 0.0:

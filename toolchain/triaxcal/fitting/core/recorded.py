@@ -101,5 +101,5 @@ class RecordingFit:
 
     @property
     def checked(self) -> bool:
-        """Whether anything but the fitted constants themselves speaks for them."""
+        """Whether anything but the fitted constants themselves checks them."""
         return self.dof > 0

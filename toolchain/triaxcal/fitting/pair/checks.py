@@ -49,19 +49,19 @@ def refuse_other_readings(
                 f"{source}, column {name}",
                 f"the readings swing as {expected} turned by {turned:+.0f} deg",
                 expected=f"{expected}, within {TURNED_MAX_DEG:g} deg",
-                remedy="look at the order of the columns, at their signs, and at the head's zero: "
+                remedy="check the order of the columns, their signs, and the head's zero: "
                 "at theta = 0 A reads -1 g, at 90 deg B reads +1 g",
             )
 
 
 def doubtful_position(residual_g2: FloatArray, H: FloatArray) -> str:
-    """The position that the others contradict, in words; "" where there is none."""
+    """The position that the others contradict, in words; "" if there is none."""
     left_out = left_out_residuals(residual_g2, H)
     found = worst_outlier(residual_g2[:, None], left_out[:, None], H.shape[1])
     if found is None:
         return ""
     k = found.indices[0]
     return (
-        f"position {k + 1} is {abs(float(left_out[k])):.2g} g^2 in Z from what the others say, "
-        f"they fit within {found.others:.2g}: look at its row"
+        f"position {k + 1} differs by {abs(float(left_out[k])):.2g} g^2 in Z from the fit of the "
+        f"others, whose residuals are {found.others:.2g} rms: check its row"
     )

@@ -147,12 +147,12 @@ def condition_number(H: FloatArray) -> float:
 
 
 def refuse_positions(source: str, theta_rad: FloatArray, gravity_g: float) -> None:
-    """Refuse too few positions, or positions that leave a coefficient open."""
+    """Refuse too few positions, or positions that do not determine a coefficient."""
     if len(theta_rad) < len(NAMES) + 2:
         raise RefusedError(
             source,
             f"{len(theta_rad)} positions",
-            expected=f"{len(NAMES) + 2} at least for {len(NAMES)} coefficients; the paper has 28",
+            expected=f"at least {len(NAMES) + 2} for {len(NAMES)} coefficients; the paper has 28",
             remedy="measure more, as 28 positions from 5 deg in steps of 13 deg",
         )
     condition = condition_number(design(theta_rad, gravity_g))
@@ -161,7 +161,7 @@ def refuse_positions(source: str, theta_rad: FloatArray, gravity_g: float) -> No
         raise RefusedError(
             source,
             f"the angles, {np.degrees(theta_rad.min()):.4g} to {np.degrees(theta_rad.max()):.4g} "
-            f"deg{turned}, leave coefficients open (condition number {condition:.3g})",
+            f"deg{turned}, do not determine all coefficients (condition number {condition:.3g})",
             expected=f"at most {CONDITION_MAX:g}; 28 positions from 5 deg by 13 deg have 2.4",
             remedy="spread the positions over the full turn",
         )
@@ -196,7 +196,7 @@ def stated_pair(unit: UnitDescription, folder: Path) -> PairTerms | None:
 
 
 def pair_terms(file: str, fit: PairFit, axes: tuple[int, int]) -> PairTerms:
-    """The coefficients of a fit as quadratic terms, with what is told of them."""
+    """The coefficients of a fit as quadratic terms, with findings about them."""
     kip_a, kip_b = (float(v) for v in fit.values[4:6])
     Q = terms_of_pair(kip_a, kip_b, axes).quadratic_per_g
     assert Q is not None
@@ -204,17 +204,17 @@ def pair_terms(file: str, fit: PairFit, axes: tuple[int, int]) -> PairTerms:
     slopes = [terms_of_pair(*one, axes).quadratic_per_g for one in ((1, 0), (0, 1))]
     J = np.stack([np.zeros(18) if s is None else s.ravel() for s in slopes], axis=1)
     first, second = ("xyz"[k] for k in axes)
-    told = (
-        f"cross-coupling of {file} is taken off: KipA {kip_a:.3g} (sd {fit.sd[4]:.1g}), "
+    subtracted = (
+        f"cross-coupling of {file} is subtracted: KipA {kip_a:.3g} (sd {fit.sd[4]:.1g}), "
         f"KipB {kip_b:.3g} (sd {fit.sd[5]:.1g}) g/g^2, A along {first} and B along {second}"
     )
     covariance = (J @ fit.covariance[4:6, 4:6] @ J.T).astype(np.float64)
-    findings = (told, *_insignificant(file, fit))
+    findings = (subtracted, *_insignificant(file, fit))
     return PairTerms(Q, covariance, len(fit.residual_g2) - len(NAMES), findings)
 
 
 def _insignificant(file: str, fit: PairFit) -> list[str]:
-    """Tells coefficients that the pair does not tell from zero."""
+    """Findings about coefficients that are not significantly different from zero."""
     found = [NAMES[k] for k in (4, 5) if abs(fit.values[k]) < SIGNIFICANT_SD * fit.sd[k]]
     if len(found) == 2:
         advice = "leave [quadratic] cross_coupling out, or measure the pair longer"

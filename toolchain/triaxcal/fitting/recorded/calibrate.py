@@ -46,7 +46,7 @@ from triaxcal.readings.samples import Samples
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import RecordingLayout
 
-BEYOND_1_G = "quadratic terms were seen at 1 g; beyond it they grow with the square, unchecked"
+BEYOND_1_G = "quadratic terms are measured at 1 g; above it they grow with the square, unchecked"
 
 
 def calibrate_poses(
@@ -76,11 +76,11 @@ def calibrate_poses(
     rows = [judge(trial, data, climate, left_out) for trial in trials]
     turns = _turns(orientations, temperatures, len(halves))
     if unscored(rows):
-        # Single poses, not half-cycles, are spared here: nothing could judge a term in dT/dt.
+        # Single poses, not half-cycles, are held out here: nothing could judge a term in dT/dt.
         halves, trials = [], [trial for trial in trials if not trial.rate]
         left_out = folds([[k] for k in range(len(temps))], temperatures, len(temps))
         rows = [judge(trial, data, climate, left_out) for trial in trials]
-        turns = f"{len(temps)} single poses, alike ones staying in,"
+        turns = f"{len(temps)} single poses, those of equal orientation kept,"
     if not any(row.able for row in rows):
         largest = max(rows, key=lambda row: -row.trial.parameters)
         refuse_unseen(poses, largest.fit.condition, largest.fit.unseen())
@@ -171,8 +171,8 @@ def _models(unit: UnitDescription) -> tuple[ScalarModel, ...]:
 
 def _turns(orientations: list[list[int]], temperatures: list[list[int]], halves: int) -> str:
     inner = max(len(temperatures) - 2, 0) if len(temperatures) >= 4 else 0
-    bundles = f" in {TURNS_MAX} bundles" if len(orientations) > TURNS_MAX else ""
-    words = f"{len(orientations)} orientations{bundles}"
+    groups = f" in {TURNS_MAX} groups" if len(orientations) > TURNS_MAX else ""
+    words = f"{len(orientations)} orientations{groups}"
     words += f" and {inner} temperatures" if inner else ""
     return words + (f" and {halves} half-cycles" if halves else "")
 
@@ -207,12 +207,13 @@ def _outlier(judge: Judged, poses: PoseSet, loss: str) -> list[str]:
     worst = found.indices[0]
     numbers = " or ".join(f"pose {poses.poses[k].number}" for k in found.indices[:4])
     error = left_out[worst] / fit.data.weight[worst] * 1e3
-    remedy = 'take it out, or set [fit] loss = "huber"' if loss == "linear" else "or take it out"
-    told = (
-        f"{numbers} (line {poses.poses[worst].line}) stands out: |a| is {error:+.3g} mg off by the "
-        f"other poses, which are within {found.others * 1e3:.2g} mg rms; look at it, {remedy}"
+    remedy = 'remove it, or set [fit] loss = "huber"' if loss == "linear" else "or remove it"
+    finding = (
+        f"{numbers} (line {poses.poses[worst].line}) is an outlier: |a| differs by {error:+.3g} mg "
+        f"from the fit of the other poses, whose residuals are {found.others * 1e3:.2g} mg rms; "
+        f"check it, {remedy}"
     )
-    return [told]
+    return [finding]
 
 
 def pose_dwells(

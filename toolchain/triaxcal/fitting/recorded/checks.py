@@ -16,11 +16,11 @@ from triaxcal.readings.spool import SAMPLED
 from triaxcal.unit.recording import SAMPLES, RecordingLayout
 
 CONDITION_MAX = 100.0
-"""Of the scaled Jacobian: beyond it a hundredth of a constant's effect tells it from the others."""
+"""Of the scaled Jacobian: beyond it less than a hundredth of a constant's effect is its own."""
 _PLANE = 0.02
 """Rms distance of the poses from a plane, of 1 g: a bias across it has 50 times their noise."""
 _CROWD = 0.6
-"""Of the poses in one orientation: a crowd that is told."""
+"""Share of the poses in one orientation from which on it is reported."""
 _HANDED_MIN = 0.35
 """Correlation of the movement with the gyro that can decide: logs turned by hand have about 0.5."""
 _MOVING_MIN = 50
@@ -29,12 +29,13 @@ _COUNTS_MIN = 50.0
 """Length of 1 g in counts: a code of a 50th of 1 g, 20 mg, is coarser than any sensor."""
 _SIZES = {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3}
 _HANDED_UNKNOWN = (
-    "note: |a| is the same with left-handed axes and with all signs turned, so neither can be seen "
-    "here: an axis that points up must read more than its bias, and x, y, z must be right-handed"
+    "note: |a| is the same with left-handed axes and with all signs reversed, so neither is "
+    "detected here: an axis that points up must read more than its bias, and x, y, z must be "
+    "right-handed"
 )
 _SIGN_UNKNOWN = (
-    "note: the axes turn as the gyro says; that all three signs are turned cannot be seen here: an "
-    "axis that points up must read more than its bias"
+    "note: the axes agree with the gyro, but three reversed signs are not detected here: an axis "
+    "that points up must read more than its bias"
 )
 
 
@@ -95,7 +96,7 @@ def turned_columns(layout: RecordingLayout, order: Sequence[int], turned: Sequen
 def refuse_left_handed(samples: Samples, layout: RecordingLayout, centre: FloatArray) -> str:
     """Refuse readings that turn the other way than the gyro says; `centre` is a rough bias, (3,).
 
-    What the recording cannot tell of its axes is returned, in words.
+    What the recording does not show of its axes is returned, in words.
 
     A force fixed in the world, seen from the turning unit, obeys da/dt = a x w. Over slow movement
     both sides correlate for one way of naming and signing the axes: it must be theirs.
@@ -124,10 +125,10 @@ def refuse_left_handed(samples: Samples, layout: RecordingLayout, centre: FloatA
     columns = turned_columns(layout, order, (matrix.sum(axis=1) < 0.0).tolist())
     raise RefusedError(
         samples.source,
-        f"the readings turn with the gyro as x, y, z = {best} would (correlation "
-        f"{scores[best]:.2f}; {own:.2f} as they are)",
+        f"the readings agree with the gyro if x, y, z are {best} (correlation "
+        f"{scores[best]:.2f}; {own:.2f} as given)",
         expected="da/dt = a x w, right-handed axes for both",
-        remedy=f"left-handed axes? then {columns}; if only the gyro is turned, leave it out",
+        remedy=f"left-handed axes? then {columns}; if only the gyro is turned, omit it",
     )
 
 
@@ -208,8 +209,8 @@ def refuse_few(poses: PoseSet, orientations: int, needed: int) -> None:
         poses.source,
         f"{looked} in {orientations} orientation{'s' * (orientations != 1)}"
         + (f" ({refused})" if refused else ""),
-        expected=f"{needed} different orientations at least, 9 for all constants, 12 and more to "
-        "have some left to check on",
+        expected=f"at least {needed} different orientations, 9 for all constants, 12 or more to "
+        "hold some out",
         remedy="add poses that are not alike: six faces, then edges and corners"
         + (
             "; `triaxcal drift` shows one orientation over temperature"
@@ -220,7 +221,7 @@ def refuse_few(poses: PoseSet, orientations: int, needed: int) -> None:
 
 
 def refuse_plane(poses: PoseSet, radius: float) -> None:
-    """Refuse poses in a plane: no sphere is seen by a circle. `radius` is about that of 1 g."""
+    """Refuse poses in a plane: a circle determines no sphere. `radius` is about that of 1 g."""
     centred = poses.readings - poses.readings.mean(axis=0)
     _, singular, directions = np.linalg.svd(centred / radius / np.sqrt(len(centred)))
     if singular[-1] >= _PLANE:
@@ -228,20 +229,21 @@ def refuse_plane(poses: PoseSet, radius: float) -> None:
     normal = AXES[int(np.abs(directions[-1]).argmax())]
     raise RefusedError(
         poses.source,
-        f"the {len(poses.poses)} poses, which lie near one plane, leave U0{normal} and what goes "
-        f"with it open (they are within {np.degrees(singular[-1]):.2g} deg of the plane, rms)",
-        expected=f"{np.degrees(_PLANE):.2g} deg at least",
+        f"the {len(poses.poses)} poses lie near one plane (within "
+        f"{np.degrees(singular[-1]):.2g} deg, rms) and do not determine U0{normal}",
+        expected=f"at least {np.degrees(_PLANE):.2g} deg",
         remedy=f"add poses with {normal} up and down, and some between",
     )
 
 
 def refuse_unseen(poses: PoseSet, condition: float, unseen: str) -> None:
-    """Refuse poses that leave a constant open."""
+    """Refuse poses that do not determine a constant."""
     if condition <= CONDITION_MAX:
         return
     raise RefusedError(
         poses.source,
-        f"the {len(poses.poses)} poses leave {unseen} open (condition number {condition:.3g})",
+        f"the {len(poses.poses)} poses do not determine {unseen} (condition number "
+        f"{condition:.3g})",
         expected=f"a condition number of at most {CONDITION_MAX:g}",
         remedy="add poses with each axis up and down, and some between",
     )

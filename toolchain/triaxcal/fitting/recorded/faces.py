@@ -59,8 +59,8 @@ def _refuse_missing(unit: UnitDescription, layout: RecordingLayout, samples: Sam
             f"{unit.name}/unit.toml, [recording] faces",
             f"no label for {', '.join(unnamed)}",
             expected="six faces, +x, -x, +y, -y, +z and -z",
-            remedy='name the sections in which these axes point up, or leave out faces: "|a| = g" '
-            "alone then serves",
+            remedy="name the sections in which these axes point up, or omit faces: the fit then "
+            'uses "|a| = g" alone',
         )
     present = set(samples.table.labels or ())
     for face in FACES:
@@ -121,5 +121,5 @@ def _refuse_moving(samples: Samples, run: Run, one_g: float) -> None:
         f'section "{samples.label(run[0])}" moves: axis {AXES[axis]} scatters by '
         f"{deviation[axis] / one_g:.2g} g",
         expected=f"at most {_MOVING:g} g while the unit lies on a face",
-        remedy="cut the section to where it lies still",
+        remedy="cut the section to the time at rest",
     )

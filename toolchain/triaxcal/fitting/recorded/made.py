@@ -28,9 +28,8 @@ from triaxcal.unit.recording import RecordingLayout
 
 ESTIMATOR = "|a| = g"
 _UNCHECKED = (
-    "NOT CHECKED: {count} constants from {count} poses fit whatever the poses say; the residuals "
-    "are 0 by themselves, and how well the constants are known is unknown; record more poses, in "
-    "other orientations"
+    "NOT CHECKED: {count} constants fit any {count} poses exactly, so the residuals are 0 and show "
+    "nothing; the uncertainty of the constants is unknown; record more poses, in other orientations"
 )
 
 
@@ -55,8 +54,8 @@ class Made:
         findings = list(self.findings)
         if self.layout.frame == CASE:
             force = force_from_voltage(fit.data.basis @ constants.T, self.poses.readings)
-            rotation, told = case_rotation(self.poses.source, force)
-            findings.append(told)
+            rotation, finding = case_rotation(self.poses.source, force)
+            findings.append(finding)
             constants = turned_constants(constants, rotation)
             quadratic = turned_quadratic(quadratic, rotation)
             patterns = np.array([turned_quadratic(pattern, rotation) for pattern in patterns])

@@ -161,7 +161,7 @@ def fit_scalar(
         theta = _gauss_newton(both, first)
         if theta is not None:
             return _fitted(model, gain_functions, data, theta)
-    # trf takes fewer poses than parameters: the minimum-norm step, told by the condition number.
+    # trf takes fewer poses than parameters: the minimum-norm step; the condition number shows it.
     solve = partial(
         least_squares,
         residual,

@@ -33,8 +33,8 @@ def temperature_findings(unit: UnitDescription, temps_degc: FloatArray | None) -
     if temps_degc is None:
         return [
             (
-                f"no temperature in the recording: the constants are taken as those of T0 = "
-                f"{t0:g} degC, and nothing shows how they change"
+                f"no temperature in the recording: the constants are assumed to be those of T0 = "
+                f"{t0:g} degC, and their change with temperature is unknown"
             )
         ]
     low, high = float(temps_degc.min()), float(temps_degc.max())

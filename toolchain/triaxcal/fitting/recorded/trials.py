@@ -213,7 +213,7 @@ def without_idle_rates(rows: Sequence[Judged], values: int) -> list[Judged]:
 
 
 def beats(errors: FloatArray | None, rival: FloatArray | None) -> bool:
-    """Whether held-out errors are told to be smaller than a rival's on the same values.
+    """Whether held-out errors are significantly smaller than a rival's on the same values.
 
     An rms of n values is known to 1 / sqrt(2 n) of itself (fit.selection), so it must be smaller by
     that much; and the squares, value by value, must differ by two standard errors of their mean, or
@@ -234,13 +234,13 @@ def reason(rows: Sequence[Judged], best: Judged, turns: str, values: int) -> str
     label = best.trial.label
     if best.held_out_g is None:
         return (
-            f"{label}: no pose can be spared to check on, so this is what the poses determine; "
-            "record more, in other orientations"
+            f"{label}: the fit needs every pose, so none is held out and no candidate is compared; "
+            "record more poses, in other orientations"
         )
     scored = [row for row in rows if row.held_out_g is not None]
     text = (
-        f"{label}: held-out error {_mg(best)} over {values} values ({turns} left out in turn), "
-        f"of {len(scored)} candidates the simplest that none is told to beat"
+        f"{label}: held-out error {_mg(best)} over {values} values ({turns} held out in turn), "
+        f"the simplest of {len(scored)} candidates; no other is significantly better"
     )
     top = min(scored, key=lambda row: row.held_out_g or 0.0)
     return text if top is best else f"{text}; {_mg(top)} of {top.trial.label}"

@@ -121,21 +121,21 @@ def _trials(
 
 
 def _open(unit: UnitDescription, poses: PoseSet, rows: Sequence[TableRow]) -> RefusedError:
-    """Why no candidate is scored: the condition number of all poses, or of the turn that fails."""
-    told, expected = "", "more values than constants, with each pose left out in turn"
+    """Why no candidate is scored: the condition number of all poses, or with some held out."""
+    detail, expected = "", "more values than constants, with each pose held out in turn"
     numbers = [(row.open_at, row.fit.condition) for row in rows if row.open_at is not None]
     if numbers:
         found, of_all = min(numbers)
         in_turn = of_all <= CONDITION_MAX
-        told = f"{' when some are left out' * in_turn} (condition number {found:.3g})"
-        expected = f"{CONDITION_MAX:g} at most"
+        detail = f"{' when some are held out' * in_turn} (condition number {found:.3g})"
+        expected = f"at most {CONDITION_MAX:g}"
         if in_turn:
-            expected = f"{LEFT_OUT_MAX:g} at most, with each pose left out in turn"
+            expected = f"at most {LEFT_OUT_MAX:g}, with each pose held out in turn"
     return RefusedError(
         poses.source,
-        f"the {len(poses.poses)} poses leave constants open{told}",
+        f"the {len(poses.poses)} poses do not determine all constants{detail}",
         expected=expected,
-        remedy='add poses over both angles, or leave out terms = "quadratic"'
+        remedy='add poses over both angles, or remove terms = "quadratic"'
         if unit.terms == "quadratic"
         else "add poses over both angles",
     )
@@ -148,8 +148,8 @@ def _choose(rows: Sequence[TableRow], temperatures: list[list[int]]) -> tuple[Ta
     also = f" and {inner} temperatures" if inner else ""
     return best, (
         f"{best.trial.label}, {best.trial.way}: held-out error "
-        f"{(best.held_out_g or 0.0) * 1e3:.3g} mg a component, each pose{also} left out in turn; "
-        f"of {len(rows)} candidates the simplest that none is told to beat"
+        f"{(best.held_out_g or 0.0) * 1e3:.3g} mg a component, each pose{also} held out in turn; "
+        f"the simplest of {len(rows)} candidates; no other is significantly better"
     )
 
 
@@ -180,11 +180,11 @@ def _budget(unit: UnitDescription, angles: Angles, table: FloatArray, best: Tabl
     )
     budget = float(np.sqrt(np.mean(errors**2))) * 1e6
     found = best.fitted_g * 1e6
-    words = "as the table allows" if found <= 2.0 * budget else "more than the table explains"
-    told = (
+    words = "consistent" if found <= 2.0 * budget else "more than the table explains"
+    table_words = (
         f"table: {angle:g} arcsec an angle, {level:g} arcsec of level are {budget:.3g} micro-g rms"
     )
-    return [f"{told}; sqrt(eps) is {found:.3g} micro-g, {words}"]
+    return [f"{table_words}; sqrt(eps) is {found:.3g} micro-g, {words}"]
 
 
 def _calibration(

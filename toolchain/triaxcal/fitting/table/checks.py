@@ -21,25 +21,25 @@ from triaxcal.unit.recording import ANGLE_NAMES, Angles, RecordingLayout
 
 
 def refuse_few_poses(poses: PoseSet) -> None:
-    """Refuse fewer poses than leave some to check on."""
+    """Refuse poses that are too few to hold one out."""
     if len(poses.poses) < 6:
         raise RefusedError(
             poses.source,
             f"{len(poses.poses)} pose{'s' * (len(poses.poses) != 1)} with angles",
-            expected="6 at least: four constants an output, and some to check on",
+            expected="at least 6: four constants for each output, and two to check",
             remedy="measure more positions",
         )
 
 
 def refuse_open(poses: PoseSet, direction: FloatArray) -> None:
-    """Refuse angles that leave a constant open."""
+    """Refuse angles that do not determine a constant."""
     condition = design_condition(direction)
     if condition > CONDITION_MAX:
         raise RefusedError(
             poses.source,
-            f"the angles of the {len(poses.poses)} poses leave constants open (condition number "
-            f"{condition:.3g})",
-            expected=f"{CONDITION_MAX:g} at most",
+            f"the angles of the {len(poses.poses)} poses do not determine all constants (condition "
+            f"number {condition:.3g})",
+            expected=f"at most {CONDITION_MAX:g}",
             remedy="add poses over both angles",
         )
 
@@ -99,7 +99,7 @@ def known_force(
     signs = np.sign(scaled[np.arange(3), along])
     if (along == np.arange(3)).all() and abs(signs.sum()) == 3.0:
         return force * signs[0], float(signs[0])
-    told = ", ".join(
+    found = ", ".join(
         f"{AXES[i]} along {'+' if signs[i] > 0 else '-'}{AXES[along[i]]}" for i in range(3)
     )
     turned = np.zeros((3, 3))
@@ -107,12 +107,12 @@ def known_force(
     handed = "left-handed axes? " if np.linalg.det(turned) < 0.0 else ""
     columns = ""
     if sorted(along.tolist()) == [0, 1, 2]:
-        # The output that looks along x of the table is the first column, and so on.
+        # The output whose axis lies along x of the table is the first column, and so on.
         where = [int(np.flatnonzero(along == k)[0]) for k in range(3)]
         columns = turned_columns(layout, where, [turned[i, along[i]] < 0.0 for i in where])
     raise RefusedError(
         source,
-        f"the outputs look {told} of the table",
+        f"the sensing axes lie {found} of the table",
         expected="x along x, y along y, z along z, of one sign",
         remedy=f"{handed}the angles may be of other axes; if they are right, {columns}"
         if columns
@@ -143,15 +143,15 @@ def outlier_findings(
     seen = angles_from_force(angles.kind, known + sign * left_out[k : k + 1])[0]
     words = [name.replace("_", " ") for name in ANGLE_NAMES[angles.kind][:2]]
     stated = ", ".join(f"{w} {v:.5g}" for w, v in zip(words, np.degrees(table[k, :2]), strict=True))
-    told = ", ".join(f"{w} {v:.5g}" for w, v in zip(words, np.degrees(seen), strict=True))
+    fitted = ", ".join(f"{w} {v:.5g}" for w, v in zip(words, np.degrees(seen), strict=True))
     pose = poses.poses[k]
     rivals = "".join(f" or pose {poses.poses[i].number}" for i in found.indices[1:4])
     text = (
-        f"pose {pose.number}{rivals} contradicts the others: {stated} deg stand there, by the "
-        f"other poses its readings say {told} deg, {away * 1e3:.3g} mg away, where the others "
-        f"are within {found.others * 1e3:.2g} mg rms"
+        f"pose {pose.number}{rivals} contradicts the others: the file has {stated} deg, the "
+        f"fit of the others gives {fitted} deg; the difference is {away * 1e3:.3g} mg, the "
+        f"residuals of the others are {found.others * 1e3:.2g} mg rms"
     )
-    remedy = "look at its angles and readings, correct the row or take it out"
+    remedy = "check its angles and readings, and correct or remove the row"
     temp = unit.t0_degc if pose.temp_degc is None else pose.temp_degc
     limit, key = unit.limits.at(temp, unit.t0_degc)
     if away <= limit:

@@ -20,7 +20,7 @@ from triaxcal.unit.recording import ANGLE_NAMES, Angles
 
 _SAME_RAD = np.radians(0.01)
 _LARGEST_STEP = np.radians(100.0)
-"""A turn with wider steps cannot tell the second harmonic from the first."""
+"""Wider steps cannot separate the second harmonic from the first."""
 _SEEN = 4.0
 """Standard errors: what an azimuth must do to be named."""
 
@@ -79,11 +79,11 @@ def table_findings(
             part = np.abs(other - value) < _SAME_RAD
             turn = full_turn(table[part, k], readings[part])
             if turn is not None:
-                findings.append(_told(turn, name, int(part.sum())))
+                findings.append(_turn_words(turn, name, int(part.sum())))
     return [*findings[:2], *_azimuth(angles, table, force, gravity_g)]
 
 
-def _told(turn: Turn, name: str, count: int) -> str:
+def _turn_words(turn: Turn, name: str, count: int) -> str:
     parts = [
         f"{AXES[i]} mean {turn.mean[i]:.5g}, amplitude {turn.amplitude[i]:.5g}, twice the angle "
         f"{turn.second[i]:.2g}"
@@ -93,7 +93,7 @@ def _told(turn: Turn, name: str, count: int) -> str:
 
 
 def _azimuth(angles: Angles, table: FloatArray, force: FloatArray, gravity_g: float) -> list[str]:
-    """Names what the residuals do with azimuth: nothing, a tilt of the table's plane, or else."""
+    """How the residuals depend on azimuth: not, as with a tilted plane, or otherwise."""
     if table.shape[1] < 3 or np.ptp(table[:, 2]) < np.radians(60.0):
         return []
     residual = force - gravity_g * gravity_direction(angles.kind, table)
@@ -104,14 +104,14 @@ def _azimuth(angles: Angles, table: FloatArray, force: FloatArray, gravity_g: fl
     arcsec = np.degrees(size) * 3600.0
     if size > _SEEN * noise and explained > 0.5:
         tilted = f"the table's plane is out of level by {arcsec:.3g} arcsec; level it"
-        return [f"azimuth matters, check (b): {tilted}"]
+        return [f"the residuals depend on azimuth, check (b): {tilted}"]
     by_angle = _first_harmonic(table[:, 2], residual)
     if by_angle > _SEEN * rest * np.sqrt(2.0 / len(residual)):
         size_mg = by_angle * 1e3
-        where = "look at the angles as computed, then at how the axes are set"
-        told = f"azimuth matters by {size_mg:.3g} mg, and not as a tilt of the plane would"
-        return [f"{told}, checks (a) and (c): {where}"]
-    return ["azimuth does not matter: computation, level and axes pass checks (a), (b), (c)"]
+        where = "check the computation of the angles, then the alignment of the axes"
+        depends = f"the residuals depend on azimuth by {size_mg:.3g} mg, not as a tilt of the plane"
+        return [f"{depends}, checks (a) and (c): {where}"]
+    return ["the residuals do not depend on azimuth; checks (a), (b), (c) passed"]
 
 
 def plane_tilt(

@@ -1,6 +1,6 @@
 """P1 (13): | |a| - g | of the fitted model at the unit's own dwells, and who is to blame.
 
-This is asked before anything is generated: a reading that is wrong is told as such, and not as a
+This is checked before anything is generated: a wrong reading is reported as such, and not as a
 curve that no integer can hold.
 """
 
@@ -56,8 +56,8 @@ def refuse_unacceptable(
         raise RefusedError(
             f"{unit.name}/unit.toml, [thermal] range_degc",
             f"no dwell of {measurements.source} lies in {low:g} to {high:g} degC",
-            expected="one at least, to check the result on",
-            remedy="widen the range, or leave it out",
+            expected="at least one, to check the result",
+            remedy="widen the range, or omit it",
         )
     _refuse_singular_curve(unit, calibration)
     temps = np.array([d.temp_degc for d in dwells])
@@ -137,7 +137,7 @@ def _contradiction(
         f"{blame.axis}",
         expected=limit,
         remedy=(
-            "opposite positions cancel but for the bias, so one of the two is wrong, or noise and "
+            "the mean of opposite positions is the bias, so one of the two is wrong, or noise and "
             "placement are too large for this limit: measure both again"
         ),
     )

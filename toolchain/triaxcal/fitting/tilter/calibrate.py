@@ -77,8 +77,8 @@ def calibrate(
     selection = _select(unit, data, estimators, checks, terms)
     chosen = data.only(estimators.index(selection.estimator))
     found = _calibration(unit, measurements, chosen, selection, range_degc, terms=terms)
-    told = () if pair is None else pair.findings
-    return replace(found, pair=pair, notes=(*contradiction(unit, groups), *told))
+    of_pair = () if pair is None else pair.findings
+    return replace(found, pair=pair, notes=(*contradiction(unit, groups), *of_pair))
 
 
 def _select(
@@ -200,8 +200,8 @@ def _variance(
         of_all = ", sd pooled over the dwells" if readings.pooled else ""
         return readings.variance_v2, (
             f"the dwells' own statistics, sd^2 / count{of_all}; readings scatter over the "
-            f"positions {ratio:.2f} times what they allow (1 is noise alone, more is placement, "
-            "which the passport's budget adds)"
+            f"positions {ratio:.2f} times as much (1 is noise alone; more is placement, which the "
+            "budget in the passport adds)"
         )
     without = [
         d.row

@@ -120,9 +120,9 @@ def refuse_ill_conditioned(where: str, temp_degc: float, constants: FloatArray) 
         return
     cosine = np.abs(rows @ rows.T) - np.eye(3)
     i, j = np.unravel_index(np.argmax(cosine), cosine.shape)
-    alike = f"outputs U{AXES[i]} and U{AXES[j]} look alike"
+    alike = f"outputs U{AXES[i]} and U{AXES[j]} respond alike"
     if cosine[i, j] < 0.99:
-        alike = "the three outputs look along one plane"
+        alike = "the three sensing axes lie in one plane"
     raise RefusedError(
         where,
         f"K {at} has condition number {condition:.3g}: {alike}",

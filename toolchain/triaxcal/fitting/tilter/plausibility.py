@@ -46,7 +46,7 @@ Exchange = tuple[int, int]
 def refuse_mistaken_units(measurements: MeasurementSet) -> None:
     """Refuse rows whose readings are about a thousand times those of the others, or a thousandth.
 
-    The length of (Ux, Uy, Uz) is of one size in every position; the median tells which. Within a
+    The length of (Ux, Uy, Uz) is of one size in every position; the median gives it. Within a
     factor of ten of a thousand is near enough: nothing but a mistaken unit is in that window.
 
     Raises

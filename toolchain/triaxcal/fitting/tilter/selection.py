@@ -1,16 +1,16 @@
-"""Choice of thermal function and estimator by error on readings that the fit has not seen.
+"""Choice of thermal function and estimator by held-out error.
 
-Held out are (a) each calibration temperature but the lowest and highest, in turn: the force in its
-six positions, computed with curves fitted without it, against the force known there, three
-components a dwell; and (b) the check dwells: |a| - g. The score is the rms of all these values, in
-g. Every candidate is scored on the same values: one that needs all temperatures is fitted, for (a),
-with the order or knot less that the remaining ones determine. (a) needs four temperatures: three
+Two kinds of readings are held out. (a) Each calibration temperature but the lowest and highest, in
+turn: the force in its six positions, computed with curves fitted without it, is compared with the
+known force, three components a dwell. (b) The check dwells: |a| - g. The score is the rms of all
+these values, in g. Every candidate is scored on the same values: for (a), one that needs all
+temperatures is fitted with an order or a knot less. (a) needs four temperatures, because three
 must remain to show a curvature.
 
-An rms of n values is itself known to 1 / sqrt(2 n) of it, one standard error. Candidates within
-that of the best are not told apart by the data: of these the one with the fewest parameters is
-taken, then the estimator in the order of `PREFERENCE`, then the better score. The residual of the
-fit is shown and never decides: it always falls with the number of parameters.
+An rms of n values has a relative standard error of 1 / sqrt(2 n). Candidates within one standard
+error of the best do not differ significantly: the one of them with the fewest parameters is taken,
+then the estimator in the order of `PREFERENCE`, then the better score. The residual of the fit is
+shown and never decides: it always falls with the number of parameters.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell
 
 PREFERENCE = ("least-squares", "equation-10", "half-sum")
-"""Estimators, the one taken first where the data do not tell them apart."""
+"""Estimators, in the order of preference when they do not differ significantly."""
 
 
 def select(
@@ -142,14 +142,14 @@ def _reason(rows: list[_Row], best: _Row, folds: int, checks: int, temperatures:
             f"nothing can be held out ({temperatures} temperature{'s' * (temperatures != 1)}, no "
             "check dwells among them), so this is the simplest that the data determine exactly"
         )
-    held = [f"{folds} temperatures left out in turn"] if folds else []
+    held = [f"{folds} temperatures held out in turn"] if folds else []
     held += [f"{checks} check dwells"] if checks else []
     own = f"held-out error {_micro(best)} over {values} values ({', '.join(held)})"
     if len(rows) == 1:
-        return f"{own}, compared with nothing"
+        return f"{own}, the only candidate"
     resolution = 100.0 / np.sqrt(2.0 * values)
     text = (
-        f"{own}, of {len(rows)} candidates the simplest within one standard error "
+        f"{own}, the simplest of {len(rows)} candidates within one standard error "
         f"({resolution:.1f} %) of the best"
     )
     top = min(rows, key=lambda r: r.held_out_g or 0.0)
