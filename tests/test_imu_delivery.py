@@ -195,7 +195,7 @@ def test_what_is_written_and_said(ran: Ran) -> None:
     for name in (*build.files, *map(sha256_of, build.files.values())):
         assert name in page
     assert f"≤ {accel:.3f} LSB" in page
-    assert f"carried along ≤ {gyro:.3f} LSB" in page
+    assert f"carried over from the accelerometer ≤ {gyro:.3f} LSB" in page
     assert "not run on this delivery (triaxcal verify)" in page
     assert stated["gyro"]["with_accelerometer_lsb"] == list(build.rate_bound_lsb)
     header = (ran.folder / "triax_calib.h").read_text(encoding="utf-8")

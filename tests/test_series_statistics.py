@@ -117,6 +117,7 @@ def test_the_terminal_names_what_stands_out() -> None:
         "page            build/series.html",
     ]
     assert text.splitlines()[3].startswith(
-        "drift           1 run(s) differ from the one before on their rig, most R-1 2026-01-04: "
+        "drift           1 run(s) differ significantly from the run before on the same rig; "
+        "the largest: R-1 2026-01-04, "
         "placement, y pair seen by y by +"
     )

@@ -27,7 +27,7 @@ def test_poses_are_listed_with_the_reasons_of_refusals(tmp_path: Path) -> None:
     output = run("poses", str(folder), "--picture", str(tmp_path / "p.svg"))
     assert "threshold, times the floor" in output
     assert "s still, needs 2.0" in output
-    assert output.rstrip().endswith("11 poses; 1 still stretches refused")
+    assert output.rstrip().endswith("11 poses; 1 stretches at rest refused")
     assert (tmp_path / "p.svg").read_text().startswith("<svg")
 
 
@@ -39,7 +39,7 @@ def test_labelled_faces_are_listed_without_a_clock(tmp_path: Path) -> None:
     assert [line.split()[0::8] for line in output.splitlines()[1:7]] == [
         [str(k + 1), label] for k, label in enumerate(LABELS)
     ]
-    assert output.rstrip().endswith("6 poses; 0 still stretches refused")
+    assert output.rstrip().endswith("6 poses; 0 stretches at rest refused")
     assert (tmp_path / "p.svg").read_text().startswith("<svg")
     folder = write_unit(tmp_path / "V", labelled(labels=tuple("abcdef")), f"{columns}\n{FACES}")
     with pytest.raises(RefusedError, match="no section is a pose; sections found: a, b, c, d"):

@@ -79,5 +79,7 @@ def test_a_certificate_of_what_nothing_checks_is_refused(tmp_path: Path) -> None
     folder = write_unit(tmp_path / "U", log(directions(6)), more=CERTIFICATE)
     result = CliRunner().invoke(main, ["calib", str(folder), "--build", str(tmp_path / "b")])
     assert isinstance(result.exception, RefusedError)
-    assert "a certificate of constants that nothing checks" in str(result.exception)
+    assert "the constants are not checked: there are as many constants as poses" in str(
+        result.exception
+    )
     assert not (tmp_path / "b").exists()

@@ -92,7 +92,7 @@ def test_a_unit_without_c_is_refused(unit: Path, tmp_path: Path) -> None:
     (other / "unit.toml").write_text(text[: text.index("[device]")], encoding="utf-8")
     done = CliRunner().invoke(main, ["verify", str(other), "--build", str(tmp_path / "build")])
     assert str(done.exception) == (
-        f"{other / 'unit.toml'}: has no [device], and so the unit gets no C; expected [device] "
+        f"{other / 'unit.toml'}: has no [device], so no C is generated; expected [device] "
         "with accel_bits, accel_full_scale_g, gyro_bits, gyro_full_scale_deg_per_s, "
         "degc_per_code, range_degc; add it: docs/how-to/imu.md"
     )

@@ -44,12 +44,12 @@ def certificate_xml(p: Passport, details: CertificateDetails) -> bytes:
     Raises
     ------
     RefusedError
-        When nothing speaks for the constants but themselves.
+        When there are as many constants as poses, so that nothing checks them.
     """
     if not p.checked:
         raise RefusedError(
             f"{p.delivery.unit.name}/unit.toml, [certificate]",
-            "a certificate of constants that nothing checks: there are as many as poses",
+            "the constants are not checked: there are as many constants as poses",
             expected="more poses than constants",
             remedy="record more poses, or remove the table",
         )

@@ -130,7 +130,7 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
     if done.off:
         lines += ["", "effects switched off, chi-square of their states in this recording:"]
         for effect in done.off:
-            call = "  SHOWN: switch it on" if effect.shown else ""
+            call = "  SIGNIFICANT: switch it on" if effect.shown else ""
             size = f"{effect.chi_square:.1f} of {effect.states}"
             lines.append(f"  {effect.name:24s} {size:>14s}{call}")
             lines += [" " * 8 + effect.hint] if effect.hint else []
@@ -140,14 +140,14 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
 
 
 def plan_summary(done: DynamicUnit) -> str:
-    """What a planned motion lets see, for the screen."""
+    """What a planned motion determines, for the screen."""
     result, layout = done.result, done.result.layout
     span = result.survey.windows.start_s[[0, -1]]
     minutes, states = (span[1] - span[0]) / 60, 3 + len(layout)
     lines = [
         f"plan            {done.unit.name}: {minutes:.1f} min, {states} states",
         "",
-        "standard deviations that a recording of it will give, nothing else being wrong",
+        "expected standard deviations from a recording of this motion, if the model is right",
     ]
     for block in layout.blocks:
         lines.append(block.title)
@@ -161,11 +161,11 @@ def _seen_lines(seen: Observability) -> list[str]:
     """What the motion did not separate."""
     lines: list[str] = []
     if seen.unseen:
-        lines += ["", "not seen by this motion (their values are the prior's guess):"]
+        lines += ["", "not observable in this motion (their values are those of the prior):"]
         lines += ["  " + " with ".join(names) for names in seen.unseen]
     for weak in seen.weak:
-        lines += ["", "known badly:", f"  {weak_words(weak)}"]
+        lines += ["", "poorly determined:", f"  {weak_words(weak)}"]
     if seen.together:
-        lines += ["", "known only together:"]
+        lines += ["", "determined only in combination:"]
         lines += [f"  {a} and {b}, correlation {c:+.4f}" for a, b, c in seen.together]
     return lines

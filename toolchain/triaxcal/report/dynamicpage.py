@@ -31,8 +31,8 @@ def verdict(result: DynamicResult) -> str:
     ratio = last.chi_square / last.freedom
     if ratio > MOST_RATIO:
         return (
-            f"innovations {math.sqrt(ratio):.2f} times the stated noise: an effect that is not "
-            "switched on, or more noise than stated"
+            f"innovations {math.sqrt(ratio):.2f} times the stated noise: an effect is missing, or "
+            "there is more noise than stated"
         )
     if ratio < LEAST_RATIO:
         return f"innovations {math.sqrt(ratio):.2f} times the stated noise: less noise than stated"
@@ -46,11 +46,12 @@ def digits(value: float, sd: float) -> str:
 
 
 def weak_words(weak: Weak) -> str:
-    """One direction that a motion hardly shows, for people."""
+    """One combination that a motion determines poorly, in words."""
     common = " and ".join(weak.names)
     text = (
-        f"{common} in common to {digits(weak.sd_each, weak.sd_each)} {weak.unit} each (sd); "
-        f"every other combination to {digits(weak.sd_next, weak.sd_next)} or better"
+        f"a common change of {common} has a standard deviation of "
+        f"{digits(weak.sd_each, weak.sd_each)} {weak.unit} each; every other combination has "
+        f"{digits(weak.sd_next, weak.sd_next)} {weak.unit} or less"
     )
     return f"{text}: {weak.why}." if weak.why else f"{text}."
 
@@ -113,13 +114,13 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
 
 
 def _badge(made: ImuDelivery) -> tuple[bool, str, str]:
-    """Whether all is well, and the words for it."""
+    """Whether the result is consistent, and the words for it."""
     last = made.done.result.passes[-1]
     words = f"innovations {math.sqrt(last.chi_square / last.freedom):.2f} times the stated noise"
     if not consistent(made.done.result):
         return False, "NOT CONSISTENT", words
     if any(effect.shown for effect in made.done.off):
-        return False, "AN EFFECT IS MISSING", "it shows and is switched off, see below"
+        return False, "AN EFFECT IS MISSING", "significant and switched off, see below"
     return True, "CONSISTENT", words
 
 

@@ -38,7 +38,7 @@ def refuse_no_device(unit: DynamicDescription) -> None:
     if unit.device is None:
         raise RefusedError(
             str(unit.path),
-            "has no [device], and so the unit gets no C",
+            "has no [device], so no C is generated",
             expected="[device] with " + ", ".join(REQUIRED),
             remedy="add it: docs/how-to/imu.md",
         )
@@ -116,7 +116,7 @@ def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
         (
             "Gyro: proven arithmetic error",
             proven_words(build.gyro_bound, build.gyro_check, f"{own} °/h")
-            + f"; with the accelerometer's error carried along ≤ {carried:.3f} LSB = "
+            + f"; with the error carried over from the accelerometer ≤ {carried:.3f} LSB = "
             f"{significant(_deg_per_h(build.gyro, carried), 3)} °/h",
         ),
         (
@@ -129,7 +129,7 @@ def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
             "Both together",
             f"{thousands(build.vectors)} vectors, constants and image: Python = generated C",
         ),
-        ("Not corrected", "; ".join(c.left_out) or "nothing that was estimated"),
+        ("Not corrected", "; ".join(c.left_out) or "nothing: every estimated effect is corrected"),
     ]
     constant = constant_triads(made)
     if constant:

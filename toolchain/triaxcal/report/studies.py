@@ -49,11 +49,11 @@ def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
     blocks.append("\n".join(table(head, rows)))
     if poses.refused:
         reasons = [f"pose {r.number} (line {r.line}): {r.reason}" for r in poses.refused]
-        blocks.append("still, but refused as poses:\n  " + "\n  ".join(reasons))
+        blocks.append("at rest, but refused as poses:\n  " + "\n  ".join(reasons))
     if poses.findings:
         blocks.append("found:\n  " + "\n  ".join(poses.findings))
     count, refused = len(poses.poses), len(poses.refused)
-    blocks.append(f"{count} poses; {refused} still stretches refused")
+    blocks.append(f"{count} poses; {refused} stretches at rest refused")
     return "\n\n".join(blocks)
 
 

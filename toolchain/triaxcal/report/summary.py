@@ -62,7 +62,7 @@ def _head(delivery: Delivery) -> str:
 
 
 def _findings(calibration: Calibration) -> list[str]:
-    """What a recording's poses are worth, and what was found in them."""
+    """How well a recording's poses determine the constants, and what was found in them."""
     recording = calibration.recording
     found = [_entry("found", finding) for finding in calibration.findings]
     if recording is None:
@@ -73,11 +73,11 @@ def _findings(calibration: Calibration) -> list[str]:
 
 
 def _held_out(recording: RecordingFit) -> str:
-    """The held-out error of a recording: |a| at poses that the fit has not seen."""
+    """The held-out error of a recording: |a| at poses outside the fit."""
     if recording.left_out_length_g is None:
-        return _entry("held out", "nothing: the fit needs every pose, so none is left to check it")
+        return _entry("held out", "none: the fit needs every pose, so none is left to check it")
     rms = recording.left_out_length_g * 1e3
-    return _entry("held out", f"|a| - g: {rms:.4f} mg rms at poses that the fit has not seen")
+    return _entry("held out", f"|a| - g: {rms:.4f} mg rms at held-out poses")
 
 
 def _thousands(number: int) -> str:
@@ -150,9 +150,11 @@ def _residuals(delivery: Delivery) -> str:
 
 
 def _uncertainty(made: Passport) -> str:
-    """Expanded uncertainty of the acceleration, what it comes from, and limits it does not keep."""
+    """Expanded uncertainty of the acceleration, its sources, and limits that it exceeds."""
     if not made.checked:
-        unknown = "unknown: as many constants as poses leave no residuals; record more poses"
+        unknown = (
+            "unknown: there are as many constants as poses, so no residuals; record more poses"
+        )
         return _entry("uncertainty", unknown)
     components, length = made.component_budget, made.length_budget
     reached = (

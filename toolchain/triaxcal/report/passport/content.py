@@ -118,7 +118,7 @@ class Passport:
 
     @property
     def unchecked(self) -> tuple[str, ...]:
-        """Limits that no dwell of the working range could be held against."""
+        """Limits without a dwell in the working range to check them."""
         checked = {a.where for a in self.acceptance}
         return tuple(where for where in ("at T0", "over the range") if where not in checked)
 
@@ -130,7 +130,7 @@ class Passport:
 
     @property
     def checked(self) -> bool:
-        """Whether the data say anything of how well the constants are known."""
+        """Whether the data show the uncertainty of the constants."""
         recording = self.delivery.calibration.recording
         return recording is None or recording.checked
 

@@ -84,12 +84,12 @@ def _identity(p: Passport) -> dict[str, Any]:
 
 
 def _left_out(calibration: Calibration) -> list[tuple[str, str]]:
-    """What counts most of a recording."""
+    """The held-out error of a recording."""
     if calibration.recording is None:
         return []
     rms = calibration.recording.left_out_length_g
-    told = "nothing: no pose can be spared" if rms is None else f"|a| − g {g_in_words(rms)} rms"
-    return [("Poses left out", told)]
+    words = "none: the fit needs every pose" if rms is None else f"|a| − g {g_in_words(rms)} rms"
+    return [("Held-out poses", words)]
 
 
 def _findings(p: Passport) -> tuple[str, ...]:
@@ -105,13 +105,13 @@ def _superscript(number: int) -> str:
 def _acceptance(a: Acceptance, *, checked: bool) -> dict[str, Any]:
     factor = significant(a.factor, 2)
     if not checked:
-        text = "the residuals are 0 by themselves: as many constants as poses"
+        text = "not checked: there are as many constants as poses, so the residuals are 0"
     elif a.shown:
-        text = "holds with the whole uncertainty inside the limit"
+        text = "the limit holds, the whole uncertainty included"
     else:
         text = (
-            f"residuals are within the limit, but the interval's end is {factor} times it: "
-            f"{a.cause}; {a.advice}"
+            f"the residuals are within the limit, but residual and uncertainty together reach "
+            f"{factor} times the limit; the main cause is {a.cause}; {a.advice}"
         )
     scale = max(a.limit_g, a.largest_g + a.uncertainty_g)
     return {

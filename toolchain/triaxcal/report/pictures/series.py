@@ -93,7 +93,7 @@ def drift(by_run: Sequence[Run]) -> list[dict[str, Any]]:
                     {
                         "x": round(56 + step * (k + 0.5), 2),
                         "y": round(150 - 136 * r.pattern_arcsec / (top * 1.1), 2),
-                        "told": r.told,
+                        "far": r.told,
                     }
                     for k, r in enumerate(its)
                 ],

@@ -145,5 +145,5 @@ def _run(r: Run) -> dict[str, Any]:
         "worst": r.worst or "nothing to compare with",
         "shift": f"{r.shift:+.3g} {r.of_unit}" if r.worst else "",
         "z": f"{r.z:.1f}" if r.worst else "",
-        "told": r.told,
+        "far": r.told,
     }

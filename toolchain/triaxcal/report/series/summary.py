@@ -7,7 +7,7 @@ from triaxcal.batch.statistics import outliers, quantities, runs
 
 
 def series_summary(series: Series, kept: int, seconds: float, workers: int, where: str) -> str:
-    """Yield, rate, what stands out and where the page is."""
+    """Yield, rate, outliers, drift and where the page is."""
     records = series.records
     total = len(records) + len(series.refused)
     lines = [f"{'series':<16}{total} units: {len(records)} passed, {len(series.refused)} refused"]
@@ -22,13 +22,13 @@ def series_summary(series: Series, kept: int, seconds: float, workers: int, wher
     names = list(dict.fromkeys(o.unit for o in far))
     if names:
         lines.append(f"{'outliers':<16}{', '.join(names)}")
-    told = [r for r in (runs(records) if records else []) if r.told]
-    if told:
-        worst = max(told, key=lambda r: r.z)
+    drifted = [r for r in (runs(records) if records else []) if r.told]
+    if drifted:
+        worst = max(drifted, key=lambda r: r.z)
         lines.append(
-            f"{'drift':<16}{len(told)} run(s) differ from the one before on their rig, most "
-            f"{worst.rig} {worst.date}: {worst.worst} by {worst.shift:+.3g} "
-            f"{worst.of_unit.replace('µ', 'micro-')}"
+            f"{'drift':<16}{len(drifted)} run(s) differ significantly from the run before on the "
+            f"same rig; the largest: {worst.rig} {worst.date}, {worst.worst} by "
+            f"{worst.shift:+.3g} {worst.of_unit.replace('µ', 'micro-')}"
         )
     lines.append(f"{'page':<16}{where}")
     return "\n".join(lines)

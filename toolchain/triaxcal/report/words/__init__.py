@@ -1,1 +1,1 @@
-"""Numbers, temperatures and tables as people read them."""
+"""Numbers, temperatures and tables in words."""

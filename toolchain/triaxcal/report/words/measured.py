@@ -13,13 +13,13 @@ def measured_words(delivery: Delivery) -> str:
     if recording is None:
         temps = ", ".join(degrees(p.temp_degc) for p in calibration.points)
         checks = len(calibration.check_dwells)
-        told = f"; {checks} check dwells" if checks else "; no check dwells"
-        return f"{len(dwells)} dwells: six positions at {temps} degC{told}"
+        of_check = f"{checks} check dwells" if checks else "no check dwells"
+        return f"{len(dwells)} dwells: six positions at {temps} degC; {of_check}"
     refused = len(recording.poses.refused)
     name = recording.poses.source.replace("\\", "/").rpartition("/")[2]
     words = f"{len(dwells)} poses of {name}, {recording.route}"
     if refused:
         first = recording.poses.refused[0]
-        words += f"; {refused} still stretches are no poses (pose {first.number}: {first.reason}"
+        words += f"; {refused} stretches at rest refused (pose {first.number}: {first.reason}"
         words += "; `triaxcal poses` lists all)" if refused > 1 else ")"
     return words

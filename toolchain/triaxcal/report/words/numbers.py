@@ -1,4 +1,4 @@
-"""Numbers as people read them: as many digits as the uncertainty allows, and no more."""
+"""Numbers in words: as many digits as the uncertainty allows, and no more."""
 
 from __future__ import annotations
 
@@ -73,5 +73,5 @@ def thousands(number: int) -> str:
 
 
 def percent(share: float) -> str:
-    """Share of a whole, in whole percent; what is below a half is told apart from nothing."""
+    """Share of a whole, in whole percent; a share below a half is shown as such, not as 0."""
     return "<\u202f1" if 0.0 < share < 0.005 else f"{100 * share:.0f}"
