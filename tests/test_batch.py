@@ -54,7 +54,7 @@ def run(
         make,
         lambda m, orders: run_local(m, orders, jobs),
         sometimes=(),
-        tell=told.append,
+        report=told.append,
     )
     return work, series, told
 
@@ -277,7 +277,7 @@ folder, build = Path(sys.argv[2]), Path(sys.argv[3])
 work = plan_work(folder.iterdir(), build)
 series = run_series(
     work, build, getattr(batch_workers, sys.argv[4]),
-    lambda m, o: run_cluster(client, m, o), sometimes=(), tell=lambda outcome: None,
+    lambda m, o: run_cluster(client, m, o), sometimes=(), report=lambda outcome: None,
 )
 print(sorted(series.entries), series.refused)
 client.close()

@@ -65,7 +65,8 @@ def test_a_combination_that_is_known_badly_is_stated_with_its_sd() -> None:
     assert abs(weak.sd_next - 1.4) < 1e-9
     assert weak_words(weak) == (
         "a common change of D11 and D22 and D33 has a standard deviation of 98 deg/h/g each; every "
-        "other combination has 1.4 deg/h/g or less: with the force along gravity it is a rate about "
-        "the vertical, which only a heading shows; along a force of 1 g the gyros' rates are uncertain by as much. Recording "
+        "other combination has 1.4 deg/h/g or less: with the force along gravity it is a rate "
+        "about the vertical, which only a heading shows; along a force of 1 g the gyros' rates are "
+        "uncertain by as much. Recording "
         'the table\'s angle separates it (block "table-angles").'
     )

@@ -66,19 +66,19 @@ def _two_axes() -> ImuRecording:
 CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
     "no stand-still": (
         _no_still,
-        ("stands still for", "then turns at", "at least 5 s at rest at the start"),
+        ("is at rest for", "then turns at", "at least 5 s at rest at the start"),
     ),
     "starts in an even turn": (
         _turning,
-        ("14.0 s: does not stand still: turns at 30.", "at least 5 s at rest at the start"),
+        ("14.0 s: is not at rest: turns at 30.", "at least 5 s at rest at the start"),
     ),
     "one sample lost in a turn": (
         lambda: _lost(1),
-        ("16.1 s: after a gap the unit does not stand still: turns at 30.", "lose no samples"),
+        ("16.1 s: after a gap the unit is not at rest: turns at 30.", "lose no samples"),
     ),
     "a gap after three seconds": (
         _cut_at_rest,
-        ("0.0 s: stands still for 3.0 s, then the recording ends or has a gap; expected",),
+        ("0.0 s: is at rest for 3.0 s, then the recording ends or has a gap; expected",),
     ),
     "deg/h for deg/s": (
         lambda: _with(rate=_samples().rate / 36000),
@@ -116,7 +116,7 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
         lambda: _with(rate=_samples().rate * [1.0, -1.0, 1.0]),
         ("x, -y, z", "a left-handed triad of gyros"),
     ),
-    "a gap while turning": (_gap, ("20.5 s", "stands still for", "after each gap")),
+    "a gap while turning": (_gap, ("20.5 s", "is at rest for", "after each gap")),
     "saturated": (_saturated, ("gyro x reads exactly", "50 deg/s", "saturated", "more slowly")),
     "an axis never rotated": (
         _two_axes,

@@ -91,8 +91,8 @@ def test_forces_of_reversed_sign_are_diagnosed_where_the_gyros_see_the_earth() -
     force = recording.all().force
     hints = shown(changed(recording, force=-force), sheet(truth))
     assert hints["g-drift"] == (
-        "the Earth turns the other way: forces of reversed sign (at rest the axis that points up "
-        "reads +g), or latitude_deg (north is positive)"
+        "the Earth turns the other way: check the sign of the forces (at rest the axis that points "
+        "up reads +g) and of latitude_deg (north is positive)"
     )
 
 
@@ -100,7 +100,7 @@ def test_forces_a_sample_late_are_diagnosed() -> None:
     truth, recording = aviation()
     force = np.roll(recording.all().force, 1, axis=0)
     hints = shown(changed(recording, force=force), sheet(truth))
-    assert hints["delay"].startswith("+1.00 samples: look at rate_samples and force_samples")
+    assert hints["delay"].startswith("+1.00 samples: check rate_samples and force_samples")
 
 
 def test_what_is_right_gives_no_hint() -> None:

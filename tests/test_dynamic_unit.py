@@ -119,11 +119,14 @@ def test_rows_that_are_doubled_late_or_empty_are_left_out_and_reported(tmp_path:
     mended = [*lines[:10], lines[9], nothing, *lines[10:20], lines[15], *lines[20:]]
     csv.write_text("\n".join(mended), encoding="utf-8")
     found = read_recording(read_dynamic(folder))
-    told = "1 row with the time of the row before left out (1 of them the same in all), the first"
+    told = (
+        "1 row with the time of the row before left out (1 of them identical in all columns), "
+        "the first"
+    )
     assert found.findings == (
         "1 row without all readings left out, the first is line 12",
         f"{told} is line 11",
-        "1 row out of order in time left out, by 0.08 s at most, the first is line 23",
+        "1 row out of order in time left out, by at most 0.08 s, the first is line 23",
     )
     for name in ("time_s", "rate", "force"):
         assert np.array_equal(getattr(found.all(), name), getattr(plain.all(), name))
@@ -131,7 +134,7 @@ def test_rows_that_are_doubled_late_or_empty_are_left_out_and_reported(tmp_path:
     text = text.replace('"rad/s"', '"rad"').replace("instant", "increment")
     text = text.replace('"m/s^2"', '"m/s"')
     (folder / "unit.toml").write_text(text, encoding="utf-8")
-    assert "expected every increment: the sum lacks what is left out" in refused(folder)
+    assert "expected every increment, because the increments are summed" in refused(folder)
 
 
 def test_dynamic_takes_what_recording_takes(tmp_path: Path) -> None:

@@ -241,7 +241,7 @@ def test_a_squareness_that_noise_explains_is_not_counted() -> None:
     # all above it once in 10^7.
     none = [s for s in found if s.sd == 0.0]
     assert none
-    told = re.fullmatch(r".*; below ([\d.]+) arcsec it is not told from noise", none[0].origin)
+    told = re.fullmatch(r".*; below ([\d.]+) arcsec it is within the noise", none[0].origin)
     assert told
     # v = (20 micro-g)^2 / 30, G = 7: sqrt(1.5 v / G sqrt(1/3)) rad is 0.265 arcsec; v has 39 * 29
     # degrees of freedom, which makes 2 % of it, and is written with two digits.

@@ -116,8 +116,8 @@ def test_too_few_positions_and_half_a_turn_are_refused() -> None:
             lambda a, b: (b, a),
             (
                 "p, column a_g: the readings swing as -cos(theta) turned by +90 deg; expected "
-                "-cos(theta), within 15 deg; look at the order of the columns, at their signs, and "
-                "at the head's zero: at theta = 0 A reads -1 g, at 90 deg B reads +1 g"
+                "-cos(theta), within 15 deg; check the order of the columns, their signs, and "
+                "the head's zero: at theta = 0 A reads -1 g, at 90 deg B reads +1 g"
             ),
         ),
         (

@@ -201,7 +201,7 @@ def test_a_clock_that_cannot_be_is_told(tmp_path: Path) -> None:
     rows = log(directions(10))
     rows[:, 0] *= 1000.0
     told = calibrated(write_unit(tmp_path / "C", csv_text(rows, "t,ax,ay,az"))).findings
-    assert any(f.startswith('a sample every 20 s by time_unit = "s": if that') for f in told)
+    assert any(f.startswith('time_unit = "s" gives a sample every 20 s: correct') for f in told)
 
 
 SECTIONS = (

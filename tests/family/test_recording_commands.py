@@ -26,7 +26,7 @@ def test_poses_are_listed_with_the_reasons_of_refusals(tmp_path: Path) -> None:
     folder = write_unit(tmp_path / "U", log(directions(12), hold))
     output = run("poses", str(folder), "--picture", str(tmp_path / "p.svg"))
     assert "threshold, times the floor" in output
-    assert "s still, needs 2.0" in output
+    assert "s at rest, needs 2.0" in output
     assert output.rstrip().endswith("11 poses; 1 stretches at rest refused")
     assert (tmp_path / "p.svg").read_text().startswith("<svg")
 

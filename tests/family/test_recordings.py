@@ -142,7 +142,7 @@ def test_a_short_pose_is_refused_with_its_length(tmp_path: Path) -> None:
     (refused,) = calibration.recording.poses.refused
     assert refused.number == 4
     # The window that shows stillness hides a quarter of a second at either end.
-    assert refused.reason in {f"1.{d} s still, needs 2.0" for d in range(1, 8)}
+    assert refused.reason in {f"1.{d} s at rest, needs 2.0" for d in range(1, 8)}
 
 
 def test_a_clipped_axis_is_named(tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_a_clipped_axis_is_named(tmp_path: Path) -> None:
     calibration = calibrated(write_unit(tmp_path / "U", rows))
     assert calibration.recording is not None
     reasons = {r.number: r.reason for r in calibration.recording.poses.refused}
-    told = "axis z is clipped: it stays at 9.5, the end of what the file shows; "
+    told = "axis z is clipped: it stays at 9.5, the largest or smallest reading of the file; "
     assert reasons == dict.fromkeys((1, 7), told + "measure with a wider range")
 
 

@@ -110,7 +110,7 @@ def test_rows_out_of_order_are_left_out_and_reported(tmp_path: Path) -> None:
     assert np.array_equal(found.part("reading"), np.asarray([[float(f"{v:.9g}") for v in r] for r in
                                                             kept[:, 1:]]))  # fmt: skip
     assert found.findings == (
-        f"{len(late)} rows out of order in time left out, by 0.01 s at most, the first is line 51",
+        f"{len(late)} rows out of order in time left out, by at most 0.01 s, the first is line 51",
     )
     assert len(poses_of(tmp_path / "U").poses) == 12
 
@@ -120,7 +120,7 @@ def test_one_stamp_ahead_does_not_cost_all_rows_after_it(tmp_path: Path) -> None
     rows[100, 0] = 1e6
     found = samples_of(write_unit(tmp_path / "U", rows))
     assert len(found) == len(rows) - 1
-    assert found.findings[0].startswith("1 row out of order in time left out, by 1e+06 s at most")
+    assert found.findings[0].startswith("1 row out of order in time left out, by at most 1e+06 s")
 
 
 @pytest.mark.parametrize(("every", "refused"), [(21, False), (19, True)])

@@ -91,7 +91,7 @@ def test_the_operators_keys(tmp_path):
         terminal.close()
     assert commands() == ["Agree", "Redo"]
     texts = [r["event"]["text"] for r in read_journal(journal).records if r["kind"] == "event"]
-    assert "nothing is offered" in texts
+    assert "no position is offered" in texts
     assert "TP1 has not been accepted at this temperature" in texts
     # The terminal is as before: the other screen left, the cursor shown.
     assert terminal.text.rindex("\x1b[?1049l") > terminal.text.rindex("\x1b[?1049h")
@@ -241,7 +241,7 @@ def test_check_names_the_ids_of_another_dbc(tmp_path):
     frames = under_other_ids(rig_of(setup).advance())
     texts = {f.text: f.good for f in findings(setup, frames, "given", [])}
     assert texts["IDs that are not the rig's: 0x140, 0x141, 0x142, 0x143"]
-    assert not texts["the rig has not said its serial number (RIG_IDENT)"]
+    assert not texts["the rig has not sent its serial number (RIG_IDENT)"]
     assert not texts["211 frames, 0 samples: wrong DBC, layout or rig"]
 
 

@@ -61,7 +61,7 @@ def test_a_session_without_faults(tmp_path, layout):
         ("busoff@82:1:3", "trouble", r"error frames: bus-off"),
         ("twonodes@82:1:4", "trouble", r"another node sends under the rig's IDs"),
         ("clipped@82:1:2", "trouble", r"clipped: 100 samples at the end of the ADC's range"),
-        ("stuck@82:1:2", "trouble", r"stuck: y gives one and the same code"),
+        ("stuck@82:1:2", "trouble", r"stuck: y gives the same code all the time"),
         ("status@82:2:2", "trouble", r"the rig reports status 0x02"),
         ("notemp@82:1:3", "trouble", r"no temperature from the rig"),
         ("creep@66:900:10", "refused", r"TP1: creep of \d+ micro-g with about 10 s on x, retake"),
@@ -132,7 +132,7 @@ def test_a_position_out_of_order_is_offered_and_taken_when_agreed(tmp_path):
     rig.turn_to("TP4")
     events = advance(engine, rig, LEARNED + 60)
     assert texts(events, "offer") == [
-        "found TP4 (+Y up), wanted TP1 (+Z up): agree to take it now, or turn"
+        "found TP4 (+Y up), wanted TP1 (+Z up): accept it (y), or turn"
     ]
     assert view(engine.session).phase == "turn"
     assert "or press y to take TP4 (+Y up) now" in view(engine.session).headline
@@ -171,10 +171,10 @@ def test_what_lay_through_a_change_of_temperature_is_taken_up_anew(tmp_path):
     rig.target_degc = 25.0
     events = advance(engine, rig, LEARNED + 150)
     (text,) = texts(events, "equilibrium")
-    assert text.endswith("degC; TP1 (+Z up) is to be left and taken up anew")
+    assert text.endswith("degC; turn away from TP1 (+Z up) and back")
     assert texts(events, "accepted") == []
     now = view(engine.session)
-    assert now.headline == "TURN AWAY FROM TP1 (+Z up) AND BACK - it went through 5 K"
+    assert now.headline == "TURN AWAY FROM TP1 (+Z up) AND BACK - its temperature changed by 5 K"
     assert (now.phase, now.order) == ("turn", "RESEAT +Z UP")
     rig.turn_to("TP2")
     advance(engine, rig, 6)
@@ -200,7 +200,7 @@ def test_a_redo_supersedes(tmp_path):
     engine, rig = Engine(setup, "test"), rig_of(setup)
     events = advance(engine, rig, LEARNED + 60)
     first = engine.session.accepted[0, "TP1"]
-    assert texts(engine.command(Redo("TP1"), 0), "found") == ["TP1 will be taken again"]
+    assert texts(engine.command(Redo("TP1"), 0), "found") == ["TP1 will be measured again"]
     events = advance(engine, rig, 60)
     second = engine.session.accepted[0, "TP1"]
     assert second.start_ns > first.end_ns
@@ -215,7 +215,7 @@ def test_a_redo_supersedes(tmp_path):
 def test_a_redo_of_nothing_is_refused(tmp_path, position, said):
     engine = Engine(short_setup(tmp_path), "test")
     assert texts(engine.command(Redo(position), 0), "refused") == [said]
-    assert texts(engine.command(Agree(), 0), "refused") == ["nothing is offered"]
+    assert texts(engine.command(Agree(), 0), "refused") == ["no position is offered"]
 
 
 def test_a_temperature_that_moves_between_positions_costs_the_older_ones(tmp_path):

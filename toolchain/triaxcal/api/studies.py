@@ -63,7 +63,7 @@ class Study(Generic[T]):
 
 
 def find_poses(unit: Unit) -> Study[PoseSet]:
-    """Poses in the recording of a unit, and the still stretches that are none, with the reason.
+    """Poses in the recording of a unit, and the stretches at rest that are refused and why.
 
     Raises
     ------

@@ -78,7 +78,7 @@ def run_cluster(client: Any, make: Make, orders: list[Order]) -> Iterator[Outcom
                 outcome: Outcome = future.result()
             except distributed.KilledWorker:
                 outcome = refused(
-                    order, f"{order.folder}: the workers died on it; is there memory enough?"
+                    order, f"{order.folder}: the workers died on it; is there enough memory?"
                 )
             future.release()
             yield outcome

@@ -23,7 +23,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Make, Order, Outcome, filled, refused
 
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""A worker is a core's worth: libraries that would start threads of their own are told so."""
+"""A worker uses one core: libraries must not start threads of their own."""
 _OF_THE_TERMINAL = {signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGINT)}
 """Signals that a terminal sends to the workers as well."""
 
@@ -42,8 +42,8 @@ def run_local(
 ) -> Iterator[Outcome]:
     """Outcomes of all orders as they come, on `jobs` processes.
 
-    At an interrupt `finishing` is told how many units are under way; they are finished and given
-    before it is raised. A second interrupt ends the workers.
+    At an interrupt `finishing` is called with the number of units under way; they are finished and
+    given before it is raised. A second interrupt ends the workers.
     """
     waiting, suspects = deque(orders), deque[Order]()
     with tempfile.TemporaryDirectory(
@@ -121,7 +121,7 @@ def _alone(make: Make, suspects: deque[Order], scratch: str) -> Iterator[Outcome
         except BrokenProcessPool:
             yield refused(
                 order,
-                f"{order.folder}: the worker process died on it twice; is there memory enough? "
+                f"{order.folder}: the worker process died on it twice; is there enough memory? "
                 "run again with fewer --jobs",
             )
 
@@ -169,7 +169,7 @@ def _start(scratch: str) -> None:
 
 
 def _leave_with(parent: int) -> None:
-    """End when the parent is gone: the pool's pipes never tell a worker that it was killed."""
+    """End when the parent is gone: the pool's pipes do not show a worker that it was killed."""
     while os.getppid() == parent:
         time.sleep(1.0)
     os.kill(os.getpid(), signal.SIGTERM)

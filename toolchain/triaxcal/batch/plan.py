@@ -66,7 +66,7 @@ def plan_work(folders: Iterable[Path], build: Path) -> Work:
         except RefusedError as refusal:
             failed.append(Outcome(path.absolute().name, "", str(refusal)))
     if not orders and not failed:
-        raise RefusedError("batch", "no units named", remedy="say triaxcal batch units/*")
+        raise RefusedError("batch", "no units named", remedy="run triaxcal batch units/*")
     clashes = _clashes(orders, before)
     failed += [refused(o, clashes[o.folder]) for o in orders if o.folder in clashes]
     orders = [o for o in orders if o.folder not in clashes]
@@ -145,7 +145,7 @@ def _clashes(orders: list[Order], before: dict[str, dict[str, Any]]) -> dict[str
 
 
 def _serial(folder: Path) -> str | None:
-    """Serial of a unit; None when its file is wrong, which is told when it is made."""
+    """Serial of a unit; None when its file is wrong, which is reported when it is made."""
     try:
         found = read_toml(folder / UNIT_FILE).get("serial")
     except RefusedError:

@@ -45,9 +45,9 @@ def run_series(
     runner: Runner,
     *,
     sometimes: Collection[str],
-    tell: Callable[[Outcome], None],
+    report: Callable[[Outcome], None],
 ) -> Series:
-    """Make what is to be made; `tell` hears of each unit when its files are in place.
+    """Make what is to be made; `report` is called for each unit when its files are in place.
 
     Raises
     ------
@@ -56,17 +56,17 @@ def run_series(
     """
     series = Series(dict(work.done), {o.name: o.refusal for o in work.refused})
     for outcome in work.refused:
-        tell(outcome)
+        report(outcome)
     for outcome in runner(make, work.orders) if work.orders else ():
-        told = _placed(outcome, build, sometimes)
+        placed = _placed(outcome, build, sometimes)
         series.made += 1
-        if told.refusal:
-            series.refused[told.name] = told.refusal
+        if placed.refusal:
+            series.refused[placed.name] = placed.refusal
         else:
-            entry = journal.entry_of(told)
+            entry = journal.entry_of(placed)
             journal.append(build, entry)
-            series.entries[told.name] = entry
-        tell(told)
+            series.entries[placed.name] = entry
+        report(placed)
     return series
 
 

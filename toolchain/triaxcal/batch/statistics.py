@@ -9,7 +9,7 @@ the smallest of 36 is within 19 times of 20.
 Drift. The placement pattern (uncertainty.scatter) is the tilter's own, so its mean over the units
 of a run is the tilter's, with the standard error s / sqrt(units), s pooled within the runs. A run
 is compared with the run before it on its rig; constants at T0 likewise. z beyond the quantile at
-0.05 over all comparisons is told.
+0.05 over all comparisons is reported.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from triaxcal.model.types import FloatArray
 
 MAD_TO_SD = 1.4826
 FEWEST_UNITS = 20
-"""Fewer units say nothing of outliers: the MAD itself is not known to better than a quarter."""
+"""With fewer units outliers are not searched: the MAD is uncertain by a quarter or more."""
 FEWEST_IN_RUN = 3
 _RISK = 0.05
 _MAD_MARGIN = 3.5
@@ -42,7 +42,7 @@ class Quantity:
     Attributes
     ----------
     name, unit : str
-        As people read them.
+        In words.
     values : array, shape (units,)
         In `unit`.
     """
@@ -85,7 +85,7 @@ class Run:
         The quantity that differs most from the run before, by how much and how many of its
         standard errors; empty and 0 where there is nothing to compare with.
     told : bool
-        Whether z is beyond what chance gives over all comparisons.
+        Whether z is significant over all comparisons; its name is that of the key in series.json.
     """
 
     rig: str

@@ -214,12 +214,12 @@ def export(log: Path, target: Path) -> None:
 
     shows = sys.stderr.isatty()
 
-    def told(count: int) -> None:
+    def written(count: int) -> None:
         if shows:
             click.echo(f"\r{count} frames ...", err=True, nl=False)
 
     try:
-        count = export_log(log, target, told)
+        count = export_log(log, target, written)
     finally:
         if shows:
             click.echo("\r\x1b[K", err=True, nl=False)

@@ -194,7 +194,7 @@ def _flipped(image: bytes, at: int) -> bytes:
 def imu_vectors(accel: Plan, gyro: Plan) -> tuple[Int32Array, Int32Array, Int32Array]:
     """Temperature codes and raw codes of both triads: half in range, half any int32.
 
-    Either triad alone is out of its range in a quarter each: their status bits can be told apart.
+    Either triad alone is out of its range in a quarter each, to distinguish their status bits.
     """
     rng = np.random.Generator(np.random.PCG64(SEED))
     count = 10_000

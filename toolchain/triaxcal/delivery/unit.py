@@ -192,7 +192,7 @@ def _refuse_beyond_limits(delivery: Delivery) -> None:
                 f"{delivery.measurements.source}, row {dwell.row}",
                 f"| |a| - g | = {error_g * 1e3:.4g} mg in {dwell.position} at "
                 f"{dwell.temp_degc:.4g} degC by the compiled C, {error_g / limit:.3g} "
-                "times the limit, which the fitted model keeps",
+                "times the limit; the fitted model is within it",
                 expected=f"at most {limit * 1e3:g} mg ({key})",
                 remedy=(
                     f"method {delivery.chosen.method.label} is within "

@@ -1,7 +1,7 @@
 """What a planned motion will let a unit see: the filter's covariance, without a recording.
 
 The covariance depends on the motion and the noise, and on measured values only by what the filter
-linearises about. So the plan is simulated with a perfect unit without noise, and the filter is told
+linearises about. So the plan is simulated with a perfect unit without noise, and the filter gets
 the noise of the data sheet.
 """
 

@@ -237,7 +237,7 @@ def unobservable(positions: tuple[str, ...]) -> list[str]:
         if abs(seen[j, j] - 1.0) > 1e-9
     ]
     if abs(seen[3, 3] - 1.0) > 1e-9:
-        words.append("U0: it cannot be told from the sensitivities")
+        words.append("U0: it cannot be separated from the sensitivities")
     return words
 
 
@@ -251,9 +251,7 @@ def _refuse_blind_positions(values: Values, positions: tuple[str, ...]) -> None:
         found += "; not determined: " + "; ".join(left_open)
     else:
         found += "; the constants are determined, but no residual shows a mistake"
-    raise RefusedError(
-        values.where("positions"), found, expected="all six", remedy="leave the key out"
-    )
+    raise RefusedError(values.where("positions"), found, expected="all six", remedy="omit the key")
 
 
 def _refuse_few_temperatures(problem: Problem, values: Values) -> None:
@@ -266,7 +264,7 @@ def _refuse_few_temperatures(problem: Problem, values: Values) -> None:
             values.where("temperatures_degc"),
             f"{len(temps)} candidates; polynomials of order {problem.order} have "
             f"{problem.order + 1} coefficients",
-            expected=f"{needed} candidates at least: with {problem.order + 1} temperatures the "
+            expected=f"at least {needed} candidates: with {problem.order + 1} temperatures the "
             "curve passes through every point and nothing shows whether it is right",
             remedy="add candidates, or lower [curves] order",
         )

@@ -177,5 +177,5 @@ def _unreachable(problem: Problem, lowest: float, target_g: float) -> RefusedErr
         f"{reached * 1e6:.3g} micro-g, {reached / target_g:.3g} times the target, mostly by "
         f"{worst}",
         expected=f"a target of {reached * 1e6:.3g} micro-g or more",
-        remedy="improve that, add candidates, or ask for less",
+        remedy="improve that, add candidates, or set a larger target",
     )

@@ -37,7 +37,7 @@ def comparison(problem: Problem, usual: Design, found: Design) -> str:
 
 
 def observability(problem: Problem, found: Design) -> list[str]:
-    """What the plan determines, what checks it and what no plan of this kind sees."""
+    """What the plan determines, what checks it and what no plan of this kind shows."""
     count, order = len(found.temps_degc), problem.order
     spare = count - order - 1
     return [

@@ -112,7 +112,7 @@ def calibrate_dynamic(
         recording.name,
         f"after {PASSES_MAX} passes the constants still move by {moved:.1f} standard deviations",
         expected="a recording that the model describes",
-        remedy="look at units, axes, conventions and the noise that unit.toml states",
+        remedy="check units, axes, conventions and the noise that unit.toml states",
     )
 
 

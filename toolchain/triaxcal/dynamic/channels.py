@@ -77,7 +77,7 @@ def table_axes(table: Turntable) -> FloatArray:
 def steady(angle_rad: FloatArray, sd_rad: float) -> BoolArray:
     """Blocks of readings (b, samples) in which the table's angle stays, shape (b,).
 
-    The gyros call a table still that turns slower than they can tell at the start: in the last
+    For the gyros a table is at rest that turns slower than they resolve at the start: in the last
     tenths of a second before a stop it may turn by 90", and the reading's mean over the block is
     not its end. The two halves of a block differ by no more than their noise where the table
     rests, and a block beside one that moves is not believed: it may hold what the test cannot see.

@@ -97,14 +97,14 @@ def missing_effects(
 
 
 def _hint(name: str, p: FloatArray, covariance: FloatArray, recording: ImuRecording) -> str:
-    """Conventions that were mistaken, where an effect has just the size that this gives."""
+    """The mistaken convention that gives an effect of just this size; "" if there is none."""
     if name == "delay":
         samples, sd = p[0] * recording.rate_hz, covariance[0, 0] ** 0.5 * recording.rate_hz
         nearest = round(2 * samples) / 2
         if nearest and abs(samples - nearest) < HALF_SAMPLE + HINT_SD * sd:
             return (
-                f"{samples:+.2f} samples: look at rate_samples and force_samples, and at what the "
-                "time stamps of both mean"
+                f"{samples:+.2f} samples: check rate_samples and force_samples, and what the time "
+                "stamps of both mean"
             )
     if name == "g-drift":
         # D11 = D22 = D33 is a rate about up: there the Earth turns, and the other way if up is down
@@ -114,8 +114,8 @@ def _hint(name: str, p: FloatArray, covariance: FloatArray, recording: ImuRecord
         turned_round = abs(rate + 2 * earth) < HINT_SD * sd + REVERSED * abs(earth)
         if turned_round and abs(rate) > HINT_SD * sd:
             return (
-                "the Earth turns the other way: forces of reversed sign (at rest the axis that "
-                "points up reads +g), or latitude_deg (north is positive)"
+                "the Earth turns the other way: check the sign of the forces (at rest the axis "
+                "that points up reads +g) and of latitude_deg (north is positive)"
             )
     return ""
 

@@ -1,7 +1,7 @@
-"""Which states a motion lets see, and which it cannot separate.
+"""Which states a motion determines, and which it cannot separate.
 
 The covariance of the filter needs the motion and the noise but no measured value, so that a planned
-motion, simulated with any truth, tells the same as a recorded one. In units of the prior standard
+motion, simulated with any truth, shows the same as a recorded one. In units of the prior standard
 deviations, a direction of the state space whose variance the recording has left is one that it did
 not see: its states cannot be separated, and their estimates are the prior's guess.
 """
@@ -20,7 +20,7 @@ UNSEEN = 0.5
 SHARE = 0.1
 """Of the squared length of a direction: states with less take no part in it."""
 CLOSE = 0.99
-"""Correlation of two estimates that are known only together."""
+"""Correlation of two estimates that are determined only in combination."""
 BADLY = 10.0
 """Within a block: one direction is known so many times worse than the next."""
 
@@ -71,7 +71,7 @@ class Observability:
 
 
 def observability(layout: Layout, covariance: FloatArray) -> Observability:
-    """What the recording let see of the states of `layout`, by their covariance (n, n), SI."""
+    """What the recording determines of the states of `layout`, by their covariance (n, n), SI."""
     names = [state.name for state in layout.states]
     n = len(names)
     prior = layout.prior_sd
@@ -86,11 +86,11 @@ def observability(layout: Layout, covariance: FloatArray) -> Observability:
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
     weak = tuple(w for w in _weak(layout, covariance) if _plain(w) not in map(set, unseen))
-    told = [_plain(w) for w in weak]
+    reported = [_plain(w) for w in weak]
     pairs = [
         (i, j)
         for i, j in np.argwhere(np.triu(np.abs(correlation) > CLOSE, 1))
-        if not any({names[i], names[j]} <= group for group in told)
+        if not any({names[i], names[j]} <= group for group in reported)
     ]
     together = tuple((names[i], names[j], float(correlation[i, j])) for i, j in pairs)
     return Observability(prior / sd, tuple(unseen), together, weak)

@@ -31,7 +31,7 @@ TURNED_COSINE = math.cos(math.radians(30.0))
 
 
 def refuse_wrong_units(recording: ImuRecording, windows: Windows) -> None:
-    """Refuse what the filter could not tell from a bad unit.
+    """Refuse mistakes that the filter would attribute to the unit.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def _refuse_force(recording: ImuRecording, force: FloatArray) -> None:
             recording.name,
             f"the force at the start is {size:.4g} m/s^2{hint}",
             expected=f"local gravity, {g:.4f} m/s^2, within {100 * GRAVITY_TOLERANCE:.0f} %",
-            remedy="look at force_unit and force_samples in [dynamic]",
+            remedy="check force_unit and force_samples in [dynamic]",
         )
 
 
@@ -91,7 +91,7 @@ def _refuse_gyros_that_miss_the_turn(name: str, windows: Windows, turned: FloatA
             f"gravity turns in the unit by {math.degrees(math.acos(max(least, -1.0))):.0f} deg, "
             f"but the gyros turn by {math.degrees(turned.max()):.2g} deg in all",
             expected="gyros that turn as the unit does",
-            remedy="look at rate_columns and rate_unit in [dynamic]",
+            remedy="check rate_columns and rate_unit in [dynamic]",
         )
 
 
@@ -119,7 +119,7 @@ def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
             name,
             f"the forces turn about x, y, z as the gyros' {words} say: {kind}",
             expected="gyros and accelerometers on the same right-handed axes",
-            remedy="look at the order and signs of rate_columns and force_columns",
+            remedy="check the order and signs of rate_columns and force_columns",
         )
     if not FACTOR_LIMITS[0] < size < FACTOR_LIMITS[1]:
         hints = {
@@ -132,5 +132,5 @@ def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
             name,
             f"gravity turns in the unit {size:.3g} times as fast as the gyros say{hint}",
             expected="once",
-            remedy="look at rate_unit, rate_samples and time_unit in [dynamic]",
+            remedy="check rate_unit, rate_samples and time_unit in [dynamic]",
         )

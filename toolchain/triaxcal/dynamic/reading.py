@@ -40,7 +40,7 @@ def read_recording(unit: DynamicDescription) -> ImuRecording:
         raise RefusedError(
             str(path),
             "; ".join(table.findings),
-            expected="every increment: the sum lacks what is left out",
+            expected="every increment, because the increments are summed",
             remedy="record again, or cut the recording there",
         )
     # Of the first piece: a clock that steps aside later does not count.

@@ -141,19 +141,19 @@ def _section(
     length_s = float(windows.duration_s[inside][:run].sum())
     found = ""
     if length_s < STILL_MIN_S:
-        found = f"stands still for {length_s:.1f} s, then " + (
+        found = f"is at rest for {length_s:.1f} s, then " + (
             f"turns at {np.degrees(np.linalg.norm(rate[run] - reference)):.1f} deg/s"
             if run < len(rate)
             else "the recording ends or has a gap"
         )
     elif _turns_evenly(reference, windows.force[inside][: round(STILL_MIN_S / WINDOW_S)]):
-        found = f"does not stand still: turns at {np.degrees(np.linalg.norm(reference)):.1f} deg/s"
+        found = f"is not at rest: turns at {np.degrees(np.linalg.norm(reference)):.1f} deg/s"
     if found:
         raise RefusedError(
             f"{name}, {start[0]:.1f} s",
             found if first == 0 else f"after a gap the unit {found}",
             expected=f"at least {STILL_MIN_S:.0f} s at rest at the start and after each gap",
-            remedy="let the unit stand before the first turn, and lose no samples while it turns",
+            remedy="keep the unit at rest before the first turn, and lose no samples in the turns",
         )
     kept = slice(0, max(1, run - 1))
     mean_rate, mean_force = rate[kept].mean(axis=0), windows.force[inside][kept].mean(axis=0)

@@ -43,7 +43,7 @@ def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUni
     RefusedError
         As `read_dynamic`, `read_recording` and `calibrate_dynamic`.
     """
-    tell = progress or (lambda _step, _part: None)
+    report = progress or (lambda _step, _part: None)
     unit = read_dynamic(folder)
     recording = read_recording(unit)
     result = calibrate_dynamic(
@@ -51,8 +51,8 @@ def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUni
         unit.noise,
         unit.state_blocks(),
         reference_degc=unit.reference_degc,
-        progress=lambda number, part: tell(f"pass {number + 1}", part),
+        progress=lambda number, part: report(f"pass {number + 1}", part),
     )
-    off = missing_effects(recording, unit.noise, result, lambda part: tell("effects off", part))
+    off = missing_effects(recording, unit.noise, result, lambda part: report("effects off", part))
     seen = observability(result.layout, result.covariance)
     return DynamicUnit(unit, result, seen, off, recording.findings)

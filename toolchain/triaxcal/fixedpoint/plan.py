@@ -114,7 +114,7 @@ class Plan:
 
 
 class Triad(Protocol):
-    """What the plan needs to know of a triad; a `UnitDescription` tells it."""
+    """What the plan needs to know of a triad; a `UnitDescription` has it."""
 
     @property
     def name(self) -> str:
@@ -207,8 +207,9 @@ def _temperature_codes(
             where,
             f"temperature_sensor.degc_per_code = {sensor.degc_per_code:g} makes "
             f"{last - first + 1} codes of {low:g} to {high:g} degC",
-            expected=f"at most {MAX_TEMPERATURE_CODES}, each of which the proof visits",
-            remedy="drop the lowest bits of the temperature code in the driver and say so here",
+            expected=f"at most {MAX_TEMPERATURE_CODES}, because the proof checks each of them",
+            remedy="drop the lowest bits of the temperature code in the driver and enlarge "
+            "degc_per_code accordingly",
         )
     if max(abs(first), abs(last)) > INT32_MAX // 2:
         raise RefusedError(

@@ -26,7 +26,7 @@ THRESHOLDS = tuple(1.25 * 2.0 ** (k / 4.0) for k in range(21))
 """1.25 to 40 times the floor, four a doubling."""
 _FLOOR_PERCENTILE = 10.0
 _NOTED = 0.25
-"""Of the shortest pose: still stretches shorter than this are part of the movement."""
+"""Of the shortest pose: stretches at rest shorter than this are part of the movement."""
 
 
 @dataclass(frozen=True)

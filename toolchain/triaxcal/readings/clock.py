@@ -42,12 +42,14 @@ class Clock:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """What was mended."""
+        """What was repaired."""
         if not self._turns:
             return ()
         name = "midnight" if self._of_day else f"every {self._turn_s:.6g} s"
         times = "once" if self._turns == 1 else f"{self._turns} times"
-        return (f"the clock starts again {times} ({name}): time goes on across it",)
+        return (
+            f"the clock starts again {times} ({name}): the times after it continue those before",
+        )
 
     def seconds(self, block: Block, numbers: FloatArray, texts: Sequence[list[str]]) -> FloatArray:
         """Times, shape (n,); NaN where one is missing.

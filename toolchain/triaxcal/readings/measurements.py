@@ -125,7 +125,7 @@ def volts(values: RealT, reading_unit: str, adc: Adc) -> RealT:
 
 
 def _peak(header: Header, rows: Sequence[Row]) -> float:
-    """Largest reading of the file, as written; cells that are no numbers are told later."""
+    """Largest reading of the file, as written; cells that are no numbers are reported later."""
     cells = [row.cells[column] for row in rows for column in READINGS[header.reading_unit]]
     return max((abs(float(c)) for c in cells if is_number(c)), default=0.0)
 

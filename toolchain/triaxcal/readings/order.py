@@ -101,11 +101,11 @@ class Order:
         if back.count + repeated.count > LEFT_OUT_MAX * self._count:
             raise self._too_many()
         repeats = (
-            f"{repeated} with the time of the row before left out ({self._equal} of them the same "
-            f"in all), the first is {self._word} {repeated.first}"
+            f"{repeated} with the time of the row before left out ({self._equal} of them "
+            f"identical in all columns), the first is {self._word} {repeated.first}"
         )
         backs = (
-            f"{back} out of order in time left out, by {self._largest_s:.3g} s at most, the first "
+            f"{back} out of order in time left out, by at most {self._largest_s:.3g} s, the first "
             f"is {self._word} {back.first}"
         )
         return (repeats,) * bool(repeated.count) + (backs,) * bool(back.count)

@@ -97,7 +97,9 @@ def find_table(lines: Sequence[Line], layout: FileLayout) -> FoundTable:
     findings: tuple[str, ...] = ()
     if skipped:
         plural = "s" * (len(skipped) != 1)
-        findings = (f"{len(skipped)} line{plural} above the rows left out, from {skipped[0]} on",)
+        findings = (
+            f"{len(skipped)} line{plural} left out above the rows, from line {skipped[0]} on",
+        )
     return FoundTable(names, start, delimiter, width, len(cells) > width, findings)
 
 
@@ -129,7 +131,7 @@ def _header(above: Sequence[Line], wanted: set[str], delimiter: str, width: int)
             best = (*score, line)
     if best is not None:
         return best[2]
-    # A line of words just above, whatever its width: told as a header that does not fit.
+    # A line of words just above, whatever its width: reported as a header that does not fit.
     plain = [line for line in above if not line.comment]
     if not plain or any(map(_numeric, split_cells(plain[-1].text, delimiter))):
         return None

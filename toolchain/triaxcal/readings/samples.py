@@ -163,8 +163,8 @@ def read_samples(folder: Path, layout: RecordingLayout, sensor: TemperatureSenso
 def _slow_clock(samples: Samples, layout: RecordingLayout) -> tuple[str, ...]:
     if samples.step_s < _SLOW_S or not layout.time or ISO in layout.time_unit:
         return ()
-    told = f'a sample every {samples.step_s:.4g} s by time_unit = "{", ".join(layout.time_unit)}"'
-    return (f"{told}: if that is not so, correct it",)
+    unit = f'time_unit = "{", ".join(layout.time_unit)}"'
+    return (f"{unit} gives a sample every {samples.step_s:.4g} s: correct it if that is wrong",)
 
 
 def _gaps(samples: Samples) -> tuple[str, ...]:
@@ -180,8 +180,8 @@ def _gaps(samples: Samples) -> tuple[str, ...]:
     if not count:
         return ()
     place = f"{samples.table.row_word} {samples.one(ROW, after):.0f}"
-    told = f"{count} gap{'s' * (count != 1)} in time, the longest {longest:.3g} s before {place}"
-    return (f"{told}; no pose reaches across one",)
+    found = f"{count} gap{'s' * (count != 1)} in time, the longest {longest:.3g} s before {place}"
+    return (f"{found}; no pose extends across a gap",)
 
 
 def _refuse_implausible(samples: Samples, layout: RecordingLayout) -> None:

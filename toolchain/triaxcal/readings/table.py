@@ -229,7 +229,7 @@ class _Reading:
         return rows
 
     def findings(self) -> tuple[str, ...]:
-        """What was mended or left out; refuses a file that lacks readings in half of its rows."""
+        """What was repaired or left out; refuses a file that lacks readings in half of its rows."""
         found = self._clock.findings
         if not self.missing:
             return found

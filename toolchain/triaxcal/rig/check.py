@@ -44,7 +44,7 @@ def collect(source: Source, seconds: float) -> Frames:
 
 
 def findings(setup: Setup, frames: Frames, where: str, notes: list[str]) -> list[Finding]:
-    """What the frames of a few seconds tell."""
+    """What the frames of a few seconds show."""
     found = [Finding(False, note) for note in notes]
     if not len(frames):
         return [*found, Finding(False, f"{where}: no frames at all")]
@@ -77,7 +77,7 @@ def _bus(setup: Setup, frames: Frames, samples: Samples) -> list[Finding]:
 
 def _identity(setup: Setup, frames: Frames, where: str, samples: Samples) -> Finding:
     if not samples.identity:
-        return Finding(False, "the rig has not said its serial number (RIG_IDENT)")
+        return Finding(False, "the rig has not sent its serial number (RIG_IDENT)")
     try:
         Engine(setup, where).feed(frames)
     except RefusedError as refusal:

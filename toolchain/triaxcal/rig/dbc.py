@@ -159,7 +159,7 @@ def _parsed(text: str) -> Database:
 
 
 def layout_of(message: Message) -> FrameLayout:
-    """Layout of any message of a cantools database; of multiplexed signals each by itself."""
+    """Layout of any message of a cantools database; of multiplexed signals each separately."""
     return FrameLayout(
         name=message.name,
         frame_id=message.frame_id,

@@ -67,12 +67,12 @@ WRITERS: dict[str, Callable[[Path], AbstractContextManager[Put]]] = {
 """By suffix of the target."""
 
 
-def export_log(log: Path, target: Path, told: Callable[[int], None]) -> int:
+def export_log(log: Path, target: Path, written: Callable[[int], None]) -> int:
     """Write a log in another format, by the target's suffix; returns the number of frames.
 
     Parameters
     ----------
-    told : callable
+    written : callable
         Gets the number of frames done, now and then.
 
     Raises
@@ -95,7 +95,7 @@ def export_log(log: Path, target: Path, told: Callable[[int], None]) -> int:
                 for parsed in read_log(log):
                     put(parsed.frames)
                     count += len(parsed.frames)
-                    told(count)
+                    written(count)
             if not count:
                 raise RefusedError(str(log), "no frames in it", expected="a candump log")
             aside.replace(target)

@@ -90,9 +90,9 @@ class Warming(Phase):
         text = f"equilibrium at {temp:.2f} degC"
         seated = state.seated_degc if state.seated_degc is not None else temp
         if state.seen and state.seen in state.pending and not state.within_span(temp, seated):
-            # A slip while the unit waited has nothing before it to be seen against.
+            # A slip while the unit waited cannot be detected: there is no dwell before it.
             state.reseat = Reseat(state.seen, because(Why.WARMED, kelvin=abs(temp - seated)))
-            text += f"; {described(state.seen)} is to be left and taken up anew"
+            text += f"; turn away from {described(state.seen)} and back"
         state.say("equilibrium", _now(state).t_ns, text, temp_degc=temp)
         return Turning(), True
 
@@ -108,7 +108,7 @@ class Turning(Phase):
         """Go on to the dwell of a position, or back when the temperature has left the target."""
         temp, target = state.temp_degc, state.target_degc
         if temp is not None and abs(temp - target) > state.plan.thermal.tolerance_k:
-            text = f"{temp:.2f} degC has left {target:g} degC; wait"
+            text = f"{temp:.2f} degC is too far from {target:g} degC; wait"
             state.say("left", _now(state).t_ns, text)
             return Warming(), False
         position = self._chosen(state)
@@ -139,7 +139,7 @@ class Turning(Phase):
             return seen
         if state.offered != seen:
             state.offered = seen
-            text = f"found {found}, wanted {described(first)}: agree to take it now, or turn"
+            text = f"found {found}, wanted {described(first)}: accept it (y), or turn"
             state.say("offer", t_ns, text)
         return None
 
@@ -191,7 +191,7 @@ class Dwelling(Phase):
         if reasons:
             text = f"{self.position}: {'; '.join(map(str, reasons))}, retake"
             state.say("refused", t_ns, text, reasons=tuple(reasons))
-            # After a slip the unit lies otherwise than it should; resting on would not help.
+            # After a slip the unit is misplaced: waiting longer would not help.
             slipped = reasons[0].why is Why.SLIP
             state.reseat = Reseat(self.position, because(Why.SLIPPED)) if slipped else None
             return Turning()

@@ -1,4 +1,4 @@
-"""Why something was refused or is to be done again: a value with its numbers; text is made last."""
+"""Why something was refused or must be repeated: a value with its numbers; text is made last."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import Enum
 
 
 class Why(Enum):
-    """Kinds of reason, each with its text for people."""
+    """Kinds of reason, each with its text."""
 
     BUS_OFF = "error frames: {names}"
     BUS_ERRORS = "{count} error frames: {names}"
@@ -19,7 +19,7 @@ class Why(Enum):
     LOST_IN_SECOND = "{lost} of {expected} samples lost in 1 s"
     LOST = "{lost} of {expected} samples lost"
     CLIPPED = "clipped: {count} samples at the end of the ADC's range"
-    STUCK = "stuck: {axes} gives one and the same code"
+    STUCK = "stuck: {axes} gives the same code all the time"
     STATUS = "the rig reports status 0x{status:02X}"
     NO_TEMPERATURE = "no temperature from the rig"
     MOVED = "moved by {micro_g:.0f} micro-g on {axis}"
@@ -31,7 +31,7 @@ class Why(Enum):
     NOISE = "noise on {axis} {ratio:.2f} times that at rest"
     UNCERTAIN = "u(A) of {axis} is {micro_g:.1f} micro-g, more than {limit:g}"
     SLIPPED = "it slipped"
-    WARMED = "it went through {kelvin:.0f} K"
+    WARMED = "its temperature changed by {kelvin:.0f} K"
 
 
 @dataclass(frozen=True)

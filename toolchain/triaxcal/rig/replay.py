@@ -37,7 +37,7 @@ class Replayed:
 
 
 def replay(setup: Setup, log: Path, journal: Path | None = None) -> Replayed:
-    """Play a log again, with the operator's words and the restarts that its journal tells of.
+    """Play a log again, with the operator's commands and the restarts in its journal.
 
     Raises
     ------

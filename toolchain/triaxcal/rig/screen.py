@@ -50,7 +50,7 @@ class BigText:
     text: str
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Lines in the middle; rich would centre each by itself."""
+        """Lines in the middle; rich would centre each line separately."""
         tall = console.size.height >= _TALL
         lines = big(self.text, options.max_width, 2 if tall else 1)
         margin = " " * ((options.max_width - len(lines[0])) // 2)

@@ -67,7 +67,7 @@ class Session(State):
         if not isinstance(command, Agree):
             self._redo(command.position, t_ns)
         elif self.offered is None:
-            self.say("refused", t_ns, "nothing is offered")
+            self.say("refused", t_ns, "no position is offered")
         else:
             self.agreed = self.offered
         return self.events
@@ -82,13 +82,13 @@ class Session(State):
             if old is None or temp is None:
                 continue
             if not self.within_span(temp, old.temp_degc):
-                text = f"{position}: its temperature, {old.temp_degc:.2f} degC, has passed"
+                text = f"{position}: the temperature is no longer {old.temp_degc:.2f} degC"
                 self.say("refused", t_ns, text)
                 return
             if step != self.step:
                 # A dwell under way was of the step that is left.
                 self.step, self.phase = step, Warming(old.temp_degc)
             self.redo.add(position)
-            self.say("found", t_ns, f"{position} will be taken again")
+            self.say("found", t_ns, f"{position} will be measured again")
             return
         self.say("refused", t_ns, f"{position} has not been accepted at this temperature")

@@ -96,7 +96,7 @@ class RoughTable:
 
 
 PRECISE_TABLE = RoughTable(wobble_arcsec=0.0, ripple_deg=0.0, reads_angle=True)
-"""A table whose angle readings are worth something: they tell the whole attitude of its plate."""
+"""A table whose angle readings give the whole attitude of its plate."""
 
 
 @dataclass(frozen=True)

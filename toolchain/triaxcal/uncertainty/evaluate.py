@@ -29,7 +29,7 @@ from triaxcal.unit.description import UnitDescription
 TEMPERATURES = 23
 """Of the working range, evenly, besides T0 and the calibrated ones."""
 _SUSPICIOUS = 3.0
-"""Residuals this many times beyond a stated squareness are told."""
+"""Residuals this many times a stated squareness give a warning."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """How much of the held-out error is the thermal function's and not noise or placement.
 
-The errors h at readings that the fit has not seen (fit.selection: temperatures left out in turn,
+The errors h at held-out readings (fitting.tilter.selection: temperatures held out in turn,
 check dwells) are linear in the errors of all readings, h = A dU + their own. Fixed tilts of the
 positions would show in h without being any fault of the curve: what they can make is projected
 out first. Of the rest,
@@ -48,7 +48,7 @@ class HeldOut:
 class ThermalError:
     """Standard uncertainty that the thermal function adds to a component of the force.
 
-    `resolution_g` is what the held-out values could not have told from noise: their standard
+    `resolution_g` is what the held-out values cannot separate from noise: their standard
     error.
     """
 

@@ -240,7 +240,7 @@ class Repeatability:
 def repeatability(unit: UnitDescription, history: list[Calibrated]) -> Repeatability | None:
     """Scatter over all calibrations about a straight line in time, or about the mean without days.
 
-    None where there are too few to tell: three with a mean, four with a line.
+    None if there are too few: three are needed with a mean, four with a line.
     """
     at_t0 = np.array([c.calibration.thermal.constants_at(unit.t0_degc) for c in history])
     kinds = _kinds(at_t0 - at_t0[0], at_t0[0])

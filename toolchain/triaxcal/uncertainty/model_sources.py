@@ -38,7 +38,7 @@ def thermal_model(p: Propagation, s: Scatter) -> Source:
     constants[:, range(12), range(12)] = (readings[:, :, None] * gain).reshape(n, 12)
     seen = f"held-out error beyond noise and placement, {error.dof:.0f} values"
     if error.sd_g < error.resolution_g:
-        seen += f"; below {error.resolution_g * 1e6:.2g} µg it is not told from noise"
+        seen += f"; below {error.resolution_g * 1e6:.2g} µg it is within the noise"
     return Source(
         *_NAMED,
         "measure at one more temperature, or choose a better thermal function",

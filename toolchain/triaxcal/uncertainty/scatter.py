@@ -1,4 +1,4 @@
-"""What the residuals over the positions say of noise and placement.
+"""Noise and placement, estimated from the residuals over the positions.
 
 The half-sums over opposite positions, brought to force by N, estimate one bias three times at each
 temperature. With the noise v of a reading and the tilts' variance p g^2 about each axis, that of
@@ -9,7 +9,7 @@ squares about their mean is therefore v + 2 p g^2 / 3, with two degrees of freed
     of the mean over temperatures      S_m = 3 (v / G + 2/3 g^2 (p_r / G + p_s)),    6
 
 p_r is the repeatability, new in each dwell, p_s the squareness, the same at all temperatures.
-Where the file has no statistics of the dwells, v and p_r are told apart by nothing, and v has both.
+If the file has no statistics of the dwells, v and p_r cannot be separated, and v is their sum.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Scatter:
         Standard deviations of the tilts about each axis; zero where noise explains the residuals.
     repeatability_dof, squareness_dof : float
     resolution_rad : float
-        Standard error of a squareness of zero: a smaller one is not told from noise.
+        Standard error of a squareness of zero: a smaller one is within the noise.
     pattern_g : array, shape (3, 3)
         What stays at all temperatures: half-sum of the pair along x, y, z (row) about the mean of
         the three, in the force's x, y, z. The tilter's own, whatever the unit's constants are.
@@ -73,7 +73,7 @@ def scatter(p: Propagation) -> Scatter:
         noise_dof = p.data.readings.variance_dof
         p_r = max(0.0, 1.5 * (within / (3.0 * (G - 1)) - v)) if G > 1 else 0.0
     else:
-        # One temperature cannot tell noise from placement: each is given the whole scatter.
+        # One temperature cannot separate noise from placement: each has the whole scatter.
         v = within / (3.0 * (G - 1)) if G > 1 else mean / 3.0
         variance = np.broadcast_to(v * gain**2, p.forces_g.shape)
         noise_dof = within_dof or 6.0

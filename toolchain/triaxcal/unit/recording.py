@@ -43,7 +43,7 @@ ANGLE_NAMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """The two angles that gravity sees, then the one that it does not."""
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 STILL_S = 2.0
-"""Shortest pose by itself: 200 samples at 100 Hz, 0.07 of their noise."""
+"""Shortest pose by default: 200 samples at 100 Hz, 0.07 of their noise."""
 
 
 @dataclass(frozen=True)

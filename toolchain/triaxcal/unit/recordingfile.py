@@ -147,7 +147,7 @@ class FileLayout(WrittenFile):
     table : str
         Name of the table that says it, "recording" or "dynamic", for messages.
     wanted : tuple of str
-        Names of columns that will be asked for: they tell a header from a remark.
+        Names of columns that will be asked for: they distinguish a header from a remark.
     """
 
     table: str

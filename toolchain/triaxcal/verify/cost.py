@@ -64,13 +64,13 @@ def outcome_of(costs: list[Cost]) -> Outcome:
     That is not promised where a library forms the products: on cores without a long multiplication,
     of shapes that have no assembly for them.
     """
-    told, varying, figures = [], [], {}
+    ranges, varying, figures = [], [], {}
     failed = False
     for cost in costs:
         assert cost.counts is not None
         assert cost.flash is not None
         n, name = cost.counts, cost.core.name.removeprefix("Cortex-")
-        told.append(f"{name} {_span(n.set)} + {_span(n.apply)}")
+        ranges.append(f"{name} {_span(n.set)} + {_span(n.apply)}")
         if n.apply.least != n.apply.most:
             varying.append(name)
             promised = bool(assembly(cost.subject.case.plan.shape)["thumb1"])
@@ -83,7 +83,7 @@ def outcome_of(costs: list[Cost]) -> Outcome:
             "state_bytes": n.state_bytes,
             "stack_bytes": {"set_temperature": n.stack_set, "apply": n.stack_apply},
         }
-    finding = f"set_temperature + apply: {', '.join(told)}"
+    finding = f"set_temperature + apply: {', '.join(ranges)}"
     if varying:
         finding += f"; apply depends on its input on {', '.join(varying)}"
     return judged(

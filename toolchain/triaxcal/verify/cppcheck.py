@@ -25,7 +25,7 @@ FORMS = (
     ("-DTRIAX_ARITHMETIC=2", "-D__thumb__", "-D__thumb2__"),
     ("-DTRIAX_ARITHMETIC=3", "-D__thumb__"),
 )  # fmt: skip
-"""Each form by itself; without them cppcheck looks at the portable one only. Thumb is claimed, or
+"""Each form alone; without them cppcheck looks at the portable one only. Thumb is claimed, or
 the assembly would be refused."""
 
 _RULE = re.compile(r"misra-c2012-(\d+\.\d+)")

@@ -1,4 +1,4 @@
-"""Every check of the C of an IMU: of each triad by itself, and of both together.
+"""Every check of the C of an IMU: of each triad alone, and of both together.
 
 The routines of the triads are those of one template, so each goes through the checks of an
 accelerometer's delivery. triax_imu.c calls them one after the other; what it adds is analysed here.

@@ -23,7 +23,7 @@ class BrokenToolError(Exception):
 
 @dataclass(frozen=True)
 class Tool:
-    """A program, the Debian package that brings it, and how it tells its version."""
+    """A program, the Debian package that brings it, and how it prints its version."""
 
     program: str
     package: str

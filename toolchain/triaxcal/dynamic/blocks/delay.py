@@ -4,7 +4,7 @@ A sample stamped t shows the force of t - tau. Gravity turns in the instrument a
 against the Earth, so f(t - tau) = exp(tau [w]) f(t): to first order the error is tau w x f. With
 P2's hat(w) = -[w] the term of y is therefore -L'^T hat(w) f tau; the sign in print is lost.
 What is felt besides gravity, by the lever arms, is late as well: less tau times its change.
-At one constant rate tau cannot be told from a turn of the gyros' axes.
+At one constant rate tau cannot be separated from a turn of the gyros' axes.
 """
 
 from __future__ import annotations

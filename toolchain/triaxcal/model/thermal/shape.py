@@ -59,7 +59,7 @@ class ThermalShape(ABC):
     @property
     @abstractmethod
     def detail(self) -> str:
-        """What tells shapes of one function apart, in two words: "order 3", "7 knots"."""
+        """What distinguishes shapes of one function, in two words: "order 3", "7 knots"."""
 
     @property
     @abstractmethod

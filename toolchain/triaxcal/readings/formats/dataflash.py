@@ -104,7 +104,7 @@ def _field(name: str, form: tuple[str, float | None, Any]) -> tuple[str, str, in
 def _whole(
     path: Path, starts: Mapping[int, IntArray], lengths: Mapping[int, int], size: int
 ) -> tuple[str, ...]:
-    """Refuse a log with bytes between its messages that are none; tell of a cut one."""
+    """Refuse a log with other bytes between its messages; report one that was cut."""
     last = max(int(found[-1]) + lengths[kind] for kind, found in starts.items())
     rest = size - last if size > last + _PAGE else 0
     if rest or sum(len(found) * lengths[kind] for kind, found in starts.items()) != last:
