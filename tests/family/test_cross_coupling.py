@@ -98,7 +98,9 @@ def test_too_few_positions_and_half_a_turn_are_refused() -> None:
     with pytest.raises(RefusedError, match=r"pair.csv: 8 positions; expected at least 9"):
         fit_pair("pair.csv", THETA[:8], a[:8], b[:8], 1.0)
     near = THETA[0] + np.radians(np.arange(28.0))
-    with pytest.raises(RefusedError, match=r"the angles, 5 to 32 deg, leave coefficients open"):
+    with pytest.raises(
+        RefusedError, match=r"the angles, 5 to 32 deg, do not determine all coefficients"
+    ):
         fit_pair("pair.csv", near, a, b, 1.0)
 
 

@@ -316,7 +316,7 @@ REFUSED = {
     "beyond-limit": (
         log(directions(12)),
         {"more": "[limits]\nat_t0_g = 1e-6\n"},
-        "expected at most 0.001 mg (limits.at_t0_g); look at that pose with `triaxcal poses`",
+        "expected at most 0.001 mg (limits.at_t0_g); check that pose with `triaxcal poses`",
     ),
 }
 

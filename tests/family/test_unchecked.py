@@ -36,7 +36,7 @@ def test_as_many_constants_as_poses_are_not_called_passed(tmp_path: Path, count:
     assert f"NOT CHECKED: {count} constants fit any {count} poses exactly" in " ".join(told.split())
     assert "\nNOT CHECKED " in told
     assert "\npassed" not in told
-    assert "uncertainty     unknown: as many constants as poses" in told
+    assert "uncertainty     unknown: there are as many constants as poses" in told
     assert "held out        nothing: the fit needs every pose" in told
     assert b"NOT CHECKED<small>as many constants as poses" in passport_html(made)
     assert not made.shown

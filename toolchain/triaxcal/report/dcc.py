@@ -129,7 +129,7 @@ def _statements(data: ET.Element, p: Passport) -> None:
         unknown = "".join(f"; not in it: {line.source.name}" for line in p.length_budget.unknown)
         found = (
             f"largest at the dwells {limit.largest_g:.3g} g, expanded uncertainty of |a| "
-            f"{limit.uncertainty_g:.3g} g ({LEVEL:.0%}), mostly from {limit.cause}{unknown}"
+            f"{limit.uncertainty_g:.3g} g ({LEVEL:.0%}), main source {limit.cause}{unknown}"
         )
         _text(statement, "declaration", found)
         _add(statement, "conformity", "pass" if limit.shown and not unknown else "conditionalPass")

@@ -163,7 +163,7 @@ def _uncertainty(made: Passport) -> str:
     )
     missed = [
         f"The limit {a.where} is not shown to hold: residual and uncertainty of |a| reach "
-        f"{a.factor:.2g} times {a.limit_g * 1e3:g} mg, mostly by {a.cause}."
+        f"{a.factor:.2g} times {a.limit_g * 1e3:g} mg; the main source is {a.cause}."
         for a in made.acceptance
         if not a.shown
     ]

@@ -86,7 +86,7 @@ def _headline(session: Session, phase: Stage, done: int, whole: int) -> str:
         return f"TURN TO {wanted} - or press y to take {described(session.offered)} now"
     return {
         "reference": f"LEARNING THE NOISE {done}/{whole} s - do not touch",
-        "temperature": f"WAIT FOR {target:g} degC - put {wanted}, then do not touch",
+        "temperature": f"WAIT FOR {target:g} degC - turn to {wanted}, then do not touch",
         "turn": f"TURN TO {wanted}",
         "still": f"{wanted} FOUND - hands off {done}/{whole} s",
         "settle": f"SETTLING {wanted} {done}/{whole} s - do not touch",

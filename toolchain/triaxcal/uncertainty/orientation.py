@@ -83,5 +83,5 @@ def in_words(direction: FloatArray) -> str:
     whole = direction / largest
     if np.allclose(whole, np.rint(whole), atol=1e-9):
         parts = [f"{'+' if v > 0 else '-'}{a}" for a, v in zip(AXES, whole, strict=True) if v]
-        return f"{parts[0]} up" if len(parts) == 1 else f"{' '.join(parts)} up alike"
+        return f"{parts[0]} up" if len(parts) == 1 else f"{' and '.join(parts)} equally up"
     return "force along (" + ", ".join(f"{v:+.2f}" for v in direction) + ")"
