@@ -66,7 +66,7 @@ class Key(Generic[T_co]):
 
 FORMAT = Key("format", whole(1, 1), "Version of this format.", example="1")
 """Every file has it."""
-DESCRIPTION = Key("description", TEXT, "For people; nothing is made of it.", "")
+DESCRIPTION = Key("description", TEXT, "A text for the reader; it is not used.", "")
 
 
 def setting(

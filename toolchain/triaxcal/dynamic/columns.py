@@ -146,7 +146,7 @@ def quantities_of(values: Values, found: DynamicTable) -> tuple[Quantity, ...]:
 
 
 def names_of(found: DynamicTable) -> list[Column]:
-    """Columns that are asked for by themselves or in triads."""
+    """Columns, single or in triads."""
     triads = (*found.rate_columns, *found.force_columns, *(found.force2_columns or ()))
     single = (found.temp_column, found.table_angle_column)
     return [*found.time_column, *(c.column for c in triads), *(c for c in single if c is not None)]

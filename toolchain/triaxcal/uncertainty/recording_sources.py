@@ -47,7 +47,7 @@ def _poses(p: Curves, recording: RecordingFit) -> Source:
         distribution=STUDENT,
         dof=float(recording.dof),
         origin="|a| - g at the poses, per degree of freedom",
-        advice="record more poses, in orientations that are not alike",
+        advice="record more poses, in different orientations",
         constants=constants,
         force=with_quadratic(p, recording, mapped(-p.inverse, constants)),
     )
@@ -61,7 +61,7 @@ def _gravity(p: Curves) -> Source:
 
 
 def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
-    """What the model misses at poses that it has not seen, beyond the fitted ones' scatter."""
+    """Error of the model at held-out poses, beyond the scatter of the fitted ones."""
     held_out = recording.held_out_g
     if held_out is None:
         return Source(
@@ -69,7 +69,7 @@ def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
             name="the model",
             unit="g",
             advice="record more poses",
-            origin="unknown: no pose could be left out",
+            origin="unknown: no pose can be held out",
         )
     sd = math.sqrt(max(held_out**2 - recording.rms_free_g**2, 0.0))
     return Source(
@@ -80,13 +80,13 @@ def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
         distribution=STUDENT,
         dof=float(len(recording.residual_g)),
         origin="held-out |a| - g beyond the scatter of the poses",
-        advice="record more poses, in orientations that are not alike",
+        advice="record more poses, in different orientations",
         force=direct(p, np.broadcast_to(np.eye(3) * sd, (len(p.temps_degc), 3, 3))),
     )
 
 
 def _temperature() -> Source:
-    """Nothing was recorded of the temperature, so nothing is known of what it does."""
+    """The change with temperature is unknown: no temperature was recorded."""
     return Source(
         key="temperature",
         name="the change with temperature",

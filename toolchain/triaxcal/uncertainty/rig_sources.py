@@ -18,7 +18,7 @@ LEVEL_ARCSEC = 20.0
 GRAVITY_M_PER_S2 = 5e-5
 THERMOMETER_DEGC = 0.1
 DRIFT_DEGC = 0.02
-_WORTH_TELLING_ARCSEC = 1e-3
+_WORTH_REPORTING_ARCSEC = 1e-3
 
 
 def rig_sources(p: Propagation, s: Scatter) -> list[Source]:
@@ -44,16 +44,16 @@ def _noise(p: Propagation, s: Scatter) -> Source:
     covariance = constants.reshape(-1, 12, 12)
     origin = "dwell statistics, sd / sqrt(count)"
     if p.data.readings.pooled:
-        origin += ", sd pooled over the dwells: they have few readings"
+        origin += ", sd pooled over the dwells because each has few readings"
     if not s.recorded:
         origin = "scatter of the residuals from temperature to temperature"
         if p.groups == 1:
-            origin = "scatter of the residuals; one temperature cannot tell it from placement"
+            origin = "scatter of the residuals; one temperature cannot separate it from placement"
     return Source(
         key="noise",
         name="the noise of the calibration readings",
         unit="V",
-        advice="dwell longer: four times as long halves it",
+        advice="measure longer: four times as long halves it",
         origin=origin,
         sd=math.sqrt(float(np.mean(s.variance_v2))),
         distribution=STUDENT,
@@ -67,9 +67,9 @@ def _repeatability(p: Propagation, s: Scatter) -> Source:
     """Tilts that are new in each dwell, and whatever else scatters beyond the noise."""
     origin = "scatter of the residuals beyond the dwell statistics"
     if not s.recorded:
-        origin = "within the noise: the file has no dwell statistics to tell it apart"
+        origin = "within the noise: the file has no dwell statistics to separate it"
     elif p.groups == 1:
-        origin = "not told from squareness by one temperature"
+        origin = "one temperature cannot separate it from squareness"
     return _placement(
         p,
         "repeatability",
@@ -82,10 +82,10 @@ def _repeatability(p: Propagation, s: Scatter) -> Source:
 
 def _squareness(p: Propagation, s: Scatter) -> Source:
     """Tilts of the six positions that are the same at all temperatures."""
-    origin = "residuals over the positions that stay at all temperatures"
+    origin = "residuals over the positions, the part common to all temperatures"
     least = s.resolution_rad / RADIANS_PER_ARCSEC
-    if s.squareness_rad <= s.resolution_rad and least >= _WORTH_TELLING_ARCSEC:
-        origin += f"; below {least:.2g} arcsec it is not told from noise"
+    if s.squareness_rad <= s.resolution_rad and least >= _WORTH_REPORTING_ARCSEC:
+        origin += f"; below {least:.2g} arcsec it is within the noise"
     each = np.einsum("nikr,riq->nikrq", p.operator, p.tilt_effect)
     return _placement(
         p,
@@ -198,7 +198,7 @@ def _stated(
         *words,
         _from_file(setting[0])
         if stated is not None
-        else f"assumed: [uncertainty] {setting[0]} says nothing",
+        else f"assumed: [uncertainty] {setting[0]} is not given",
         sd,
         NORMAL,
         ASSUMED_DOF if stated is None else math.inf,

@@ -14,13 +14,13 @@ from triaxcal.unit.recording import RecordingLayout
 DEFAULT_LSB: Mapping[str, float] = MappingProxyType(
     {"m/s^2": 2.0**-16, "g": 2.0**-20, "mg": 2.0**-10, "count": 1.0, "V": 2.0**-22, "mV": 2.0**-12}
 )
-"""Reading of one raw code where [adc] says nothing: at 24 bits +-128 m/s^2, +-8 g, +-2 V."""
+"""Reading of one raw code without [adc]: at 24 bits +-128 m/s^2, +-8 g, +-2 V."""
 _CODE = whole(-(2**31), 2**31 - 1)
 
 
 @dataclass(frozen=True)
 class Adc:
-    """How a raw code stands for a voltage: U = code * full_scale_v / 2^(bits - 1)."""
+    """The voltage of a raw code: U = code * full_scale_v / 2^(bits - 1)."""
 
     bits: int
     full_scale_v: float

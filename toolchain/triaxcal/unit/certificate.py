@@ -1,4 +1,4 @@
-"""What only people know of a calibration: [certificate] in unit.toml, for the DCC."""
+"""What only the laboratory knows of a calibration: [certificate] in unit.toml, for the DCC."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from triaxcal.base.kinds import DATE, line, pattern
 
 @dataclass(frozen=True)
 class CertificateDetails:
-    """[certificate]: what only people know, for the Digital Calibration Certificate.
+    """[certificate]: what only the laboratory knows, for the Digital Calibration Certificate.
 
     Attributes
     ----------

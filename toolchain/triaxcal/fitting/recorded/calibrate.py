@@ -66,7 +66,7 @@ def calibrate_poses(
     halves = half_cycle_turns(temps)
     rates = pose_rates(samples, poses, layout) if halves else None
     if rates is None:
-        halves = []  # they judge a term in dT/dt; without a clock the rows' order says nothing
+        halves = []  # they judge a term in dT/dt; without a clock the order has no meaning
     climate = PoseClimate(temps, rates, unit.loss)
     left_out = folds(orientations, temperatures, len(temps)) + halves
     trials = [
