@@ -160,7 +160,7 @@ def test_what_loggers_write_above_the_rows(tmp_path: Path, text: str) -> None:
 def test_what_was_left_out_above_is_told(tmp_path: Path) -> None:
     text = f"Device: 17\n\nt,ax,ay,az\ns,m/s2,m/s2,m/s2\n{BODY}"
     told = calibrated(write_unit(tmp_path / "U", text)).findings
-    assert "2 lines above the rows left out, from 1 on" in told
+    assert "2 lines left out above the rows, from line 1 on" in told
 
 
 def test_a_first_row_with_empty_cells_is_still_a_row(tmp_path: Path) -> None:

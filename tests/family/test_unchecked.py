@@ -37,7 +37,7 @@ def test_as_many_constants_as_poses_are_not_called_passed(tmp_path: Path, count:
     assert "\nNOT CHECKED " in told
     assert "\npassed" not in told
     assert "uncertainty     unknown: there are as many constants as poses" in told
-    assert "held out        nothing: the fit needs every pose" in told
+    assert "held out        none: the fit needs every pose" in told
     assert b"NOT CHECKED<small>as many constants as poses" in passport_html(made)
     assert not made.shown
     assert np.isnan(delivery.calibration.constants_covariance(20.0)).any()

@@ -1,8 +1,8 @@
 """certificate.dcc.xml: PTB's Digital Calibration Certificate, schema 3.2.1 with D-SI 2.1.0.
 
 Values are in SI units: K in V/(m/s^2), U0 in V; of a recording in its own unit of the readings
-(counts have the unit one, g are turned into m/s^2). What only the laboratory knows (customer, dates,
-signer) is in [certificate] of unit.toml; without it there is no certificate.
+(counts have the unit one, g are turned into m/s^2). Customer, dates and
+signer are in [certificate] of unit.toml; without it there is no certificate.
 """
 
 from __future__ import annotations
