@@ -78,7 +78,7 @@ def calibrate_series(
     work = units if isinstance(units, Work) else plan_work([Path(u) for u in units], target)
     start = time.monotonic()
     with _runner(jobs, scheduler, finishing) as (run, width):
-        series = run_series(work, target, make_unit, run, sometimes=SOMETIMES, tell=outcome)
+        series = run_series(work, target, make_unit, run, sometimes=SOMETIMES, report=outcome)
     seconds = time.monotonic() - start
     target.mkdir(parents=True, exist_ok=True)
     if series.made:

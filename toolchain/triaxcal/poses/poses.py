@@ -1,4 +1,4 @@
-"""Poses of a recording: still stretches long and steady enough, and the reason of every refusal."""
+"""Poses of a recording: stretches at rest, long and steady enough; the reason of every refusal."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from triaxcal.unit.recordingfile import TIME_UNITS
 
 BATCHES = 8
 _STEPS_S = (5e-4, 0.5)
-"""Between samples of a logger: what tells seconds from milliseconds."""
+"""Plausible times between samples: they distinguish seconds from milliseconds."""
 _SAME_RAD = 1e-6
 """Angles of one pose are written alike in all its rows."""
 ALIKE_DEG = 5.0
@@ -33,7 +33,7 @@ class Pose:
     Attributes
     ----------
     number : int
-        Among all still stretches that were looked at, from 1.
+        Among all stretches at rest that were examined, from 1.
     line : int
         Line of its first sample.
     start_s, duration_s : float
@@ -130,13 +130,14 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
 def _sorted_out(
     judged: Iterable[tuple[Pose, str]],
 ) -> tuple[tuple[Pose, ...], tuple[RefusedPose, ...]]:
-    """Poses, and still stretches for which there is a reason not to be one."""
+    """Poses, and the stretches at rest that are refused, with the reason."""
     poses: list[Pose] = []
     refused: list[RefusedPose] = []
     for pose, reason in judged:
         if reason:
-            told = RefusedPose(pose.number, pose.line, pose.start_s, pose.duration_s, reason)
-            refused.append(told)
+            refused.append(
+                RefusedPose(pose.number, pose.line, pose.start_s, pose.duration_s, reason)
+            )
         else:
             poses.append(pose)
     return tuple(poses), tuple(refused)
@@ -228,7 +229,7 @@ def _no_poses(
     first = f"; pose {refused[0].number}: {refused[0].reason}" if refused else ""
     return RefusedError(
         samples.source,
-        f"no pose found: the longest still stretch has {longest:.3g} s{first}",
+        f"no pose found: the longest stretch at rest lasts {longest:.3g} s{first}",
         expected=f"poses of at least {layout.still_s:g} s",
         remedy=_wrong_clock(samples, layout)
         or "hold each pose longer, or lower [recording] still_s; "
@@ -237,20 +238,20 @@ def _no_poses(
 
 
 def _wrong_clock(samples: Samples, layout: RecordingLayout) -> str:
-    """What to do where the whole recording is shorter than a few poses can be; "" where not."""
+    """Remedy for a recording that is too short for a few poses; "" otherwise."""
     whole = samples.one(TIME, len(samples) - 1) + samples.step_s
     if whole > 4.0 * layout.still_s:
         return ""
-    told = f"the whole recording lasts {whole:.3g} s"
+    lasts = f"the whole recording lasts {whole:.3g} s"
     if layout.sample_rate_hz is not None:
-        return f"{told} at {1.0 / samples.step_s:g} Hz: check sample_rate_hz"
+        return f"{lasts} at {1.0 / samples.step_s:g} Hz: check sample_rate_hz"
     if not layout.time:
-        return told
+        return lasts
     scale = TIME_UNITS[layout.time_unit[0]]
     near = [
         u for u, s in TIME_UNITS.items() if _STEPS_S[0] < samples.step_s / scale * s < _STEPS_S[1]
     ]
-    return f"{told}: check time_unit" + (f', as time_unit = "{near[0]}"' if near else "")
+    return f"{lasts}: check time_unit" + (f', as time_unit = "{near[0]}"' if near else "")
 
 
 def orientation_groups(directions: FloatArray, angle_deg: float = ALIKE_DEG) -> list[list[int]]:

@@ -28,11 +28,11 @@ class Steady:
         self._one_g = layout.reading_of_1_g or float(spans.max()) / 2.0
 
     def reason(self, run: tuple[int, int]) -> str:
-        """Why a still stretch is no pose; "" when it is one."""
+        """Why a stretch at rest is no pose; "" if it is one."""
         samples, (start, stop) = self._samples, run
         length_s = duration_s(samples, run)
         if length_s < self._layout.still_s:
-            return f"{length_s:.1f} s still, needs {self._layout.still_s:.1f}"
+            return f"{length_s:.1f} s at rest, needs {self._layout.still_s:.1f}"
         deviation = samples.deviation(READING, start, stop)
         return (
             self._clipped(deviation, samples.part(READING, start, start + 1)[0])
@@ -56,8 +56,8 @@ class Steady:
             stuck = moves and deviation[axis] == 0.0 and (np.delete(deviation, axis) > 0.0).any()
             if stuck and first[axis] in (self._low[axis], self._high[axis]):
                 return (
-                    f"axis {AXES[axis]} is clipped: it stays at {first[axis]:g}, the end of what "
-                    "the file shows; measure with a wider range"
+                    f"axis {AXES[axis]} is clipped: it stays at {first[axis]:g}, the largest or "
+                    "smallest reading of the file; measure with a wider range"
                 )
         return ""
 

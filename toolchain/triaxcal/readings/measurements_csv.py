@@ -64,7 +64,7 @@ class Header:
 
 @dataclass(frozen=True)
 class Row:
-    """Cells of one line by column; getters tell file, line and column of a mistake."""
+    """Cells of one line by column; getters report file, line and column of a mistake."""
 
     source: str
     line: int
@@ -86,7 +86,7 @@ class Row:
         Raises
         ------
         RefusedError
-            For anything else; tells a decimal comma and a thousands separator apart from text.
+            For anything else; the remedy names a decimal comma or a thousands separator.
         """
         text = self.cells[column]
         if is_number(text):
@@ -178,7 +178,7 @@ def _text(path: Path) -> str:
     try:
         data = path.read_bytes()
     except OSError as error:
-        remedy = "put the dwells there, as docs/how-to/add-a-unit.md tells"
+        remedy = "put the dwells there, as docs/how-to/add-a-unit.md describes"
         raise refused_by_system(path, "read", error, remedy=remedy) from error
     try:
         return data.decode("utf-8-sig")
