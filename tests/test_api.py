@@ -314,6 +314,36 @@ def _changed(name: str, value: Any) -> dict[str, list[Any]]:
     return data
 
 
+def test_where_nothing_can_be_written_another_folder_is_advised(
+    cal: triaxcal.Calibration, fw: triaxcal.Firmware, tmp_path: Path
+) -> None:
+    missing, mine = tmp_path / "no" / "x.json", tmp_path / "mine.txt"
+    mine.write_text("mine", encoding="utf-8")
+    with pytest.raises(triaxcal.RefusedError) as refusal:
+        cal.save(missing)
+    assert str(refusal.value) == (
+        f"{missing}: cannot be written: no such file or directory; make its folder, or name "
+        "another folder"
+    )
+    with pytest.raises(triaxcal.RefusedError) as refusal:
+        fw.write(tmp_path)
+    assert str(refusal.value) == (
+        f"{tmp_path}: holds 'mine.txt', which no delivery has; expected only what an earlier run "
+        "wrote: the folder is replaced as a whole; move it away, or name another folder"
+    )
+
+
+def test_a_series_is_refused_when_it_is_asked_for(tmp_path: Path) -> None:
+    with pytest.raises(triaxcal.RefusedError, match="found 0; expected 1 to 9999 units"):
+        triaxcal.simulate_series(UNITS / "AT-SIM", tmp_path, 0)
+    (tmp_path / "AT-SIM-0002").mkdir()
+    with pytest.raises(triaxcal.RefusedError, match="AT-SIM-0002: exists already; remove it"):
+        triaxcal.simulate_series(UNITS / "AT-SIM", tmp_path, 2)
+    assert [p.name for p in triaxcal.simulate_series(UNITS / "AT-SIM", tmp_path / "n", 1)] == [
+        "AT-SIM-0001"
+    ]
+
+
 @pytest.mark.parametrize(
     ("readings", "told"),
     [

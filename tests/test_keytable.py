@@ -139,6 +139,16 @@ def test_a_first_file_of_a_tilter_goes_the_whole_way(tmp_path: Path) -> None:
     assert (result["unit"], result["serial"]) == ("SN-7", "SN-7")
 
 
+@pytest.mark.parametrize("kind", ["tilter", "recording"])
+def test_the_codes_of_a_first_file_hold_when_they_are_in_force(kind: str, tmp_path: Path) -> None:
+    path, _ = write_starter(tmp_path / "U-7", kind)
+    text = path.read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^# (?=\[adc\]|code_m)", "", text)
+    path.write_text(text, encoding="utf-8")
+    adc = read_unit(path.parent).adc
+    assert (adc.bits, adc.code_min, adc.code_max) == (24, -32000, 32000)
+
+
 @pytest.mark.parametrize("there", ["unit.toml", "unit.schema.json"])
 def test_no_file_is_overwritten(tmp_path: Path, there: str) -> None:
     (tmp_path / "U").mkdir()

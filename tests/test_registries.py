@@ -42,7 +42,7 @@ from triaxcal.report.series.unit import unit_record
 from triaxcal.report.summary import summary
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.uncertainty.evaluate import uncertainty
-from triaxcal.unit.description import read_unit, tilter_file
+from triaxcal.unit.description import read_unit, tilter_file, unit_of_text
 from triaxcal.unit.thermal import ThermalChoice
 
 UNITS = Path(__file__).parent.parent / "units"
@@ -352,6 +352,14 @@ def test_an_entry_without_a_part_is_named(part: str) -> None:
         "label, doc, short_label, colour, form; define every part of the entry"
     )
     assert "toy-broken" not in METHODS
+
+
+def test_the_default_method_is_the_first_of_the_methods_that_there_are() -> None:
+    text = (UNITS / "AT-SIM" / "unit.toml").read_text(encoding="utf-8")
+    assert "method" not in text
+    assert unit_of_text("U", text, "unit.toml").method == "matrix"
+    with METHODS.added(replace(TOY_METHOD, name="toy-first", rank=0)):
+        assert unit_of_text("U", text, "unit.toml").method == "toy-first"
 
 
 def test_a_name_twice_and_a_wrong_class_are_refused() -> None:

@@ -179,6 +179,13 @@ def test_a_source_added_at_run_time_is_opened_and_explained():
     assert kind_of("toy").name == "socketcan"
 
 
+def test_an_added_source_is_asked_before_python_can_takes_the_rest():
+    own = SourceKind("zlg", "zlg:n", "a test's", lambda bus: bus == "zlg:0", lambda _: None)
+    with SOURCES.added(own):
+        assert kind_of("zlg:0") is own
+        assert kind_of("zlg:1").name == "python-can"
+
+
 def test_a_log_is_a_source_until_it_ends(tmp_path):
     source_rig, path = rig_of(short_setup(tmp_path)), tmp_path / "x.log"
     frames = [source_rig.advance() for _ in range(2)]

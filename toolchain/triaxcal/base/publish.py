@@ -70,7 +70,7 @@ def _refuse_foreign(target: Path, files: Collection[str]) -> None:
             str(target),
             "is not a folder of results",
             expected="nothing there, or what an earlier run wrote",
-            remedy="move it away, or name another folder with --build",
+            remedy="move it away, or name another folder",
         )
     if not target.is_dir():
         return
@@ -84,7 +84,7 @@ def _refuse_foreign(target: Path, files: Collection[str]) -> None:
             f"holds {foreign[0]!r}, which no delivery has"
             + (f", and {len(foreign) - 1} more" if len(foreign) > 1 else ""),
             expected="only what an earlier run wrote: the folder is replaced as a whole",
-            remedy="move it away, or name another folder with --build",
+            remedy="move it away, or name another folder",
         )
 
 
@@ -110,9 +110,11 @@ def _umask() -> int:
 
 
 def _refusal(where: Path, error: OSError) -> RefusedError:
-    remedy = "check its permissions, or name another folder with --build"
+    remedy = "check its permissions, or name another folder"
+    if error.errno == errno.ENOENT:
+        remedy = "make its folder, or name another folder"
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        remedy = "free some space, or name another folder with --build"
+        remedy = "free some space, or name another folder"
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
-        remedy = "a file is in the way: move it, or name another folder with --build"
+        remedy = "a file is in the way: move it, or name another folder"
     return refused_by_system(where, "written", error, remedy=remedy)

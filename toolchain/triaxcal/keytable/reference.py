@@ -1,6 +1,6 @@
 """The reference of the keys as Markdown.
 
-The documentation includes it with the directive `keys` of docs/_ext/key_tables.py: a block
+The documentation includes it with the directive `keys` of docs/_ext/generated.py: a block
 `{keys} tilter` becomes `reference_markdown(FILES["tilter"]())`.
 """
 

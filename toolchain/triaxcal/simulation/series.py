@@ -40,7 +40,9 @@ _SERIAL = re.compile(r'(?m)^serial\s*=\s*"[^"]*"')
 
 
 def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Iterator[Path]:
-    """Write `count` unit folders <template's name>-0001 ... into `into`; yields each.
+    """Write `count` unit folders <template's name>-0001 ... into `into`.
+
+    Everything is checked at the call; each folder is given when it is written.
 
     Raises
     ------
@@ -59,8 +61,17 @@ def write_series(template: Path, into: Path, count: int, seed: int = 1) -> Itera
             "given",
             remedy="remove it: each unit gets its own",
         )
+    folders = _new_folders(into, template.absolute().name, count)
     text = (template / UNIT_FILE).read_text(encoding="utf-8")
-    for k, folder in enumerate(_new_folders(into, template.absolute().name, count)):
+    return _written(folders, text, (truth, plan, spread), seed)
+
+
+def _written(
+    folders: list[Path], text: str, model: tuple[Truth, Plan, Spread], seed: int
+) -> Iterator[Path]:
+    """Folders as they are written, of the template's `text` of unit.toml and its truth."""
+    truth, plan, spread = model
+    for k, folder in enumerate(folders):
         run = k // spread.units_per_run
         day = FIRST_DAY + datetime.timedelta(days=run)
         rng = np.random.Generator(np.random.PCG64([seed, _STREAM, k]))

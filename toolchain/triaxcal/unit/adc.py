@@ -62,8 +62,8 @@ class _AdcTable:
 
     bits: int = setting(whole(8, 32), unit="bit", example="24")
     full_scale_v: float = setting(number(1e-3, 100.0), unit="V", example="2.5")
-    code_min: int | None = setting(_CODE, None, "code", words="-2^(bits - 1)")
-    code_max: int | None = setting(_CODE, None, "code", words="2^(bits - 1) - 1")
+    code_min: int | None = setting(_CODE, None, "code", words="-2^(bits - 1)", example="-32000")
+    code_max: int | None = setting(_CODE, None, "code", words="2^(bits - 1) - 1", example="32000")
 
 
 @dataclass(frozen=True)

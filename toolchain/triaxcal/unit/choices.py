@@ -68,7 +68,7 @@ class Compensation:
         How far the firmware's functions may be from the fitted model.
     """
 
-    method: str = setting(TEXT, METHODS.names[0])
+    method: str = setting(TEXT)
     output_q: int = setting(whole(*OUTPUT_Q_RANGE), 24)
     model_error_max_micro_g: float = setting(number(1e-3, 1e6), 1.0, "micro-g")
 
@@ -78,5 +78,6 @@ FIT, SENSOR = TableKeys.of(Fit), TableKeys.of(Sensor)
 
 def compensation_table() -> TableKeys:
     """Keys of [compensation], with the methods that there are."""
-    method = {"kind": word(METHODS.names), "doc": METHODS.explained}
+    names = METHODS.names
+    method = {"kind": word(names), "doc": METHODS.explained, "default": names[0]}
     return TableKeys.of(Compensation).but(method=method)

@@ -100,7 +100,7 @@ class Calibration:
     ----------
     serial : str
     estimator : str
-        One of `unitfile.ESTIMATORS`.
+        One of `unit.choices.ESTIMATORS`.
     thermal : ThermalModel
         The curves.
     shape : ThermalShape

@@ -141,7 +141,7 @@ def fit_scalar(
     gain_functions : int
         How many functions of temperature, the first ones, the entries of K have.
     loss : str
-        One of `unitfile.LOSSES`; the robust ones turn at three robust deviations.
+        One of `unit.choices.LOSSES`; the robust ones turn at three robust deviations.
     start : array or None
         Theta to start from; None is K = 1 and no bias, in scaled readings.
     """

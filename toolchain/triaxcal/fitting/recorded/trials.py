@@ -215,9 +215,9 @@ def without_idle_rates(rows: Sequence[Judged], values: int) -> list[Judged]:
 def beats(errors: FloatArray | None, rival: FloatArray | None) -> bool:
     """Whether held-out errors are significantly smaller than a rival's on the same values.
 
-    An rms of n values is known to 1 / sqrt(2 n) of itself (fit.selection), so it must be smaller by
-    that much; and the squares, value by value, must differ by two standard errors of their mean, or
-    the rms must be below half, an F of 4, where few values make a standard error of no use.
+    An rms of n values is known to 1 / sqrt(2 n) of itself (tilter.selection), so it must be smaller
+    by that much; and the squares, value by value, must differ by two standard errors of their mean,
+    or the rms must be below half, an F of 4, where few values make a standard error of no use.
     """
     if errors is None or rival is None:
         return False

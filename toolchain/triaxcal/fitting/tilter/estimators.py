@@ -40,7 +40,7 @@ def estimator_operators(
     Parameters
     ----------
     estimator : str
-        One of `unitfile.ESTIMATORS`.
+        One of `unit.choices.ESTIMATORS`.
     variance_v2 : array, shape (G, 6, 3), or None
         Weights of least squares; None weights all positions alike.
     """

@@ -17,4 +17,5 @@ ENTRY = SourceKind(
     doc="anything that python-can supports, as pcan:PCAN_USBBUS1",
     takes=lambda bus: True,  # noqa: ARG005
     open=_open,
+    rank=900,
 )
