@@ -1,4 +1,4 @@
-"""`fit`, `Calibration`, `load`: from readings to constants, and what is known of them."""
+"""`fit`, `Calibration`, `load`: from readings to constants and their uncertainty."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the readings say besides the constants.
+    """Findings about the readings, and the candidates of the fit.
 
     Attributes
     ----------
     findings : tuple of str
-        What a user should know of the readings, the worst first.
+        What a user should know about the readings, the worst first.
     candidates : tuple of Candidate
         Thermal functions and estimators that were tried, each with its held-out error.
     reason : str
@@ -61,7 +61,7 @@ class Calibration:
         None for a file of triaxcal 0.1.0, which does not describe its unit.
     serial : str
     range_degc : tuple of two floats
-        Working range; no other temperature is answered.
+        Working range; other temperatures are refused.
     reading_unit : str
         Unit of U and U0; K is in it per g.
     """
@@ -84,7 +84,7 @@ class Calibration:
         Raises
         ------
         RefusedError
-            When the calibration was loaded from a file of triaxcal 0.1.0: it has the curves alone.
+            When the calibration was loaded from a file of triaxcal 0.1.0: it has only the curves.
         """
         if self._saved.fitted is None:
             raise RefusedError(
@@ -122,10 +122,10 @@ class Calibration:
         Parameters
         ----------
         readings : array_like, shape (3,) or (n, 3)
-            Outputs x, y, z in `reading_unit`; a data frame of three columns will do.
+            Outputs x, y, z in `reading_unit`; a data frame of three columns is accepted.
         temp_degc : array_like, shape () or (n,)
         rate_k_per_s : array_like, shape () or (n,)
-            dT/dt, of use where a term in it was fitted.
+            dT/dt; used only if a term in it was fitted.
 
         Returns
         -------
@@ -152,7 +152,7 @@ class Calibration:
         ----------
         temp_degc : float
         direction : array_like, shape (3,)
-            Of 1 g, on the unit's axes; it is normalised.
+            Direction of the force of 1 g in the unit's axes; it is normalised.
         quantity : str
             "a_x", "a_y", "a_z" or "|a|".
 
@@ -164,7 +164,7 @@ class Calibration:
         Raises
         ------
         RefusedError
-            For a quantity or direction that is none, or a temperature out of `range_degc`.
+            For an unknown quantity, a direction of length 0, or a temperature out of `range_degc`.
         """
         if quantity not in QUANTITIES:
             raise RefusedError(
@@ -188,12 +188,12 @@ class Calibration:
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """What the readings say besides the constants."""
+        """Findings about the readings, and the candidates of the fit."""
         found = self.fitted.calibration
         return Diagnosis(found.findings, found.candidates, found.selection_reason)
 
     def plot(self) -> Figure:
-        """Constants over temperature, their uncertainty, and what is left at the dwells.
+        """Constants over temperature, their uncertainty, and the residuals at the dwells.
 
         Returns
         -------
@@ -242,7 +242,7 @@ def _refuse_other_length(voltage: FloatArray, **others: FloatArray) -> None:
 def fit(unit: Unit, readings: Any = None) -> Calibration:
     """Fit the constants of a unit over temperature.
 
-    A calibration beyond the unit's limits is returned all the same; its `verdict` says so, and
+    A calibration beyond the unit's limits is returned all the same; its `verdict` shows it, and
     `firmware` refuses it.
 
     Parameters
@@ -261,7 +261,7 @@ def fit(unit: Unit, readings: Any = None) -> Calibration:
     Raises
     ------
     RefusedError
-        When the readings break a rule of the file formats, or carry no calibration.
+        When the readings break a rule of the file formats, or do not determine a calibration.
     """
     if readings is not None:
         return _of_fitted(unit, fit_columns(unit.description, unit.toml, readings))

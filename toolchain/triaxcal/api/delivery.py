@@ -28,7 +28,7 @@ class Delivered:
     summary : str
         The text that the command line prints.
     warnings : tuple of str
-        What the unit's history contradicts.
+        Contradictions with earlier calibrations of the unit.
     """
 
     folder: Path

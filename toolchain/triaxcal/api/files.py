@@ -1,4 +1,4 @@
-"""`write_first_file`, `key_schema`: the TOML files, for people and for editors."""
+"""`write_first_file`, `key_schema`: TOML files to edit, and their schemas."""
 
 from __future__ import annotations
 

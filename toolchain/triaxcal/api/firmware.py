@@ -31,7 +31,7 @@ _BLOCK = 1 << 16
 
 
 class Firmware:
-    """The fixed-point routine of one calibration, in Python's integers: the bits that the C gives.
+    """The fixed-point routine of one calibration, in Python's integers: the same bits as the C.
 
     Made by `firmware`.
 
@@ -44,7 +44,7 @@ class Firmware:
         One code of the result, in g.
     model_error_g : float
         Largest error of the functions that the device evaluates against the fitted model, at any
-        temperature code and any raw code: what `bound` does not hold.
+        temperature code and any raw code; `bound` does not include it.
     files : dict
         Name and content of the generated C and the image.
     """
@@ -67,7 +67,7 @@ class Firmware:
         return prove(self.plan)
 
     def apply(self, raw_codes: Any, temp_codes: Any, rate_codes: Any = None) -> Answers:
-        """What `triax_set_temperature` and `triax_apply` answer.
+        """Results of `triax_set_temperature` and `triax_apply`.
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ class Firmware:
             Codes of the thermometer, any int32.
         rate_codes : array_like of whole numbers, shape () or (n,), or None
             dT/dt in 2^-RATE_Q codes of the thermometer per second (docs/reference/c-api.md). None
-            is zero; a routine without a term in dT/dt does not look at it.
+            is zero; a routine without a term in dT/dt ignores it.
 
         Returns
         -------
@@ -89,7 +89,7 @@ class Firmware:
         Raises
         ------
         RefusedError
-            For another shape, or a number that int32 does not hold: nothing wraps around.
+            For another shape, or a number beyond int32; no value wraps around.
         """
         raw, temp, rate = self.codes(raw_codes, temp_codes, rate_codes)
         accel = np.empty((len(raw), 3), np.int32)
@@ -187,7 +187,7 @@ def firmware(calibration: Calibration) -> Firmware:
     Raises
     ------
     RefusedError
-        When the calibration is beyond its unit's limits, or no integers of the format hold it.
+        When the calibration is beyond its unit's limits, or its integers do not fit the format.
     """
     refuse_beyond_limits(calibration.fitted)
     return Firmware(calibration)

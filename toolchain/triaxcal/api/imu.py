@@ -126,7 +126,7 @@ class ImuCalibration:
 
     @property
     def verdict(self) -> str:
-        """What the innovations say of the recording and the model, in words."""
+        """How consistent recording and model are, by the innovations, in words."""
         return str(self.document["innovations"]["verdict"])
 
     def constants(self, temp_degc: Any = None) -> ImuConstants:
@@ -218,7 +218,7 @@ def fit_imu(imu: Imu, progress: Progress | None = None) -> ImuCalibration:
     Raises
     ------
     RefusedError
-        When the recording cannot be read, or carries no calibration.
+        When the recording cannot be read, or does not determine a calibration.
     """
     return ImuCalibration.of(deliver_imu(imu.folder, progress))
 
@@ -229,7 +229,7 @@ def load_imu(path: str | Path) -> ImuCalibration:
     Raises
     ------
     RefusedError
-        When the file cannot be read, or is none of an IMU.
+        When the file cannot be read, or is not that of an IMU.
     """
     try:
         document = json.loads(Path(path).read_bytes())

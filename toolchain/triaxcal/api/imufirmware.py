@@ -16,7 +16,7 @@ from triaxcal.codegen.routines import Int32Array, UInt32Array
 
 
 class ImuFirmware:
-    """The fixed-point routines of both triads, in Python's integers: the bits that the C gives.
+    """The fixed-point routines of both triads, in Python's integers: the same bits as the C.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class ImuFirmware:
     def apply(
         self, raw_accel: Any, raw_gyro: Any, temp_codes: Any
     ) -> tuple[Int32Array, Int32Array, UInt32Array]:
-        """What `triax_imu_apply` answers.
+        """Results of `triax_imu_apply`.
 
         Parameters
         ----------
@@ -49,7 +49,7 @@ class ImuFirmware:
         Raises
         ------
         RefusedError
-            For another shape, or a number that int32 does not hold.
+            For another shape, or a number beyond int32.
         """
         accel, gyro = int32("raw_accel", raw_accel, 3), int32("raw_gyro", raw_gyro, 3)
         temp = int32("temp_codes", temp_codes)

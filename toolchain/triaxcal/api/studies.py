@@ -35,7 +35,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Study(Generic[T]):
-    """A result, and how people look at it.
+    """A result, with its text and picture.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ def find_poses(unit: Unit) -> Study[PoseSet]:
     Raises
     ------
     RefusedError
-        When the unit has no [recording], it cannot be read, or it is never still.
+        When the unit has no [recording], it cannot be read, or it is never at rest.
     """
     layout, samples = _recorded(unit)
     found = poses_of(samples, layout)
@@ -150,7 +150,7 @@ class MeasurementPlan:
     best: Design
 
     def session_plan(self, made_by: str) -> str:
-        """TOML of the best plan, for `triaxcal rig run --plan`; `made_by` stands in a comment."""
+        """TOML of the best plan, for `triaxcal rig run --plan`; `made_by` is in a comment."""
         return rig_plan(self.problem, self.best, made_by)
 
 

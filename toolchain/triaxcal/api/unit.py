@@ -15,7 +15,7 @@ from triaxcal.unit.folder import UNIT_FILE, UNIT_FORMAT, find_unit
 
 
 class Unit:
-    """One unit: what unit.toml says of it.
+    """One unit, as unit.toml describes it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`verify_unit`: the delivered C before other people's tools."""
+"""`verify_unit`: external tools check the delivered C."""
 
 from __future__ import annotations
 

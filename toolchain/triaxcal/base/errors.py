@@ -3,7 +3,7 @@
 RefusedError            the data or the result was refused: exit code 1
   UsageError            what was asked for does not exist or fit together: exit code 2
 
-Every message says where (file, row, key), what was found, what was expected and what to do.
+Every message has the place (file, row, key), what was found, what was expected, what to do.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class Key(Generic[T_co]):
     unit : str
         Of the value, as the reference prints it; "" for none.
     default_words : str
-        The default for people, where `default` is None or says too little.
+        The default for readers, where `default` is None or says too little.
     example : str
         The value as TOML, for the commented file of `triaxcal init`; "" makes it from the default.
     """

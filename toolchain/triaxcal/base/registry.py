@@ -17,7 +17,7 @@ from triaxcal.base.tomltable import did_you_mean
 
 
 class Entry(Protocol):
-    """What every entry has: a name for files, a label and an explanation for people."""
+    """What every entry has: a name for files, a label and an explanation for readers."""
 
     @property
     def name(self) -> str: ...

@@ -95,7 +95,7 @@ def example(*lines: str) -> str:
 
 
 def say(text: str) -> None:
-    """Print text with its words wrapped to the terminal, to 80 columns where there is none."""
+    """Print text with its words wrapped to the terminal, to 80 columns if there is none."""
     narrow, wide = _WIDTHS
     click.echo(wrapped(text, min(max(shutil.get_terminal_size().columns, narrow), wide)))
 

@@ -1,4 +1,4 @@
-"""triaxcal verify: the delivered C of a unit before other people's tools."""
+"""triaxcal verify: the delivered C of a unit before external tools."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Provenance:
     inputs_sha256 : str
         Hash of the unit's files.
     summary : tuple of str
-        Lines for people: method, thermal model, range, limits.
+        Lines for readers: method, thermal model, range, limits.
     """
 
     serial: str

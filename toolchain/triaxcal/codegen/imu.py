@@ -132,7 +132,7 @@ def rate_bound(gyro: Plan, own: Bound, accel: Bound) -> tuple[float, float, floa
     assert gyro.sensitivity is not None
     weight = np.abs(gyro.sensitivity) * 2.0**-gyro.shape.output_shift
     x, y, z = (
-        # Seven roundings of some 2^-53 each; this is a figure for people, and rounded up.
+        # Seven roundings of some 2^-53 each; this is a figure for readers, and rounded up.
         (1 + 2.0**-49) * (b + float(row @ np.array(accel.per_axis_lsb)))
         for b, row in zip(own.per_axis_lsb, weight, strict=True)
     )

@@ -52,7 +52,7 @@ _CUSTOM: Custom = {ThermalShape: (_shape_data, _shape)}
 
 @dataclass(frozen=True)
 class Saved:
-    """What a calibration.json says.
+    """What a calibration.json holds.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ def _state(fitted: Fitted) -> dict[str, Any]:
 
 
 def read_saved(path: Path) -> Saved:
-    """What a calibration.json says.
+    """What a calibration.json holds.
 
     Raises
     ------

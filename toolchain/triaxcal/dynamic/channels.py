@@ -80,7 +80,7 @@ def steady(angle_rad: FloatArray, sd_rad: float) -> BoolArray:
     For the gyros a table is at rest that turns slower than they resolve at the start: in the last
     tenths of a second before a stop it may turn by 90", and the reading's mean over the block is
     not its end. The two halves of a block differ by no more than their noise where the table
-    rests, and a block beside one that moves is not believed: it may hold what the test cannot see.
+    rests, and a block beside one that moves is not used: it may hold what the test cannot see.
     """
     blocks, samples = angle_rad.shape
     halves = angle_rad[:, : samples // 2 * 2].reshape(blocks, 2, -1).mean(axis=2)

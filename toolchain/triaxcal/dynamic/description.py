@@ -94,7 +94,7 @@ _AXES = {
 
 @dataclass(frozen=True, kw_only=True)
 class _TablePapers:
-    """[table]: what the papers of the turntable say; for its angle readings.
+    """[table]: what the certificate of the turntable states; for its angle readings.
 
     Attributes
     ----------
@@ -185,7 +185,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
 
 
 def _table(values: Values) -> Turntable | None:
-    """[table], or None where there is none."""
+    """[table], or None if there is none."""
     if not values:
         return None
     papers = values.record(_TablePapers)

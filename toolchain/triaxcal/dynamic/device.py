@@ -68,7 +68,7 @@ REQUIRED = tuple(key.name for key in DEVICE.keys if key.required)
 
 
 def device_of(values: Values) -> Device | None:
-    """[device], or None where there is none."""
+    """[device], or None if there is none."""
     if not values:
         return None
     return values.record(Device, temperature_sensor=values.record(TemperatureSensor))

@@ -2,7 +2,7 @@
 
 At rest on the Earth gravity turns in the instrument as f' = -w x f. Over the whole recording this
 gives, by least squares, the matrix M that best makes the turning of the forces out of the measured
-rates. For a sound recording M is near the identity; a factor in it is a wrong unit, and a signed
+rates. For a good recording M is near the identity; a factor in it is a wrong unit, and a signed
 permutation is exchanged axes or a left-handed triad.
 """
 

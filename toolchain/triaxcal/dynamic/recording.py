@@ -89,7 +89,7 @@ def joined(parts: Iterable[ImuSamples]) -> ImuSamples:
 
 @dataclass(frozen=True)
 class Turntable:
-    """What the table's own papers say, for its angle readings (P2 (17)).
+    """What the table's own certificate states, for its angle readings (P2 (17)).
 
     Table axes: the first is the axis of rotation, the third is as near to up as that allows. At
     angle zero the plate's axes are the table's; it turns right-handed about the first. Geographic
@@ -133,7 +133,7 @@ class ImuRecording:
     table : Turntable, or None
         Needed only where the table's angle readings are used.
     findings : tuple of str
-        What was left out or mended when it was read.
+        What was left out or repaired when it was read.
     """
 
     name: str

@@ -33,7 +33,7 @@ STILL_SD = 5.0
 STILL_MAX_RAD_PER_S = np.radians(3.0)
 """A noisy gyro is given so many deviations of a window's mean, by its first seconds."""
 GUARD_S = 2.0
-"""Around handling nothing is believed: what lifts the unit starts and ends slowly."""
+"""Around handling nothing is used: what lifts the unit starts and ends slowly."""
 
 
 @dataclass(frozen=True)

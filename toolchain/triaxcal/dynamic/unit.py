@@ -25,7 +25,7 @@ class DynamicUnit:
     off : tuple of Effect
         Effects that are switched off, tested on the recording.
     findings : tuple of str
-        What was left out or mended when the recording was read.
+        What was left out or repaired when the recording was read.
     """
 
     unit: DynamicDescription

@@ -117,7 +117,7 @@ class Window:
 
     @cached_property
     def delta_degc(self) -> FloatArray:
-        """Temperature against the reference; zero where there is none."""
+        """Temperature against the reference; zero if there is none."""
         if self.samples.temp_degc is None:
             return np.zeros(len(self.samples))
         delta: FloatArray = self.samples.temp_degc - self.frame.reference_degc

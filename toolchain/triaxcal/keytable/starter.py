@@ -84,7 +84,7 @@ def _key(key: Key[Any], stands: bool) -> str:
 
 
 def example(key: Key[Any]) -> str:
-    """A good value in TOML: the default, where there is one."""
+    """A good value in TOML: the default, if there is one."""
     stated = key.default not in (REQUIRED, None, (), {})
     if stated and (not key.kind.choices or key.default in key.kind.choices):
         return key.example or toml_value(key.default)

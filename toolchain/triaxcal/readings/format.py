@@ -103,7 +103,7 @@ class Format:
     name : str
         Value of the key `format`.
     label, doc : str
-        Name for people, and what is a column in it.
+        Name for readers, and what is a column in it.
     open : callable
         Opens a path with the layout of its table.
     extensions : tuple of str

@@ -53,7 +53,7 @@ class Dwell:
     voltage_v : array, shape (3,)
         Mean outputs Ux, Uy, Uz in V.
     count : int or None
-        Number of independent readings in the mean; None when the file does not say.
+        Number of independent readings in the mean; None if the file does not state it.
     sd_v : array, shape (3,), or None
         Standard deviation of one reading, V.
     rate_k_per_s : float

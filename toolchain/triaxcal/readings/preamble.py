@@ -41,7 +41,7 @@ class FoundTable:
     names : tuple of str
         Of the columns; empty without a header.
     start : int
-        Line of the first row, from 1; 0 where there is none.
+        Line of the first row, from 1; 0 if there is none.
     delimiter : str
     width : int
         Cells of a row.
@@ -117,7 +117,7 @@ def _first_row(plain: Sequence[Line], layout: FileLayout) -> int:
 
 
 def _header(above: Sequence[Line], wanted: set[str], delimiter: str, width: int) -> Line | None:
-    """Line of names above the first row; None where there is none."""
+    """Line of names above the first row; None if there is none."""
     best: tuple[int, int, Line] | None = None
     for line in above:
         cells = _trimmed(split_cells(line.text, delimiter))

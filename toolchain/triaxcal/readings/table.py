@@ -1,6 +1,6 @@
 """The columns of a recording that a table of unit.toml names, with a time, in one spool.
 
-One reader for [recording] and [dynamic]: the file is read once, in blocks; times are mended, rows
+One reader for [recording] and [dynamic]: the file is read once, in blocks; times are repaired, rows
 without all readings are left out and reported, and the rest goes into a spool of doubles.
 """
 

@@ -1,1 +1,1 @@
-"""Tables and pictures for people. Reads every room; no room imports it."""
+"""Tables and pictures for readers. Reads every room; no room imports it."""

@@ -17,14 +17,14 @@ SOMETIMES = (CERTIFICATE,)
 
 
 def passport_files(made: Passport) -> dict[str, bytes]:
-    """The passport for people and for machines."""
+    """The passport as a page and as JSON."""
     return {"passport.html": passport_html(made), "passport.json": passport_json(made)}
 
 
 def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, bytes]:
     """Name and content of everything that build/<UNIT>/ receives.
 
-    `made` is the delivery's passport, where there is one already.
+    `made` is the delivery's passport, if there is one already.
     """
     unit_passport = made or passport(delivery, {})
     certificate = {}

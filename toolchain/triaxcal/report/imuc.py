@@ -45,7 +45,7 @@ def refuse_no_device(unit: DynamicDescription) -> None:
 
 
 def imu_c_files(made: ImuDelivery) -> dict[str, bytes]:
-    """Name and content of `C_FILES`; nothing where there is no C."""
+    """Name and content of `C_FILES`; nothing if there is no C."""
     if made.c is None:
         return {}
     return {**made.c.build.files, VERIFICATION_FILE: _verification_json(made, made.c)}
@@ -99,7 +99,7 @@ def _deg_per_h(gyro: Plan, lsb: float) -> float:
 
 
 def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
-    """What the delivery has shown of its C: rows for the page, nothing where there is no C."""
+    """What the delivery has shown of its C: rows for the page, nothing if there is no C."""
     if made.c is None:
         return []
     c, build = made.c, made.c.build

@@ -2,7 +2,7 @@
 
 One record a line: eight hex digits of CRC-32, a space, JSON. The CRC runs over the one before and
 the JSON, so a record that was changed, moved or taken out breaks the chain. What stands behind
-the first broken record is not believed.
+the first broken record is not used.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Record = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class ReadJournal:
-    """Records of a journal that can be believed.
+    """Records of a journal that can be used.
 
     Attributes
     ----------

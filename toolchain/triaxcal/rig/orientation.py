@@ -33,7 +33,7 @@ def recognised(mean_code: FloatArray, micro_g_per_code: FloatArray) -> str | Non
 
 
 def described(position: str) -> str:
-    """Position with the axis that points up, for people."""
+    """Position with the axis that points up, for readers."""
     if position in CHECK_POSITIONS:
         return f"{position} ({UP['T' + position[1:]]} up, tilted)"
     return f"{position} ({UP[position]} up)"

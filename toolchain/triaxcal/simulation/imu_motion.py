@@ -187,7 +187,7 @@ class ImuMotion:
         return self._built.lift
 
     def turntable(self) -> Turntable:
-        """What the table's papers say, without wobble and placement."""
+        """What the table's certificate states, without wobble and placement."""
         return Turntable(
             azimuth_rad=math.radians(self.table.azimuth_deg),
             elevation_rad=math.radians(self.table.elevation_deg),

@@ -40,7 +40,7 @@ class Subject:
 
     @property
     def label(self) -> str:
-        """For people."""
+        """Text for readers."""
         kind = self.real or ARITHMETIC_NAMES[self.arithmetic]
         return f"{self.case.name}, {kind}"
 

@@ -34,7 +34,7 @@ class Build:
 
     @property
     def label(self) -> str:
-        """For people."""
+        """Text for readers."""
         t = self.toolset
         return (
             f"{self.case.name}, {t.core.label}, {t.compiler} {t.optimisation}, "

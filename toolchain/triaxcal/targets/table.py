@@ -1,4 +1,4 @@
-"""The matrix for people and as JSON."""
+"""The matrix as text and as JSON."""
 
 from __future__ import annotations
 

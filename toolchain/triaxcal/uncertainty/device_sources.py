@@ -34,7 +34,7 @@ class Device:
 
 
 def device_sources(p: Curves, device: Device | None) -> list[Source]:
-    """Rounding of the codes, and what is proven of the firmware, where there is one."""
+    """Rounding of the codes, and what is proven of the firmware, if there is one."""
     code_v = p.unit.adc.volts_per_code / _ROOT_12
     code_degc = p.unit.temperature_sensor.degc_per_code / _ROOT_12
     sources = [

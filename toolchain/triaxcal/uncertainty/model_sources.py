@@ -52,7 +52,7 @@ def thermal_model(p: Propagation, s: Scatter) -> Source:
 
 
 def _without_held_out(p: Propagation) -> Source:
-    """The distance to another function through the same points, where there is one."""
+    """The distance to another function through the same points, if there is one."""
     rival = _rival(p)
     if rival is None:
         return Source(

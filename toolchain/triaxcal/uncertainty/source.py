@@ -24,7 +24,7 @@ class Source:
     key : str
         For machines.
     name : str
-        For people, as the subject of a sentence.
+        For readers, as the subject of a sentence.
     unit : str
     advice : str
         What would make it smaller.

@@ -63,7 +63,7 @@ def rate_source(p: Curves, recording: RecordingFit) -> list[Source]:
 
 
 def with_quadratic(p: Curves, recording: RecordingFit, force: FloatArray) -> FloatArray:
-    """Covariance of D, (n, 12, 12), with Q of the same fit: (n, 30, 30) where there is one."""
+    """Covariance of D, (n, 12, 12), with Q of the same fit: (n, 30, 30) if there is one."""
     own, cross = recording.terms.quadratic, recording.terms.cross
     if own is None or cross is None:
         return force

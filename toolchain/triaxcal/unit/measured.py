@@ -13,7 +13,7 @@ from triaxcal.base.kinds import DATE, line
 class Measured:
     """[measured]: when and on which rig the unit was measured.
 
-    None where the file does not say.
+    None if the file does not state it.
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ SAMPLES, POSES, SECTIONS = "samples", "poses", "sections"
 ACCELERATION_UNITS: Mapping[str, float | None] = MappingProxyType(
     {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3, "count": None, "V": None, "mV": None}
 )
-"""Readings of 1 g, where the unit says it."""
+"""Readings of 1 g, if the unit states it."""
 AIRCRAFT, INCLINOMETER = "aircraft", "inclinometer"
 ANGLE_NAMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {AIRCRAFT: ("pitch", "roll", "yaw"), INCLINOMETER: ("zenith", "tool_face", "azimuth")}
@@ -184,7 +184,7 @@ class RecordingLayout(WrittenFile, _RecordedFile):
 
     @property
     def reading_of_1_g(self) -> float | None:
-        """Reading that 1 g should give, where the unit says it."""
+        """Reading that 1 g should give, if the unit states it."""
         return ACCELERATION_UNITS[self.acceleration_unit]
 
     @property

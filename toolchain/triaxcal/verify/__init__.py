@@ -1,1 +1,1 @@
-"""Verifying a delivered unit with other people's tools: bounds, analysers, sanitizers, mutants."""
+"""Verifying a delivered unit with external tools: bounds, analysers, sanitizers, mutants."""

@@ -29,7 +29,7 @@ class ImageSegment:
 
 @dataclass(frozen=True)
 class Image:
-    """What an image says; shifts of the inverse form are left out.
+    """What an image holds; shifts of the inverse form are left out.
 
     `rate` is rate_min, rate_max, rate_gain and the three words.
     """

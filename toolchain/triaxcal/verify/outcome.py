@@ -20,7 +20,7 @@ class Outcome:
     key : str
         Name in verification.json.
     title : str
-        Name for people.
+        Name for readers.
     result : str
         `PASSED`, `FAILED` or `NOT_DONE`.
     finding : str
@@ -28,7 +28,7 @@ class Outcome:
     figures : dict
         What verification.json keeps; nothing that differs between two runs.
     details : tuple of str
-        Complaints of the tool, for people.
+        Complaints of the tool, for readers.
     """
 
     key: str

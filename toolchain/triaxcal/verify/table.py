@@ -1,4 +1,4 @@
-"""The outcomes as a table for people."""
+"""The outcomes as a table for readers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Other people's tools: found on the PATH, started with a time limit, named with their package."""
+"""External tools: found on the PATH, started with a time limit, named with their package."""
 
 from __future__ import annotations
 

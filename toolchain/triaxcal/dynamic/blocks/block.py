@@ -95,7 +95,7 @@ class StateBlock:
     name : str
         By which it is switched on.
     title : str
-        For people.
+        Text for readers.
     states : tuple of State
     rate, force, motion, edges, force2, motion2, edges2 : callables, or None
         Rows; the names with 2 belong to the second accelerometer triad.
@@ -109,7 +109,7 @@ class StateBlock:
         Column that must be recorded: "temp_degc", "force2", "table_angle_rad"; "table" for the
         table's axis in unit.toml; or "".
     weak : str
-        For people: what it is that a usual motion shows badly, and what would show it; or "".
+        For readers: what it is that a usual motion shows badly, and what would show it; or "".
     """
 
     name: str

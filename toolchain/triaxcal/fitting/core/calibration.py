@@ -125,11 +125,11 @@ class Calibration:
         The poses, where the readings are a recording and no tilter's; `points` then has the
         constants at T0 alone, and `parameter_covariance` only the blocks of each output.
     reading_unit : str
-        Unit of U0; K has it per g. That of the recording, where there is one.
+        Unit of U0; K has it per g. That of the recording, if there is one.
     pair : PairTerms or None
         Part of `terms` that a pair on a dividing head has shown.
     notes : tuple of str
-        What the user should know of the readings, where they are no `recording`'s.
+        What the user should know about the readings, where they are no `recording`'s.
     """
 
     serial: str
@@ -151,7 +151,7 @@ class Calibration:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """What the user should know of the readings, the worst first."""
+        """What the user should know about the readings, the worst first."""
         return self.notes if self.recording is None else self.recording.findings
 
     @property

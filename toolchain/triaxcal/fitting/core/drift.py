@@ -50,7 +50,7 @@ class DriftRow:
     fitted : array, shape (3,)
         Rms residual per output, each degree weighted alike.
     held_out : array, shape (half-cycles, 3), or None
-        Rms error on each half-cycle left out; None with fewer than two.
+        Rms error on each half-cycle held out; None with fewer than two.
     rate : array, shape (3,), or None
         Coefficient of dT/dt, reading units per K/s.
     """

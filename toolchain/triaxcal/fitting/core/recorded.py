@@ -21,7 +21,7 @@ class PairTerms:
     dof : int
         Degrees of freedom of the pair's residuals.
     findings : tuple of str
-        What the user should know of it.
+        What the user should know about it.
     """
 
     quadratic: FloatArray
@@ -70,10 +70,10 @@ class RecordingFit:
         Rms of |a| - g (of its components, where angles are known) at the fitted poses, and the
         same per degree of freedom; the latter NaN without any.
     held_out_g : float or None
-        The same at what was left out in turn: the score of the candidates.
+        The same at what was held out in turn: the score of the candidates.
     left_out_length_g : float or None
-        Rms of |a| - g over the poses, each left out with its orientation (of more than 60
-        orientations in 60 bundles); temperatures and half-cycles left out are not in it.
+        Rms of |a| - g over the poses, each held out with its orientation (of more than 60
+        orientations in 60 groups); temperatures and half-cycles held out are not in it.
     condition : float
         Condition number of the scaled Jacobian.
     weakest : str

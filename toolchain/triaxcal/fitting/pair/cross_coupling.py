@@ -47,7 +47,7 @@ class PairFit:
     condition : float
         Of H, its columns scaled to length 1.
     doubtful : str
-        The position that the others contradict, "" where there is none.
+        The position that the others contradict, "" if there is none.
     """
 
     values: FloatArray

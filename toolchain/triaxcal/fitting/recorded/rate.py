@@ -20,7 +20,7 @@ from triaxcal.unit.recording import SAMPLES, RecordingLayout
 WINDOW_S = 60.0
 _HALF_MIN_S = 5.0
 HALVES_MIN = 3
-"""Half-cycles: with one of two left out, the other's rate is a constant like the bias."""
+"""Half-cycles: with one of two held out, the other's rate is a constant like the bias."""
 _ROUNDING_DECIMALS = 6
 """Of a temperature in degC: no thermometer has a finer step, and units are turned with less."""
 

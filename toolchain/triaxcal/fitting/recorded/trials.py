@@ -1,12 +1,12 @@
 """Candidates of a recording: each fitted, each judged by poses that it has not seen.
 
 Left out in turn is every orientation with all its poses (two poses alike would give each other
-away), and every inner temperature where there are four and more. What is left out is scored by
+away), and every inner temperature where there are four and more. What is held out is scored by
 |a| - g. Every candidate is scored on the same poses; one whose constants the remaining poses leave
 open in any turn is not scored.
 
 Where a linear candidate that all poses determine cannot be scored so (six faces: no orientation can
-be spared), single poses are left out instead, a weaker test, for poses alike stay in. Where even
+be spared), single poses are held out instead, a weaker test, for poses alike stay in. Where even
 that is impossible nothing is held out, and the candidate with the most constants is taken: as with
 the tilter, what the data determine exactly.
 """
@@ -26,9 +26,9 @@ from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
 
 Turn = tuple[BoolArray, BoolArray]
-"""Poses that are left out, and those of them that are judged, as masks."""
+"""Poses that are held out, and those of them that are judged, as masks."""
 TURNS_MAX = 60
-"""Of hundreds of poses one more or less left out changes nothing that a rms could show."""
+"""Of hundreds of poses one more or less held out changes nothing that a rms could show."""
 
 
 def detail(shape: ThermalShape, gain_functions: int) -> str:
@@ -93,11 +93,11 @@ class Judged:
     Attributes
     ----------
     held_out_g : float or None
-        Rms |a| - g of what was left out; None when not scored.
+        Rms |a| - g of what was held out; None when not scored.
     able : bool
         Whether all poses together determine it.
     errors_g : array or None
-        |a| - g of everything left out, in the order of the turns.
+        |a| - g of everything held out, in the order of the turns.
     """
 
     trial: Trial
@@ -107,7 +107,7 @@ class Judged:
     errors_g: FloatArray | None = None
 
     def length_g(self, poses: int) -> float | None:
-        """Rms |a| - g of the `poses` poses, each left out with its orientation: the first turns."""
+        """Rms |a| - g of the `poses` poses, each held out with its orientation: the first turns."""
         if self.errors_g is None:
             return None
         return float(np.sqrt(np.mean(self.errors_g[:poses] ** 2)))
@@ -130,9 +130,9 @@ class Judged:
 def folds(
     orientations: Sequence[Sequence[int]], temperatures: Sequence[Sequence[int]], count: int
 ) -> list[Turn]:
-    """Masks of what is left out in turn: orientations, then inner temperatures (rising).
+    """Masks of what is held out in turn: orientations, then inner temperatures (rising).
 
-    More than `TURNS_MAX` orientations are left out in so many bundles.
+    More than `TURNS_MAX` orientations are held out in so many groups.
     """
     inner = temperatures[1:-1] if len(temperatures) >= 4 else ()
     turns = [[k for g in orientations[n::TURNS_MAX] for k in g] for n in range(TURNS_MAX)]
@@ -177,7 +177,7 @@ def unscored(rows: Sequence[Judged]) -> list[Judged]:
 
 
 def choose(rows: Sequence[Judged]) -> Judged:
-    """The simplest candidate that no other beats on what was left out (`beats`).
+    """The simplest candidate that no other beats on what was held out (`beats`).
 
     Where linear candidates could not be scored, the one of them with the most constants.
     """
@@ -193,7 +193,7 @@ def choose(rows: Sequence[Judged]) -> Judged:
 
 
 def without_idle_rates(rows: Sequence[Judged], values: int) -> list[Judged]:
-    """Rows without the terms in dT/dt that do not win on half-cycles left out, the last `values`.
+    """Rows without the terms in dT/dt that do not win on half-cycles held out, the last `values`.
 
     A term in dT/dt must beat the same candidate without it there, whatever it gains elsewhere.
     """

@@ -233,7 +233,7 @@ def _calibration(
 
 
 def _left_out_lengths(best: TableRow, known: TablePoses, gravity_g: float) -> float | None:
-    """Rms |a| - g of each pose left out in turn."""
+    """Rms |a| - g of each pose held out in turn."""
     if best.errors_g is None:
         return None
     force = known.force + best.errors_g[: len(known.force)]

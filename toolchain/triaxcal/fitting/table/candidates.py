@@ -1,4 +1,4 @@
-"""Candidates of poses with known angles, P0: each fitted, each judged by poses left out.
+"""Candidates of poses with known angles, P0: each fitted, each judged by poses held out.
 
 At one temperature they are the forms of `oriented`; over temperature the forward form (28) with
 polynomials, which is linear in all unknowns: U = sum_p f_p(T) (d0_p + D_p g). Left out in turn is
@@ -133,7 +133,7 @@ class TableRow:
     held_out_g : float or None
         Rms of `errors_g`, a component; None when not scored.
     errors_g : array, shape (m, 3), or None
-        Errors of what was left out: each pose in turn, then the inner temperatures.
+        Errors of what was held out: each pose in turn, then the inner temperatures.
     open_at : float or None
         The condition number for which it is not scored: of all poses, or of what a turn leaves.
     """
@@ -185,7 +185,7 @@ def thermal_trials(shape: ThermalShape) -> list[TableTrial]:
 
 
 def turns(poses: TablePoses, temperatures: Sequence[Sequence[int]]) -> list[BoolArray]:
-    """Masks of what is left out: each pose, then each inner temperature of four and more."""
+    """Masks of what is held out: each pose, then each inner temperature of four and more."""
     count = len(poses.readings)
     inner = temperatures[1:-1] if len(temperatures) >= 4 else ()
     masks = []

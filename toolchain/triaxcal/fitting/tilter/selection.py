@@ -182,7 +182,7 @@ def _score_shape(
 
 
 def _folds(data: TilterData) -> list[_Fold]:
-    """Each inner temperature left out in turn; none with fewer than four temperatures."""
+    """Each inner temperature held out in turn; none with fewer than four temperatures."""
     count = len(data.readings.temps_degc)
     return [
         _Fold(
@@ -194,7 +194,7 @@ def _folds(data: TilterData) -> list[_Fold]:
 
 
 def _fold_errors(fold: _Fold, shape: ThermalShape, design: FloatArray) -> FloatArray:
-    """Errors (E, 1, 6, 3) in g at the temperature left out, of curves fitted without it."""
+    """Errors (E, 1, 6, 3) in g at the temperature held out, of curves fitted without it."""
     temps = fold.remaining.readings.temps_degc
     reduced = shape.without(temps, float(fold.left_out.temps_degc[0]))
     parameters = fit_curves(fold.remaining, reduced)

@@ -37,7 +37,7 @@ class Column:
     Attributes
     ----------
     name, label, doc : str
-        For files, for people, and what it computes.
+        For files, for readers, and what it computes.
     short_label : str
         For the head of a narrow column.
     colour : str

@@ -108,7 +108,7 @@ class ThermalFunction:
     Attributes
     ----------
     name, label, doc : str
-        For unit.toml, for people, and what it is.
+        For unit.toml, for readers, and what it is.
     keys : tuple of Key
         Keys of [thermal] that go with it; each has a default.
     stated : callable

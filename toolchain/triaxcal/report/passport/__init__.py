@@ -1,1 +1,1 @@
-"""The unit's passport: one page for people, one JSON file for machines, the same content."""
+"""The unit's passport: one page for readers, one JSON file for programs, the same content."""

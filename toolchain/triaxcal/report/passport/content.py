@@ -1,4 +1,4 @@
-"""What a passport says, before it is laid out."""
+"""What a passport states, before it is laid out."""
 
 from __future__ import annotations
 

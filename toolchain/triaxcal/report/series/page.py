@@ -33,7 +33,7 @@ MOST_ROWS = 30
 
 
 def series_files(series: Series) -> dict[str, bytes]:
-    """The page for people and for machines; no clock in them."""
+    """The page, and the same as JSON; no clock in them."""
     records = series.records
     found = quantities(records) if records else []
     far, by_run = outliers(records, found), runs(records) if records else []

@@ -1,4 +1,4 @@
-"""What a page says of the firmware's files: bounds, vectors, tools, hashes."""
+"""What a page states about the firmware's files: bounds, vectors, tools, hashes."""
 
 from __future__ import annotations
 

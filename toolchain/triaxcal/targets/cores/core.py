@@ -17,7 +17,7 @@ class Core:
     Attributes
     ----------
     name, label, doc : str
-        For files and tables, for people, and what it is.
+        For files and tables, for readers, and what it is.
     gcc : str
         The cross compiler, which also links what clang compiled (it knows its libgcc).
     clang_triple : str
