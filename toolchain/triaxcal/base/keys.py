@@ -147,7 +147,7 @@ class Values:
         kind = declared.kind
         if key.name not in self.given:
             if declared.required:
-                raise RefusedError(self.where(key.name), "missing", expected=kind.expected)
+                raise self.missing(key.name, kind.expected)
             return declared.default
         found = self.given[key.name]
         try:
@@ -171,6 +171,10 @@ class Values:
     def where(self, name: str) -> str:
         """Place of a key as messages name it."""
         return f"{self.file}, {key_name(self.name, name)}"
+
+    def missing(self, name: str, expected: str, remedy: str = "") -> RefusedError:
+        """Error of a key that should be there."""
+        return RefusedError(self.where(name), "missing", expected=expected, remedy=remedy)
 
     def refuse(self, name: str, expected: str, remedy: str = "") -> RefusedError:
         """Error that names the value of a key and what should be there."""
@@ -243,25 +247,17 @@ class FileKeys:
 
     def check(self, source: str, document: Mapping[str, object]) -> Mapping[str, Values]:
         """Checked tables of a document by name, as `read`; `source` is for messages."""
+        file = Values(source, "", document)
         found = document.get("format", 1)  # when absent, it is among the missing
         if type(found) is not int or found != 1:
-            raise RefusedError(
-                f"{source}, format",
-                f"found {shown(found)}",
-                expected="1",
-                remedy="another format needs a triaxcal that knows it",
-            )
+            raise file.refuse("format", "1", "another format needs a triaxcal that knows it")
         names = {table.name for table in self.tables}
         top = {name: value for name, value in document.items() if name not in names}
         given: dict[str, Mapping[str, object]] = {}
         for table in self.tables:
             values = document.get(table.name, {}) if table.name else top
             if not isinstance(values, dict):
-                raise RefusedError(
-                    f"{source}, {table.name}",
-                    f"found {shown(values)}",
-                    expected=f"a table [{table.name}]",
-                )
+                raise file.refuse(table.name, f"a table [{table.name}]")
             given[table.name] = values
         self._refuse_wrong_keys(source, given, document)
         return {

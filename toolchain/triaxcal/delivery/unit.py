@@ -8,6 +8,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
+from ctypes import CDLL
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -38,9 +39,7 @@ from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.methods.registry import METHODS
-from triaxcal.readings.measurements import (
-    Dwell,
-)
+from triaxcal.readings.measurements import Dwell
 from triaxcal.unit.description import UnitDescription, read_unit
 
 
@@ -106,7 +105,7 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
             reference = stack.enter_context(reference_under_way())
         fitted = fit_folder(unit, folder)
         refuse_beyond_limits(fitted)
-        unit, calibration = fitted.unit, fitted.calibration
+        unit = fitted.unit
         firmware = make_firmware(fitted)
         plan = firmware.plan
         for file, content in firmware.files.items():
@@ -130,20 +129,25 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
         tried = routines_of(plan.rate, ours(), theirs())
         check = replace(check, images=check_images(plan, cases, *tried))
         _refuse_wrong_bound(unit, bound, check)
-        dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
-        rates = _rate_codes(unit, dwells)
-        own = routines_of(plan.rate, ours(), theirs(), rates)[0]
-        routines = {
-            unit.method: own.run,
-            **_other_routines(unit, calibration, Reference(theirs()), rates),
-        }
-        source = fitted.measurements.source
-        methods = run_on_dwells(unit, calibration.thermal, source, dwells, routines)
+        methods = _on_dwells(fitted, plan, ours(), Reference(theirs()))
         compiler = Generated(ours()).compiler
-    parts = unit, fitted.measurements, fitted.inputs_sha256, calibration, fitted.unit_toml
+    parts = unit, fitted.measurements, fitted.inputs_sha256, fitted.calibration, fitted.unit_toml
     delivery = Delivery(*parts, firmware, bound, check, methods, compiler)
     _refuse_beyond_limits(delivery)
     return delivery
+
+
+def _on_dwells(
+    fitted: Fitted, plan: Plan, generated: CDLL, reference: Reference
+) -> tuple[MethodResult, ...]:
+    """Residuals at the unit's own dwells: before, by the compiled C, and by the other methods."""
+    unit, calibration = fitted.unit, fitted.calibration
+    dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
+    rates = _rate_codes(unit, dwells)
+    own = routines_of(plan.rate, generated, reference.library, rates)[0]
+    routines = {unit.method: own.run, **_other_routines(unit, calibration, reference, rates)}
+    source = fitted.measurements.source
+    return run_on_dwells(unit, calibration.thermal, source, dwells, routines)
 
 
 def _rate_codes(unit: UnitDescription, dwells: Sequence[Dwell]) -> Int32Array:

@@ -19,11 +19,11 @@ from triaxcal.readings.measurements_csv import (
     READINGS,
     Header,
     Row,
-    is_number,
     read_rows,
     rows_of,
     write_measurements,
 )
+from triaxcal.readings.numbertext import is_number
 from triaxcal.unit.adc import Adc
 from triaxcal.unit.description import UnitDescription
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,6 +14,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.tomltable import did_you_mean, shown
+from triaxcal.readings.numbertext import is_number, number_remedy
 
 READING_UNITS = ("v", "mv", "code")
 TEMPERATURE_UNITS = ("degc", "code")
@@ -27,10 +27,6 @@ _KNOWN = (
     "count",
     *(name for unit in READING_UNITS for name in DEVIATIONS[unit]),
 )
-
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_GROUPED = re.compile(r"[+-]?\d{1,3}([ _'’\u00a0\u202f,]\d{3})+(\.\d*)?", re.ASCII)
-_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -91,7 +87,7 @@ class Row:
         text = self.cells[column]
         if is_number(text):
             return float(text)
-        raise self.refuse(column, "a number such as -0.54859", _number_remedy(text))
+        raise self.refuse(column, "a number such as -0.54859", number_remedy(text))
 
     def whole(self, column: str, low: int, high: int) -> int:
         """Whole number from `low` to `high`."""
@@ -99,24 +95,6 @@ class Row:
         if not value.is_integer() or not low <= value <= high:
             raise self.refuse(column, f"a whole number from {low} to {high}")
         return int(value)
-
-
-def is_number(text: str) -> bool:
-    """Whether a cell is a finite decimal number."""
-    return _NUMBER.fullmatch(text) is not None and math.isfinite(float(text))
-
-
-def _number_remedy(text: str) -> str:
-    # "0,125" may be either: a comma before three digits is read as decimal when it leads with 0.
-    if _DECIMAL_COMMA.fullmatch(text) and (
-        not _GROUPED.fullmatch(text) or text.lstrip("+-")[0] == "0"
-    ):
-        return "write a decimal point for the decimal comma"
-    if _GROUPED.fullmatch(text):
-        return "leave out the thousands separator"
-    if text.startswith("−"):
-        return "write the minus sign as a hyphen"
-    return ""
 
 
 def read_rows(path: Path) -> tuple[Header, list[Row]]:
@@ -298,8 +276,7 @@ def write_measurements(
         When the folder cannot be written.
     """
     lines = [f"# {comment}" for comment in comments] + [",".join(columns)]
-    for row in rows:
-        lines.append(",".join(repr(c) if isinstance(c, float) else str(c) for c in row))
+    lines += [",".join(map(_cell, row)) for row in rows]
     aside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         try:

@@ -67,19 +67,14 @@ class RecordingFile:
             if column <= count:
                 return self.source.numbered[column - 1]
             if not count:
-                raise RefusedError(
-                    str(self.path),
+                raise self._refused(
                     f"holds {_some(names) or 'no numbers'}",
-                    expected=f"one matrix for column {column} ({key})",
-                    remedy='name it: variable = "..."',
+                    f"one matrix for column {column} ({key})",
+                    'name it: variable = "..."',
                 )
-            raise RefusedError(
-                str(self.path),
-                f"{count} columns",
-                expected=f"column {column} ({key})",
-                remedy="columns are counted from 1; check the delimiter"
-                if self.source.row_word == "line"
-                else "columns are counted from 1",
+            check = "; check the delimiter" if self.source.row_word == "line" else ""
+            raise self._refused(
+                f"{count} columns", f"column {column} ({key})", "columns are counted from 1" + check
             )
         found = meant(column, names, self.layout.variable)
         if len(found) == 1:
@@ -87,32 +82,26 @@ class RecordingFile:
         raise self._no_column(column, key, found)
 
     def _no_column(self, column: str, key: str, found: Sequence[int]) -> RefusedError:
-        names = self.source.names
+        names, wanted = self.source.names, f"{shown(column)} ({key})"
         if found:
             full = sorted({names[k] for k in found})
-            return RefusedError(
-                str(self.path),
-                f"{len(found)} columns {shown(column)} ({key})",
-                expected="one of that name" if len(full) == 1 else "one of " + _some(full),
-                remedy="give its number from 1" if len(full) == 1 else "",
-            )
+            several = f"{len(found)} columns {wanted}"
+            if len(full) == 1:
+                return self._refused(several, "one of that name", "give its number from 1")
+            return self._refused(several, "one of " + _some(full))
         if not any(names) and self.source.row_word != "line":
-            return RefusedError(
-                str(self.path), "holds no columns", expected=f"column {shown(column)} ({key})"
-            )
+            return self._refused("holds no columns", f"column {wanted}")
         if not any(names):
-            return RefusedError(
-                str(self.path),
-                f"no header, so no column {shown(column)} ({key})",
-                expected="column numbers from 1",
-                remedy="give numbers, or header = true if the first line is one",
+            return self._refused(
+                f"no header, so no column {wanted}",
+                "column numbers from 1",
+                "give numbers, or header = true if the first line is one",
             )
         hint = did_you_mean(column, names)
-        return RefusedError(
-            str(self.path),
-            f"no column {shown(column)} ({key}){hint}",
-            expected="one of " + _some(names),
-        )
+        return self._refused(f"no column {wanted}{hint}", "one of " + _some(names))
+
+    def _refused(self, found: str, expected: str, remedy: str = "") -> RefusedError:
+        return RefusedError(str(self.path), found, expected=expected, remedy=remedy)
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int] = ()) -> Iterator[Block]:
         """Blocks of the wanted columns, as `Source.blocks`.
@@ -125,20 +114,18 @@ class RecordingFile:
         tables = {self.source.tables[k]: self.source.names[k] for k in (*numbers, *texts)
                   if self.source.tables}  # fmt: skip
         if len(tables) > 1:
-            raise RefusedError(
-                str(self.path),
+            raise self._refused(
                 "columns of several tables: " + ", ".join(tables.values()),
-                expected="columns of one table, which has one clock",
-                remedy="name columns of one, or export them at common times",
+                "columns of one table, which has one clock",
+                "name columns of one, or export them at common times",
             )
         with self._one_line():
             yield from self.source.blocks(numbers, texts)
         if _stamp(self.path, self.layout) != self._stamp:
-            raise RefusedError(
-                str(self.path),
+            raise self._refused(
                 "changed while it was read",
-                expected="a recording that is complete",
-                remedy="wait until the logger has closed it, or copy it first",
+                "a recording that is complete",
+                "wait until the logger has closed it, or copy it first",
             )
 
     @contextmanager
@@ -159,11 +146,10 @@ class RecordingFile:
             ) from error
 
     def _missing(self, package: str) -> RefusedError:
-        return RefusedError(
-            str(self.path),
+        return self._refused(
             f"the package {package} is missing",
-            expected=f"it, to read {self._format.label}",
-            remedy=f"install it: pip install 'triaxcal[{self._format.extra}]'",
+            f"it, to read {self._format.label}",
+            f"install it: pip install 'triaxcal[{self._format.extra}]'",
         )
 
 

@@ -13,7 +13,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from triaxcal.readings.measurements_csv import is_number
+from triaxcal.readings.numbertext import is_number
 from triaxcal.unit.recordingfile import DELIMITERS, FileLayout
 
 _SPACES = re.compile(r"[ \t]+")

@@ -228,19 +228,11 @@ def recording_layout(values: Values) -> RecordingLayout | None:
     layout = values.record(RecordingLayout)
     for required in ("acceleration", "acceleration_unit"):
         if required not in values:
-            raise RefusedError(
-                values.where(required),
-                "missing",
-                expected=values.keys[required].kind.expected,
-                remedy="or name a preset: " + ", ".join(PRESETS),
-            )
+            presets = "or name a preset: " + ", ".join(PRESETS)
+            raise values.missing(required, values.keys[required].kind.expected, presets)
     check_units(values, layout.time, layout.time_unit)
     if layout.section is None and layout.rows == SECTIONS:
-        raise RefusedError(
-            values.where("section"),
-            "missing",
-            expected="the column that numbers or names the poses",
-        )
+        raise values.missing("section", "the column that numbers or names the poses")
     if layout.section is None and "faces" in values:
         raise RefusedError(values.where("faces"), "given without section", expected="its column")
     _check_angles(values, layout)
@@ -264,7 +256,7 @@ def _check_angles(values: Values, layout: RecordingLayout) -> None:
         ("angle_unit", '"deg" or "rad"'),
     ):
         if name not in values:
-            raise RefusedError(values.where(name), "missing", expected=expected)
+            raise values.missing(name, expected)
     if layout.rows == SAMPLES:
         raise RefusedError(
             values.where(names[0]),

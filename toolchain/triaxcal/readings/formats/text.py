@@ -19,7 +19,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import shown
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.format import PIECE, Block, Format, Source
-from triaxcal.readings.measurements_csv import is_number
+from triaxcal.readings.numbertext import is_number
 from triaxcal.readings.preamble import LOOKED_AT, Line, find_table, split_cells
 from triaxcal.unit.recordingfile import FileLayout
 
