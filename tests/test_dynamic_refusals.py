@@ -94,7 +94,7 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
     ),
     "degrees for radians": (
         lambda: _with(rate=np.degrees(_samples().rate)),
-        ("0.017", "as fast as the gyros say (degrees taken for radians?)", "rate_unit"),
+        ("0.017", "as fast as the gyros measure (degrees taken for radians?)", "rate_unit"),
     ),
     "radians for degrees": (
         lambda: _with(rate=np.radians(_samples().rate)),

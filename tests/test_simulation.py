@@ -294,7 +294,7 @@ def test_a_wrong_seed_is_refused(tmp_path: Path, seed: int) -> None:
 
 
 def test_a_seed_for_published_constants_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RefusedError, match=r"nothing random in it; leave out the seed"):
+    with pytest.raises(RefusedError, match=r"has no random values; omit the seed"):
         write_simulated_unit(copy_of(CHERNIAK, tmp_path), seed=1)
 
 

@@ -89,7 +89,7 @@ def _last_session(root: Path) -> Path:
 def replay(setup: Setup, log: Path, into: Path | None) -> None:
     """Make the records of a session again from its log.
 
-    LOG has the frames of the session; the journal lies beside it.
+    LOG has the frames of the session; the journal is beside it.
     """
     from triaxcal.rig import recording, replay, store  # noqa: PLC0415
 
@@ -130,8 +130,8 @@ def status(setup: Setup, sessions: Path | None) -> None:
         for event in dwells:
             click.echo(f"  {event.text}")
         if found.damaged or found.torn:
-            what = "damaged" if found.damaged else "torn at its end, as a crash leaves it"
-            click.echo(f"  journal {what}: only the records above are believed")
+            what = "damaged" if found.damaged else "incomplete at its end, as after a crash"
+            click.echo(f"  journal {what}: only the records above are used")
     if not session_folders(root):
         click.echo(f"{root}: no session")
 
@@ -189,7 +189,7 @@ def record(setup: Setup, bus: BusChoice, seconds: float | None, log: Path) -> No
 @SECONDS
 @click.option("--hold", type=int, default=130, show_default=True, help="Seconds in each position.")
 def simulate(setup: Setup, bus: BusChoice, seconds: float | None, hold: int) -> None:
-    """Be a rig on a bus, in real time.
+    """Simulate a rig on a bus, in real time.
 
     It turns through the plan's positions.
     """
@@ -205,7 +205,7 @@ def simulate(setup: Setup, bus: BusChoice, seconds: float | None, hold: int) -> 
 @click.argument("log", type=click.Path(path_type=Path))
 @click.argument("target", type=click.Path(path_type=Path))
 def export(log: Path, target: Path) -> None:
-    """Write a log for other tools.
+    """Convert a log for other tools.
 
     TARGET ends in .asc, .blf, .csv, .mf4 or .parquet.
     """

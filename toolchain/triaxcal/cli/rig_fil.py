@@ -70,7 +70,7 @@ def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
     )
     if done.returncode != 0:
         lines = [line for line in done.stderr.splitlines() if "error" in line]
-        raise RefusedError("gcc", (lines or ["failed without a word"])[0])
+        raise RefusedError("gcc", (lines or ["failed without a message"])[0])
     return program
 
 

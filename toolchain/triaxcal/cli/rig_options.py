@@ -52,7 +52,11 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
         with_setup,
         click.option("--unit", required=True, type=UnitFolder(), help="Folder, or name in units/."),
         click.option("--plan", type=click.Path(path_type=Path), help="TOML file of the session."),
-        click.option("--dbc", type=click.Path(path_type=Path), help="Frames, if not tilter.dbc."),
+        click.option(
+            "--dbc",
+            type=click.Path(path_type=Path),
+            help="DBC file of the frames; tilter.dbc by default.",
+        ),
     )
 
 
@@ -83,8 +87,10 @@ def bus_options(command: Callable[..., None]) -> Callable[..., None]:
     return _optioned(
         with_bus,
         click.option("--bus", required=True, cls=_BusOption),
-        click.option("--fault", multiple=True, help="Of the simulated rig: kind@s[:value[:s]]."),
-        click.option("--seed", type=int, default=1, help="Of the simulated rig."),
+        click.option(
+            "--fault", multiple=True, help="Faults of the simulated rig: kind@s[:value[:s]]."
+        ),
+        click.option("--seed", type=int, default=1, help="Seed of the simulated rig."),
     )
 
 
@@ -94,7 +100,7 @@ SESSIONS = click.option(
     help="Folder of the unit's sessions; sessions/ in the unit's folder by default.",
 )
 PLAIN = click.option("--plain", is_flag=True, help="One line an event, for logs and CI.")
-SECONDS = click.option("--seconds", type=float, help="Stop after this time; else at Ctrl-C.")
+SECONDS = click.option("--seconds", type=float, help="Stop after this time; by default at Ctrl-C.")
 
 
 def _setup(folder: Path, plan: Path | None, dbc: Path | None) -> Setup:

@@ -62,7 +62,7 @@ class Compilation:
             lines = [line for line in complaints.splitlines() if "error" in line.lower()]
             raise RefusedError(
                 "gcc",
-                (lines or complaints.splitlines() or ["failed without a word"])[0],
+                (lines or complaints.splitlines() or ["failed without a message"])[0],
                 remedy="check the compiler with a small program, and the space in the temp folder",
             )
         try:
@@ -70,7 +70,7 @@ class Compilation:
         except OSError as error:
             raise RefusedError(
                 "gcc",
-                f"said nothing and made no library that loads ({error})",
+                f"printed nothing and made no library that loads ({error})",
                 remedy="check that the gcc on PATH is a C compiler for this machine",
             ) from error
 

@@ -117,7 +117,7 @@ def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
             kind = "exchanged axes, or a left-handed triad of accelerometers"
         raise RefusedError(
             name,
-            f"the forces turn about x, y, z as the gyros' {words} say: {kind}",
+            f"the forces turn about x, y, z as the gyros' {words} measure: {kind}",
             expected="gyros and accelerometers on the same right-handed axes",
             remedy="check the order and signs of rate_columns and force_columns",
         )
@@ -130,7 +130,7 @@ def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
         hint = next((h for k, h in hints.items() if abs(math.log(size / k)) < 0.5), "")
         raise RefusedError(
             name,
-            f"gravity turns in the unit {size:.3g} times as fast as the gyros say{hint}",
+            f"gravity turns in the unit {size:.3g} times as fast as the gyros measure{hint}",
             expected="once",
             remedy="check rate_unit, rate_samples and time_unit in [dynamic]",
         )

@@ -156,7 +156,7 @@ def _answers(
                 f"sample {first + len(rows) // 3}",
                 "the node has not answered",
                 expected=f"3 frames within {_ANSWER_S:g} s",
-                remedy="see what rig_node said",
+                remedy="look at the output of rig_node",
             )
         if int.from_bytes(payload[:4], "little") in ids:
             rows.append((0, payload))

@@ -43,12 +43,12 @@ def write_simulated_unit(folder: Path, seed: int | None = None) -> Path:
             str(folder),
             found,
             expected="one of the two, as docs/reference/keys.md describes",
-            remedy="only simulated units have one: real measurements are not made anew",
+            remedy="only simulated units have one; real measurements cannot be simulated again",
         )
     if has_tables:
         if seed is not None:
             raise RefusedError(
-                f"{folder / TABLES_FILE}", "nothing random in it", remedy="leave out the seed"
+                f"{folder / TABLES_FILE}", "has no random values", remedy="omit the seed"
             )
         return write_published_measurements(folder, unit)
     truth, plan = read_truth(folder)

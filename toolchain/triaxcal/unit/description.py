@@ -142,7 +142,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
     fit, compensation = tables["fit"].record(Fit), tables["compensation"].record(Compensation)
     temperatures = tables["thermal"].record(Temperatures)
     recording = recording_layout(tables["recording"]) if "recording" in tables else None
-    _ = tables[""][DESCRIPTION]  # for people; checked all the same
+    _ = tables[""][DESCRIPTION]  # not used, but checked
     adc, site = tables["adc"], tables["site"].record(Site)
     return UnitDescription(
         name=name,
