@@ -462,16 +462,56 @@ def test_a_file_that_is_not_toml_is_refused_and_the_others_made(tmp_path: Path, 
     assert series.refused["U-2"].startswith(f"{folder}/U-2/unit.toml: not TOML: ")
 
 
+def real_unit(folder: Path) -> Order:
+    """AT-CHERNIAK in a series of its own."""
+    shutil.copytree(UNITS / "AT-CHERNIAK", folder / "AT-CHERNIAK")
+    (order,) = plan_work([folder / "AT-CHERNIAK"], folder / "build").orders
+    return order
+
+
+def append_line(path: Path) -> None:
+    with path.open("a", encoding="utf-8") as file:
+        file.write("\n")
+
+
 def test_a_unit_that_changes_while_the_series_runs_is_refused(tmp_path: Path) -> None:
-    folder, build = units(tmp_path / "units", 3), tmp_path / "build"
-    work = plan_work(folder.iterdir(), build)
-    # Planned without their contents: a thousand recordings are not held in memory.
-    assert not any(order.inputs for order in work.orders)
-    (folder / "U-2" / "measurements.csv").write_text("new rows", encoding="utf-8")
-    (folder / "U-3" / "measurements.csv").unlink()
-    told = {o.name: o for o in run_local(batch_workers.made, work.orders, 1)}
-    assert not told["U-1"].refusal
-    assert told["U-2"].refusal == (
-        f"{folder}/U-2: its files changed while the series ran; run again"
+    order = real_unit(tmp_path)
+    sent = filled(order)
+    append_line(tmp_path / "AT-CHERNIAK" / "unit.toml")
+    text = f"{tmp_path}/AT-CHERNIAK: its files changed while the series ran; run again"
+    (outcome,) = run_local(make_unit, [order], 1)
+    assert outcome.refusal == text
+    with pytest.raises(RefusedError) as refusal:
+        filled(order)
+    assert str(refusal.value) == text
+    # What was sent before is made.
+    assert make_unit(sent).refusal == ""
+    (tmp_path / "AT-CHERNIAK" / "measurements.csv").unlink()
+    (outcome,) = run_local(make_unit, [order], 1)
+    assert outcome.refusal == (
+        f"{tmp_path}/AT-CHERNIAK/measurements.csv: cannot be read: no such file or directory; "
+        "put it there, or correct its name in unit.toml"
     )
-    assert "U-3/measurements.csv: cannot be read: no such file" in told["U-3"].refusal
+
+
+def test_a_worker_here_reads_the_unit_s_own_folder(tmp_path: Path) -> None:
+    order = real_unit(tmp_path)
+    here, sent = make_unit(order), make_unit(filled(order))
+    assert not order.inputs  # a recording of gigabytes is not sent through a pipe
+    assert here == sent
+    assert here.refusal == ""
+
+
+def test_a_recording_that_is_a_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "units" / "HAND"
+    (folder / "bag" / "more").mkdir(parents=True)
+    (folder / "unit.toml").write_text('serial = "H-1"\n[recording]\nfile = "bag"\n')
+    (folder / "bag" / "metadata.yaml").write_text("a")
+    (folder / "bag" / "more" / "x.db3").write_text("b")
+    (order,) = plan_work([folder], tmp_path / "build").orders
+    inputs = filled(order).inputs
+    assert sorted(inputs) == ["bag/metadata.yaml", "bag/more/x.db3", "unit.toml"]
+    assert inputs["bag/more/x.db3"] == b"b"
+    (folder / "bag" / "more" / "x.db3").rename(folder / "bag" / "more" / "y.db3")
+    with pytest.raises(RefusedError, match="its files changed while the series ran"):
+        filled(order)

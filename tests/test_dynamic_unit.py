@@ -12,8 +12,12 @@ from click.testing import CliRunner
 from dynamic_cases import COLUMNS, UNIT_TOML, mems_short, table_of, write_unit
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
+from triaxcal.delivery.imu import deliver_imu
+from triaxcal.delivery.inputs import files_sha256
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.reading import read_recording
+from triaxcal.readings.arrays import ArraySource
+from triaxcal.readings.format import FORMATS, Format, starts_with
 
 
 def table() -> np.ndarray:
@@ -46,6 +50,28 @@ def test_three_kinds_of_files_hold_the_same(tmp_path: Path) -> None:
         for name in ("time_s", "rate", "force"):
             assert np.array_equal(getattr(found, name), getattr(expected, name))
     assert np.array_equal(expected.rate, mems_short()[1].all().rate)
+
+
+def test_a_recording_that_is_a_folder_is_delivered(tmp_path: Path) -> None:
+    bag = Format(
+        name="toybag",
+        label="a bag",
+        doc="A folder.",
+        open=lambda path, layout: ArraySource(
+            str(path), dict(zip(COLUMNS, np.load(path / "rows.npy").T, strict=True)), layout
+        ),
+        sniff=starts_with(b"toybag"),
+    )
+    rows = table()
+    text = UNIT_TOML.replace("recording.csv", "bag")
+    folder = write_unit(tmp_path / "IMU-A", rows, text)
+    (folder / "bag").mkdir()
+    (folder / "bag" / "metadata.yaml").write_text("toybag\n", encoding="utf-8")
+    np.save(folder / "bag" / "rows.npy", rows)
+    with FORMATS.added(bag):
+        made = deliver_imu(folder)
+    assert made.inputs_sha256 == files_sha256((folder / "unit.toml", folder / "bag"), "")
+    assert made.done.unit.recording.name == "bag"
 
 
 def test_units_of_the_file(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 import sys
 from collections.abc import Callable
@@ -16,6 +18,8 @@ from written import AXES, CASES, Case, Times, csv, readings
 
 from recordings import recording
 from triaxcal.base.errors import RefusedError
+from triaxcal.batch.order import filled
+from triaxcal.batch.plan import plan_work
 from triaxcal.cli.main import main
 from triaxcal.delivery.inputs import files_sha256
 from triaxcal.delivery.unit import deliver
@@ -24,6 +28,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.readings.arrays import ArraySource
 from triaxcal.readings.format import FORMATS, Format, starts_with
 from triaxcal.readings.opened import RecordingFile
+from triaxcal.report.series.unit import make_unit
 from triaxcal.unit.recordingfile import FileLayout
 
 LAYOUT = FileLayout("recording")
@@ -264,12 +269,40 @@ def test_a_bag_that_is_a_folder_reaches_the_c(files: Callable[[str], Path], tmp_
     folder = unit_of(tmp_path / "SAME", CASES["ros2"])
     shutil.copytree(files("ros2"), folder / "bag")
     delivery = deliver(folder)
+    (order,) = plan_work([folder], tmp_path / "build").orders
+    for made in (make_unit(order), make_unit(filled(order))):
+        assert made.refusal == ""
+        assert {n: made.files[n] for n in delivery.files} == dict(delivery.files)
     assert delivery.calibration.recording is not None
     assert len(delivery.calibration.recording.poses.poses) == 12
     assert delivery.inputs_sha256 == files_sha256((folder / "unit.toml", folder / "bag"), "")
     with (folder / "bag" / "metadata.yaml").open("a") as file:
         file.write("\n")
     assert delivery.inputs_sha256 != files_sha256((folder / "unit.toml", folder / "bag"), "")
+
+
+def test_the_hash_of_a_folder_is_of_names_and_subfolders(tmp_path: Path) -> None:
+    (tmp_path / "bag" / "more").mkdir(parents=True)
+    (tmp_path / "bag" / "a").write_text("1")
+    (tmp_path / "bag" / "more" / "b").write_text("2")
+    hashes = {files_sha256([tmp_path / "bag"], "")}
+    (tmp_path / "bag" / "a").rename(tmp_path / "bag" / "c")
+    hashes.add(files_sha256([tmp_path / "bag"], ""))
+    (tmp_path / "bag" / "more" / "b").write_text("3")
+    hashes.add(files_sha256([tmp_path / "bag"], ""))
+    assert len(hashes) == 3
+
+
+def test_a_folder_that_cannot_be_listed_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def denied(path: Path) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(os, "scandir", denied)  # root may list any folder
+    with pytest.raises(RefusedError) as refusal:
+        files_sha256([tmp_path], "put it there")
+    assert str(refusal.value) == f"{tmp_path}: cannot be read: permission denied; put it there"
 
 
 # ---- A format of one's own ----

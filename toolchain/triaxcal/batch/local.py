@@ -19,8 +19,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context
 
-from triaxcal.base.errors import RefusedError
-from triaxcal.batch.order import Make, Order, Outcome, filled, refused
+from triaxcal.batch.order import Make, Order, Outcome, refused
 
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """A worker uses one core: libraries must not start threads of their own."""
@@ -83,7 +82,7 @@ def _together(
             while waiting or under_way:
                 while waiting and len(under_way) < jobs:
                     with _uninterrupted():
-                        under_way[_sent(pool, make, waiting[0])] = waiting[0]
+                        under_way[pool.submit(make, waiting[0])] = waiting[0]
                     waiting.popleft()
                 done, _ = wait(under_way, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -116,7 +115,7 @@ def _alone(make: Make, suspects: deque[Order], scratch: str) -> Iterator[Outcome
     with _pool(1, scratch) as pool:
         try:
             with _uninterrupted():
-                future = _sent(pool, make, order)
+                future = pool.submit(make, order)
             yield future.result()
         except BrokenProcessPool:
             yield refused(
@@ -124,15 +123,6 @@ def _alone(make: Make, suspects: deque[Order], scratch: str) -> Iterator[Outcome
                 f"{order.folder}: the worker process died on it twice; is there enough memory? "
                 "run again with fewer --jobs",
             )
-
-
-def _sent(pool: ProcessPoolExecutor, make: Make, order: Order) -> Future[Outcome]:
-    try:
-        return pool.submit(make, filled(order))
-    except RefusedError as refusal:
-        future: Future[Outcome] = Future()
-        future.set_result(refused(order, refusal))
-        return future
 
 
 def _pool(jobs: int, scratch: str) -> ProcessPoolExecutor:

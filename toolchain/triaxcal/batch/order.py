@@ -1,18 +1,19 @@
-"""What a worker is given and what it gives back: bytes alone, so that it needs no shared disk.
+"""What a worker is given and what it gives back.
 
-An order is planned without its inputs and is sent with them: a series of recordings need not fit
-into memory.
+A worker on this machine reads the unit's own folder. One of a cluster needs no shared disk: its
+order is `filled` with the contents of the files.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from triaxcal.base.errors import RefusedError, refused_by_system
+from triaxcal.base.errors import RefusedError
+from triaxcal.delivery.inputs import files_of, files_sha256
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,9 @@ class Order:
     toolchain : str
         What the result must be made by (`batch.toolchain`).
     files : tuple of str
-        Names of its inputs: unit.toml, and measurements.csv or a recording.
+        Names of its inputs: unit.toml, and measurements.csv or a recording, which may be a folder.
     inputs : dict
-        Name and content of each, once it is `filled`.
+        Name and content of each file, once it is `filled`.
     """
 
     name: str
@@ -41,6 +42,13 @@ class Order:
     toolchain: str
     files: tuple[str, ...]
     inputs: dict[str, bytes] = field(default_factory=dict)
+
+    def refuse_change(self, inputs_sha256: str) -> None:
+        """Refuse inputs of another hash than when the order was planned."""
+        if _key(self.toolchain, self.name, inputs_sha256) != self.key:
+            raise RefusedError(
+                self.folder, "its files changed while the series ran", remedy="run again"
+            )
 
 
 @dataclass(frozen=True)
@@ -80,39 +88,27 @@ def planned(folder: Path, toolchain: str, files: tuple[str, ...]) -> Order:
         When a file cannot be read.
     """
     name = folder.absolute().name
-    key = _key(toolchain, name, (_content(folder / file) for file in files))
-    return Order(name, str(folder), key, toolchain, files)
+    inputs = files_sha256((folder / file for file in files), "")
+    return Order(name, str(folder), _key(toolchain, name, inputs), toolchain, files)
 
 
 def filled(order: Order) -> Order:
-    """The order with its inputs, read now.
+    """The order with the contents of its files, read now.
 
     Raises
     ------
     RefusedError
         When a file cannot be read, or is another than when the order was planned.
     """
-    inputs = {file: _content(Path(order.folder) / file) for file in order.files}
-    if _key(order.toolchain, order.name, inputs.values()) != order.key:
-        raise RefusedError(
-            order.folder, "its files changed while the series ran", remedy="run again"
-        )
-    return replace(order, inputs=inputs)
+    folder = Path(order.folder)
+    paths = [folder / file for file in order.files]
+    order.refuse_change(files_sha256(paths, ""))
+    files = (file for path in paths for file in files_of(path))
+    return replace(order, inputs={f.relative_to(folder).as_posix(): f.read_bytes() for f in files})
 
 
-def _key(toolchain: str, name: str, contents: Iterable[bytes]) -> str:
-    digest = hashlib.sha256(toolchain.encode())
-    digest.update(name.encode())
-    for content in contents:
-        digest.update(hashlib.sha256(content).digest())
-    return digest.hexdigest()
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise refused_by_system(path, "read", error) from error
+def _key(toolchain: str, name: str, inputs_sha256: str) -> str:
+    return hashlib.sha256(f"{toolchain}\0{name}\0{inputs_sha256}".encode()).hexdigest()
 
 
 def refused(order: Order, why: RefusedError | str) -> Outcome:

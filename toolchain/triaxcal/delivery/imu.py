@@ -80,7 +80,7 @@ def deliver_imu(folder: Path, progress: Progress | None = None) -> ImuDelivery:
     unit = read_dynamic(folder)
     if unit.device is not None:
         find_compiler()  # before minutes of filtering, not after
-    inputs = _inputs_sha256(unit) if unit.recording.is_file() else ""
+    inputs = _inputs_sha256(unit) if unit.recording.exists() else ""
     done = calibrate_unit(folder, progress)
     if _inputs_sha256(unit) != inputs:
         raise RefusedError(str(folder), "changed while it was read", remedy="run it again")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -27,13 +28,35 @@ def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:
 def files_sha256(paths: Iterable[Path], remedy: str) -> str:
     """Hash of the hashes of files; `remedy` is what to do where one cannot be read.
 
-    Of a folder, as a bag of ROS 2 is one, all its files count.
+    Of a folder, as a bag of ROS 2 is one, the names and contents of all its files count.
     """
     digest = hashlib.sha256()
-    for path in (f for p in paths for f in (sorted(p.iterdir()) if p.is_dir() else (p,))):
+    for path in paths:
         try:
-            with path.open("rb") as file:
-                digest.update(hashlib.file_digest(file, "sha256").digest())
+            for file in files_of(path):
+                if file != path:
+                    digest.update(file.relative_to(path).as_posix().encode() + b"\0")
+                with file.open("rb") as content:
+                    digest.update(hashlib.file_digest(content, "sha256").digest())
         except OSError as error:
-            raise refused_by_system(path, "read", error, remedy=remedy) from error
+            raise refused_by_system(error.filename or path, "read", error, remedy=remedy) from error
     return digest.hexdigest()
+
+
+def files_of(path: Path) -> list[Path]:
+    """The file itself, or all files in a folder and its subfolders, sorted.
+
+    Raises
+    ------
+    OSError
+        When a folder cannot be read.
+    """
+    if not path.is_dir():
+        return [path]
+    return sorted(
+        Path(folder, name) for folder, _, names in os.walk(path, onerror=_raise) for name in names
+    )
+
+
+def _raise(error: OSError) -> None:
+    raise error

@@ -35,7 +35,8 @@ def make_unit(order: Order) -> Outcome:
             f"{order.toolchain}; install the same there",
         )
     with tempfile.TemporaryDirectory(prefix="triaxcal-") as scratch:
-        folder = Path(scratch) / order.name
+        here = Path(order.folder).absolute()
+        folder = Path(scratch) / order.name if order.inputs else here
         try:
             for name, content in order.inputs.items():
                 if not is_in_folder(name):
@@ -43,6 +44,7 @@ def make_unit(order: Order) -> Outcome:
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 (folder / name).write_bytes(content)
             delivery = deliver(folder, _reference())
+            order.refuse_change(delivery.inputs_sha256)
             made = passport(delivery, {})
             return Outcome(order.name, order.key, "", all_files(delivery, made), unit_record(made))
         except RefusedError as refusal:
