@@ -8,7 +8,8 @@ import pytest
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.compiler import start_reference
-from triaxcal.codegen.image_cases import ROW_LIMIT, check_images, image_cases, sum_of_floors
+from triaxcal.codegen.image_cases import check_images, image_cases
+from triaxcal.codegen.image_layout import ROW_LIMIT, sum_of_floors
 from triaxcal.codegen.routines import Generated, Reference, start_generated
 from triaxcal.verify.shapes import SHAPES, Subject
 from triaxcal.verify.workspace import IMAGE, Workspace

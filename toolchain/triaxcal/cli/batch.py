@@ -20,7 +20,7 @@ from triaxcal import SeriesResult, calibrate_series
 from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Outcome
 from triaxcal.batch.plan import Work, plan_work
-from triaxcal.cli.options import UnitFolder, example, say
+from triaxcal.cli.options import UnitFolder, build_option, example, say
 
 
 @click.command(
@@ -29,13 +29,7 @@ from triaxcal.cli.options import UnitFolder, example, say
     )
 )
 @click.argument("units", nargs=-1, required=True, type=UnitFolder(files=True))
-@click.option(
-    "--build",
-    type=click.Path(path_type=Path),
-    default=Path("build"),
-    show_default=True,
-    help="Folder that receives a folder for each unit, and the series' page.",
-)
+@build_option("a folder for each unit, and the series' page")
 @click.option(
     "--jobs",
     type=click.IntRange(1, 1024),

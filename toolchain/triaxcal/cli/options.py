@@ -53,16 +53,25 @@ class UnitFolder(click.ParamType[Path]):
 
 
 _UNIT = click.argument("unit", type=UnitFolder())
-_BUILD = click.option(
-    "--build",
-    type=click.Path(path_type=Path),
-    default=Path("build"),
-    show_default=True,
-    help="Folder that receives a folder of the unit's name.",
-)
 
 
 PICTURE = click.option("--picture", type=click.Path(path_type=Path), help="Also draw this SVG.")
+
+
+def build_option(
+    receives: str, default: str = "build"
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """--build: the folder for the results."""
+    return click.option(
+        "--build",
+        type=click.Path(path_type=Path),
+        default=Path(default),
+        show_default=True,
+        help=f"Folder that receives {receives}.",
+    )
+
+
+_BUILD = build_option("a folder of the unit's name")
 
 
 def unit_and_build(command: Callable[..., Any]) -> Callable[..., Any]:

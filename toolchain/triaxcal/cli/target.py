@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import UnitFolder, example, say
+from triaxcal.cli.options import UnitFolder, build_option, example, say
 
 
 @click.group(epilog=example("triaxcal target test AT-SIM"))
@@ -20,13 +20,7 @@ def target() -> None:
 
 @target.command(epilog=example("triaxcal target test", "triaxcal target test AT-SIM"))
 @click.argument("unit", required=False, type=UnitFolder())
-@click.option(
-    "--build",
-    type=click.Path(path_type=Path),
-    default=Path("build/targets"),
-    show_default=True,
-    help="Folder that receives targets.json.",
-)
+@build_option("targets.json", "build/targets")
 def test(unit: Path | None, build: Path) -> None:
     """Compare the C on every core with Python, bit for bit.
 
@@ -60,13 +54,7 @@ def test(unit: Path | None, build: Path) -> None:
 
 
 @target.command(epilog=example("triaxcal target bench --build out"))
-@click.option(
-    "--build",
-    type=click.Path(path_type=Path),
-    default=Path("build/target-bench"),
-    show_default=True,
-    help="Folder that receives bench.json and bench.md.",
-)
+@build_option("bench.json and bench.md", "build/target-bench")
 @click.option(
     "--page",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),

@@ -16,7 +16,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.forces import forces_of, rates_of
-from triaxcal.codegen.routines import Answers, Generated, Int32Array, Routine
+from triaxcal.codegen.routines import Answers, Generated, Int32Array, Routine, difference
 from triaxcal.codegen.ties import ties
 from triaxcal.fixedpoint.exact import exact_error_lsb
 from triaxcal.fixedpoint.integer_model import (
@@ -230,16 +230,16 @@ def _largest_errors(plan: Plan, sets: list[VectorSet], answers: list[Answers]) -
 
 
 def _compare(vectors: VectorSet, name: str, found: Answers, expected: Answers) -> None:
-    if np.array_equal(found[0], expected[0]) and np.array_equal(found[1], expected[1]):
+    differs = difference(found, expected)
+    if differs is None:
         return
-    differs = (found[0] != expected[0]).any(axis=1) | (found[1] != expected[1])
-    i = int(differs.argmax())
+    i = differs.first
     raise RefusedError(
         f"cross-check, vector {i} of '{vectors.name}'",
         f"temp_code {vectors.temp[i]}, raw_code {vectors.raw[i].tolist()}: {name} gives "
-        f"{found[0][i].tolist()} status {found[1][i]}",
-        expected=f"{expected[0][i].tolist()} status {expected[1][i]}",
-        remedy=f"{int(differs.sum())} of {len(differs)} vectors differ: do not use this build, "
+        f"{differs.found}",
+        expected=differs.expected,
+        remedy=f"{differs.count} of {len(vectors.temp)} vectors differ: do not use this build, "
         "report it",
     )
 

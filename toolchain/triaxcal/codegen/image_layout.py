@@ -6,6 +6,8 @@ plans or proves.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
@@ -19,6 +21,14 @@ RATE_MIN, RATE_MAX, RATE_GAIN, RATE_WORDS = range(4)
 
 
 FIRST, ORIGIN, GAIN, COEFFICIENTS = range(4)
+
+
+def sum_of_floors(order: int) -> int:
+    """B_0 of a function whose coefficients are all nil."""
+    bound = 0
+    for _ in range(order):
+        bound = bound // 2 + 1
+    return bound
 
 
 @dataclass(frozen=True)
@@ -59,6 +69,11 @@ class Layout:
     def coefficient(self, s: int, f: int, k: int) -> int:
         """Index of c_k of a function."""
         return self.segment(s) + COEFFICIENTS + f * (self.order + 1) + k
+
+    def coefficients(self, functions: Iterable[int]) -> list[tuple[int, int, int, int]]:
+        """Segment, function, power and index of every coefficient of some functions."""
+        places = itertools.product(range(self.segments), functions, range(self.order + 1))
+        return [(s, f, k, self.coefficient(s, f, k)) for s, f, k in places]
 
     def reaches(self, words: list[int]) -> list[tuple[int, int, int]]:
         """First word of each segment, and its first and last temperature code."""

@@ -26,6 +26,26 @@ Routine = Callable[[Int32Array, Int32Array], Answers]
 """Answers of temperature codes (n,) and raw codes (n, 3)."""
 
 
+@dataclass(frozen=True)
+class Difference:
+    """Where answers differ first: its index, how many do, and both answers there in words."""
+
+    first: int
+    count: int
+    found: str
+    expected: str
+
+
+def difference(found: Answers, expected: Answers) -> Difference | None:
+    """How answers differ from the expected ones; None where they are equal."""
+    if np.array_equal(found[0], expected[0]) and np.array_equal(found[1], expected[1]):
+        return None
+    differs = (found[0] != expected[0]).any(axis=1) | (found[1] != expected[1])
+    i = int(differs.argmax())
+    words = [f"{accel[i].tolist()} status {status[i]}" for accel, status in (found, expected)]
+    return Difference(i, int(differs.sum()), *words)
+
+
 def start_generated(folder: Path, target: Path) -> Compilation:
     """Start compiling the generated files in `folder` with the batch entry."""
     source = shipped("firmware_ref")

@@ -90,17 +90,16 @@ def steady(angle_rad: FloatArray, sd_rad: float) -> BoolArray:
     return both_sides
 
 
-def extra_rows(
-    at: Moments,
-    layout: Layout,
-    p: FloatArray,
-    noise: DataSheet,
-    table: tuple[Turntable, FloatArray],
-) -> list[tuple[FloatArray, BoolArray]]:
-    """Whitened rows (b, 3 or 2, 7 + n) of each channel that is on, and the blocks that have them.
+Table = tuple[Turntable, FloatArray]
+"""The turntable, and the matrix of the present mounting."""
+Rows = tuple[FloatArray, BoolArray]
+"""Whitened rows (b, 3 or 2, 7 + n) of a channel, and the blocks that have them."""
 
-    `table` has the turntable and the matrix of the present mounting.
-    """
+
+def extra_rows(
+    at: Moments, layout: Layout, p: FloatArray, noise: DataSheet, table: Table
+) -> list[Rows]:
+    """Rows of each channel that is on."""
     made = []
     if TABLE in layout and at.table_angle_rad is not None:
         made.append(_table_rows(at, layout, p, noise, table))
@@ -109,13 +108,7 @@ def extra_rows(
     return made
 
 
-def _table_rows(
-    at: Moments,
-    layout: Layout,
-    p: FloatArray,
-    noise: DataSheet,
-    table: tuple[Turntable, FloatArray],
-) -> tuple[FloatArray, BoolArray]:
+def _table_rows(at: Moments, layout: Layout, p: FloatArray, noise: DataSheet, table: Table) -> Rows:
     assert at.table_angle_rad is not None
     assert noise.table_sd_arcsec is not None
     turntable, mounting = table
@@ -141,13 +134,7 @@ def _table_rows(
     return rows * (at.still / sd)[:, None, None], at.still
 
 
-def _axis_rows(
-    at: Moments,
-    layout: Layout,
-    p: FloatArray,
-    noise: DataSheet,
-    table: tuple[Turntable, FloatArray],
-) -> tuple[FloatArray, BoolArray]:
+def _axis_rows(at: Moments, layout: Layout, p: FloatArray, noise: DataSheet, table: Table) -> Rows:
     assert noise.axis_wobble_arcsec is not None
     turntable, mounting = table
     first, second, third = table_axes(turntable)

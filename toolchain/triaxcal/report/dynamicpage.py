@@ -15,7 +15,7 @@ from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Weak
 from triaxcal.report.imuc import NO_C, imu_verification
 from triaxcal.report.words.firmware import file_rows, tool_rows
-from triaxcal.report.words.numbers import signed, thousands
+from triaxcal.report.words.numbers import signed, superscript, thousands
 
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
 BAND = 10.0
@@ -139,7 +139,7 @@ def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
     ]
     if made.c is not None:
         low, high = made.c.device.range_degc
-        q = _raised(-made.c.device.accel_q), _raised(-made.c.device.gyro_rate_q)
+        q = superscript(-made.c.device.accel_q), superscript(-made.c.device.gyro_rate_q)
         facts += [
             ("Working range", signed(f"{low:g} to {high:g} °C")),
             ("Firmware", f"LSB 2{q[0]} g, 2{q[1]} °/s"),
@@ -149,10 +149,6 @@ def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
         ("Made by", f"triaxcal {__version__}"),
         ("Inputs", f"sha256 {made.inputs_sha256[:16]}…"),
     ]
-
-
-def _raised(number: int) -> str:
-    return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _warnings(made: ImuDelivery) -> list[str]:

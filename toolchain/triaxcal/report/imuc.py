@@ -152,12 +152,12 @@ def imu_c_lines(made: ImuDelivery) -> list[str]:
     accel_q, gyro_q = c.device.accel_q, c.device.gyro_rate_q
     accel, gyro = build.accel_bound.lsb, max(build.rate_bound_lsb)
     checked = build.accel_check.total + build.gyro_check.total + build.vectors
-    codes = _thousands(build.accel_bound.codes)
+    codes = thousands(build.accel_bound.codes, " ")
     proven = (
         f"{accel:.3f} LSB, {accel * 2.0**-accel_q * 1e6:.3g} micro-g",
         f"{gyro:.3f} LSB, {_deg_per_h(build.gyro, gyro):.3g} deg/h",
     )
-    agree = f"{_thousands(checked)} vectors: Python, reference C and generated C agree"
+    agree = f"{thousands(checked, ' ')} vectors: Python, reference C and generated C agree"
     lines = [
         f"C               both triads, {low:g} to {high:g} degC, {codes} temperature codes",
         f"  accelerometer LSB 2^-{accel_q} g; proven within {proven[0]},",
@@ -173,7 +173,3 @@ def imu_c_lines(made: ImuDelivery) -> list[str]:
             f'                "{what}-thermal"',
         ]
     return lines
-
-
-def _thousands(number: int) -> str:
-    return f"{number:,}".replace(",", " ")

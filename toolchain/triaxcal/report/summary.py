@@ -12,6 +12,7 @@ from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.words.measured import measured_words
+from triaxcal.report.words.numbers import thousands
 from triaxcal.report.words.temperatures import by_temperature, degrees
 
 _LABEL = 16
@@ -44,6 +45,7 @@ def _head(delivery: Delivery) -> str:
     outside = len(delivery.measurements.dwells) - len(delivery.methods[0].residuals)
     if outside:
         measured += f"; {outside} of the dwells lie outside the range and are not in the residuals"
+    codes = thousands(delivery.bound.codes, " ")
     method = f"{delivery.chosen.method.label}: {_method_words(delivery)}"
     return "\n".join(
         [
@@ -54,7 +56,7 @@ def _head(delivery: Delivery) -> str:
             _entry("method", method),
             _entry(
                 "range",
-                f"{low:g} to {high:g} degC, {_thousands(delivery.bound.codes)} temperature codes; "
+                f"{low:g} to {high:g} degC, {codes} temperature codes; "
                 f"LSB 2^-{plan.shape.output_q} g",
             ),
         ]
@@ -78,10 +80,6 @@ def _held_out(recording: RecordingFit) -> str:
         return _entry("held out", "none: the fit needs every pose, so none is left to check it")
     rms = recording.left_out_length_g * 1e3
     return _entry("held out", f"|a| - g: {rms:.4f} mg rms at held-out poses")
-
-
-def _thousands(number: int) -> str:
-    return f"{number:,}".replace(",", " ")
 
 
 def _method_words(delivery: Delivery) -> str:
@@ -179,7 +177,7 @@ def _small_g(value_g: float) -> str:
 def _verdict(made: Passport) -> str:
     delivery = made.delivery
     bound, check, limits = delivery.bound, delivery.check, delivery.unit.limits
-    q = delivery.plan.shape.output_q
+    q, vectors = delivery.plan.shape.output_q, thousands(check.total, " ")
     by_key: dict[str, float] = {}
     for r in delivery.chosen.residuals:
         _, key = limits.at(r.dwell.temp_degc, delivery.unit.t0_degc)
@@ -194,7 +192,7 @@ def _verdict(made: Passport) -> str:
             ),
             _entry(
                 "cross-check",
-                f"{_thousands(check.total)} vectors bit for bit: Python = reference = generated C",
+                f"{vectors} vectors bit for bit: Python = reference = generated C",
             ),
             _entry(
                 "passed" if made.checked else "NOT CHECKED",

@@ -16,7 +16,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.shipped import shipped
 from triaxcal.model.types import IntArray
 from triaxcal.rig.e2e import frame_crc
-from triaxcal.rig.frames import BoolArray, ByteArray, Frames
+from triaxcal.rig.frames import BoolArray, ByteArray, Frames, alike, widened
 from triaxcal.rig.signals import Signal
 
 REQUIRED = MappingProxyType(
@@ -80,6 +80,11 @@ class FrameLayout:
         crc = self.signals["Crc"]
         crc.put(data, frame_crc(self.frame_id, data, crc.length))
         return data
+
+    def frames(self, values: dict[str, IntArray], t_ns: IntArray) -> Frames:
+        """Frames of times (n,) with the payloads of `pack`."""
+        data = widened(self.pack(values), 64 if self.fd else 8)
+        return alike(t_ns, self.frame_id, self.size, self.fd, data)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.rig.canbus import messages_of
 from triaxcal.rig.candump import NS_PER_US, read_log
 from triaxcal.rig.export_columns import mf4_writer, parquet_writer
-from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, Frames
+from triaxcal.rig.frames import ID_MASK, Frames
 
 Put = Callable[[Frames], None]
 """Adds frames to a file that is being written."""
@@ -38,12 +38,10 @@ def _csv(target: Path) -> Iterator[Put]:
         file.write("time_s,id,extended,remote,error,fd,length,payload\n")
 
         def put(frames: Frames) -> None:
-            ids = frames.can_id
-            flags = [(ids & np.uint32(f)) != 0 for f in (EFF_FLAG, RTR_FLAG, ERR_FLAG)]
-            table = np.stack([*flags, frames.fd, frames.length], axis=1).astype(np.int64)
+            table = np.stack([*frames.flags, frames.fd, frames.length], axis=1).astype(np.int64)
             rows = zip(
                 (frames.t_ns // NS_PER_US).tolist(),
-                (ids & np.uint32(ID_MASK)).tolist(),
+                (frames.can_id & np.uint32(ID_MASK)).tolist(),
                 table.tolist(),
                 frames.data,
                 strict=True,

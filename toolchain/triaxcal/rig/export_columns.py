@@ -12,7 +12,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import FloatArray
-from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, BoolArray, Frames, widened
+from triaxcal.rig.frames import ID_MASK, BoolArray, Frames, widened
 
 _FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
@@ -95,10 +95,10 @@ def _moment(t_ns: int) -> datetime:
 
 
 def _of_group(frames: Frames, group: str) -> BoolArray:
-    remote = (frames.can_id & np.uint32(RTR_FLAG)) != 0
+    _, remote, error = frames.flags
     if group == "CAN_ErrorFrame":
-        return frames.is_error
-    return np.asarray(~frames.is_error & (remote == (group == "CAN_RemoteFrame")), np.bool_)
+        return error
+    return np.asarray(~error & (remote == (group == "CAN_RemoteFrame")), np.bool_)
 
 
 def _records(frames: Frames, group: str) -> Any:
@@ -106,7 +106,7 @@ def _records(frames: Frames, group: str) -> Any:
     columns = {
         "BusChannel": 1,
         "ID": frames.can_id & np.uint32(ID_MASK),
-        "IDE": (frames.can_id & np.uint32(EFF_FLAG)) != 0,
+        "IDE": frames.flags[0],
         "DLC": np.searchsorted(_FD_LENGTHS, frames.length),
         "DataLength": frames.length,
         "DataBytes": widened(frames.data, 64),
@@ -142,7 +142,6 @@ def parquet_writer(target: Path) -> Iterator[Callable[[Frames], None]]:
         def put(frames: Frames) -> None:
             if not len(frames):
                 return
-            ids = frames.can_id
             inside = np.arange(frames.data.shape[1]) < frames.length[:, None]
             ends = np.concatenate([[0], np.cumsum(frames.length, dtype=np.int32)]).astype(np.int32)
             payload = arrow.Array.from_buffers(
@@ -150,8 +149,8 @@ def parquet_writer(target: Path) -> Iterator[Callable[[Frames], None]]:
                 len(frames),
                 [None, arrow.py_buffer(ends), arrow.py_buffer(frames.data[inside].tobytes())],
             )
-            flags = [(ids & np.uint32(f)) != 0 for f in (EFF_FLAG, RTR_FLAG, ERR_FLAG)]
-            columns = [frames.t_ns, ids & np.uint32(ID_MASK), *flags, frames.fd, payload]
+            columns = [frames.t_ns, frames.can_id & np.uint32(ID_MASK), *frames.flags]
+            columns += [frames.fd, payload]
             file.write_table(arrow.Table.from_arrays(
                 [arrow.array(c, type=t.type) for c, t in zip(columns[:-1], schema, strict=False)]
                 + columns[-1:],

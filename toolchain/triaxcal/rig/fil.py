@@ -17,7 +17,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import IntArray
 from triaxcal.rig.burst import FD_BYTES
 from triaxcal.rig.dbc import FrameLayout, RigDbc, load_database
-from triaxcal.rig.frames import Frames, UintArray, concatenate, widened
+from triaxcal.rig.frames import Frames, UintArray, concatenate
 from triaxcal.rig.socketcan import frames_of_rows, packed
 
 Int32Array = npt.NDArray[np.int32]
@@ -129,15 +129,7 @@ def _questions_fd(dbc: RigDbc, temp: int, codes: Int32Array, first: int) -> Fram
 
 
 def _as_frames(layout: FrameLayout, values: dict[str, IntArray]) -> Frames:
-    payload = layout.pack(values)
-    count = len(payload)
-    return Frames(
-        np.zeros(count, np.int64),
-        np.full(count, layout.frame_id, np.uint32),
-        np.full(count, layout.size, np.uint8),
-        np.full(count, layout.fd, np.bool_),
-        widened(payload, 64 if layout.fd else 8),
-    )
+    return layout.frames(values, np.zeros(len(values["Sequence"]), np.int64))
 
 
 def _answers(

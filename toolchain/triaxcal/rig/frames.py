@@ -65,29 +65,30 @@ class Frames:
 
     def take(self, index: slice | BoolArray | IntArray) -> Frames:
         """Some of the frames."""
-        return Frames(
-            self.t_ns[index],
-            self.can_id[index],
-            self.length[index],
-            self.fd[index],
-            self.data[index],
-        )
+        kinds = self.length[index], self.fd[index]
+        return Frames(self.t_ns[index], self.can_id[index], *kinds, self.data[index])
+
+    @property
+    def flags(self) -> list[BoolArray]:
+        """Which have an extended ID, which are remote requests, which are error frames."""
+        return [(self.can_id & np.uint32(f)) != 0 for f in (EFF_FLAG, RTR_FLAG, ERR_FLAG)]
 
     @property
     def is_error(self) -> BoolArray:
         """Which are error frames."""
-        return np.asarray((self.can_id & np.uint32(ERR_FLAG)) != 0, np.bool_)
+        return self.flags[2]
+
+
+def alike(t_ns: IntArray, can_id: int, length: int, fd: bool, data: ByteArray) -> Frames:
+    """Frames of one ID, length and kind: times (n,) and payloads (n, 8) or (n, 64)."""
+    count = len(t_ns)
+    kinds = np.full(count, length, np.uint8), np.full(count, fd, np.bool_)
+    return Frames(t_ns, np.full(count, can_id, np.uint32), *kinds, data)
 
 
 def empty(width: int = 8) -> Frames:
     """No frames."""
-    return Frames(
-        np.zeros(0, np.int64),
-        np.zeros(0, np.uint32),
-        np.zeros(0, np.uint8),
-        np.zeros(0, np.bool_),
-        np.zeros((0, width), np.uint8),
-    )
+    return alike(np.zeros(0, np.int64), 0, 0, False, np.zeros((0, width), np.uint8))
 
 
 def concatenate(parts: Sequence[Frames]) -> Frames:

@@ -6,7 +6,7 @@ import numpy as np
 
 from triaxcal.model.types import IntArray
 from triaxcal.rig.dbc import FrameLayout, RigDbc
-from triaxcal.rig.frames import BUS_OFF, ERR_FLAG, RESTARTED, Frames, concatenate, empty
+from triaxcal.rig.frames import BUS_OFF, ERR_FLAG, RESTARTED, Frames, alike, concatenate
 from triaxcal.rig.simorders import Fault
 
 _AFTER_NS = {"RIG_XY": 0, "RIG_Z": 150_000, "RIG_FD": 0, "RIG_TEMP": 300_000, "RIG_IDENT": 450_000}
@@ -89,17 +89,7 @@ class FrameMaker:
 
 
 def _packed(layout: FrameLayout, values: dict[str, IntArray], t_ns: IntArray) -> Frames:
-    payload = layout.pack(values)
-    count = len(payload)
-    data = np.zeros((count, 64 if layout.fd else 8), np.uint8)
-    data[:, : layout.size] = payload
-    return Frames(
-        t_ns + _AFTER_NS[layout.name],
-        np.full(count, layout.frame_id, np.uint32),
-        np.full(count, layout.size, np.uint8),
-        np.full(count, layout.fd, np.bool_),
-        data,
-    )
+    return layout.frames(values, t_ns + _AFTER_NS[layout.name])
 
 
 def with_frame_faults(
@@ -155,12 +145,5 @@ def _silenced(frames: Frames, fault: Fault, at_ns: int, end_ns: int) -> Frames:
 
 
 def _errors(t_ns: int, bits: int, count: int, width: int) -> Frames:
-    if not count:
-        return empty(width)
-    return Frames(
-        np.full(count, t_ns, np.int64),
-        np.full(count, ERR_FLAG | bits, np.uint32),
-        np.full(count, 8, np.uint8),
-        np.zeros(count, np.bool_),
-        np.zeros((count, width), np.uint8),
-    )
+    times, data = np.full(count, t_ns, np.int64), np.zeros((count, width), np.uint8)
+    return alike(times, ERR_FLAG | bits, 8, False, data)

@@ -27,12 +27,7 @@ KINDS = {
     "notemp": "no frames of the thermometer",
 }
 _FORM = re.compile(r"([a-z]+)@([0-9.]+)(?::([0-9.]+))?(?::([0-9.]+))?")
-_DEFAULTS = {
-    "nudge": (10.0, 0.3),
-    "slip": (30.0, 0.0),
-    "creep": (20.0, 20.0),
-    "lose": (50.0, 0.0),
-}
+_DEFAULTS = {"nudge": (10.0, 0.3), "slip": (30.0, 0.0), "creep": (20.0, 20.0), "lose": (50.0, 0.0)}
 
 
 @dataclass(frozen=True)
@@ -62,11 +57,6 @@ def read_fault(order: str) -> Fault:
         )
     value, length = _DEFAULTS.get(kind, (1.0, 5.0))
     try:
-        return Fault(
-            kind,
-            float(match[2]),
-            float(match[3]) if match[3] else value,
-            float(match[4]) if match[4] else length,
-        )
+        return Fault(kind, float(match[2]), float(match[3] or value), float(match[4] or length))
     except ValueError as error:
         raise UsageError("--fault", f"found {shown(order)}", expected=form) from error

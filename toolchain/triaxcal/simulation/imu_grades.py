@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,34 +21,39 @@ class Grade:
     ----------
     name : str
     noise : ImuNoise
-    rate_convention, force_convention : str
-    gyro_bias_deg_per_h ... second_bias_mm_per_s2 : float
-        Standard deviations, as the attributes of `ImuTruth` and `SecondTriad`.
+    convention : str
+        Of both triads, as in `triaxcal.dynamic.recording`.
+    sd : mapping
+        Standard deviations by name: attributes of `ImuTruth`, and with "second_" before them those
+        of `SecondTriad`.
     """
 
     name: str
     noise: ImuNoise
-    rate_convention: str
-    force_convention: str
-    gyro_bias_deg_per_h: float
-    gyro_scale_ppm: float
-    gyro_misalignment_arcsec: float
-    accel_bias_mm_per_s2: float
-    accel_scale_ppm: float
-    accel_misalignment_arcsec: float
-    gyro_g_deg_per_h_per_g: float
-    accel_delay_ms: float
-    accel_position_mm: float
-    mount_elasticity_arcsec_per_g: float
-    gyro_elasticity_arcsec_per_g: float
-    accel_bias_mm_per_s2_per_k: float
-    accel_scale_ppm_per_k: float
-    gyro_bias_deg_per_h_per_k: float
-    gyro_scale_ppm_per_k: float
-    second_bias_mm_per_s2: float
-    second_scale_ppm: float
+    convention: str
+    sd: Mapping[str, float]
 
 
+_SD = {
+    "gyro_bias_deg_per_h": (0.1, 500.0),
+    "gyro_scale_ppm": (50.0, 3000.0),
+    "gyro_misalignment_arcsec": (60.0, 600.0),
+    "accel_bias_mm_per_s2": (5.0, 30.0),
+    "accel_scale_ppm": (200.0, 3000.0),
+    "accel_misalignment_arcsec": (60.0, 600.0),
+    "gyro_g_deg_per_h_per_g": (0.05, 50.0),
+    "accel_delay_ms": (1.0, 5.0),
+    "accel_position_mm": (20.0, 10.0),
+    "mount_elasticity_arcsec_per_g": (15.0, 120.0),
+    "gyro_elasticity_arcsec_per_g": (1.5, 30.0),
+    "accel_bias_mm_per_s2_per_k": (0.1, 1.0),
+    "accel_scale_ppm_per_k": (10.0, 50.0),
+    "gyro_bias_deg_per_h_per_k": (0.005, 10.0),
+    "gyro_scale_ppm_per_k": (1.0, 50.0),
+    "second_bias_mm_per_s2": (10.0, 50.0),
+    "second_scale_ppm": (500.0, 5000.0),
+}
+"""Standard deviations of both grades."""
 AVIATION = Grade(
     # Ring laser gyros that count fringes, quartz accelerometers behind a charge-balance counter.
     name="aviation",
@@ -59,25 +65,8 @@ AVIATION = Grade(
         temp_sd_degc=0.01,
         table_sd_arcsec=1.0,
     ),
-    rate_convention=INCREMENT,
-    force_convention=INCREMENT,
-    gyro_bias_deg_per_h=0.1,
-    gyro_scale_ppm=50.0,
-    gyro_misalignment_arcsec=60.0,
-    accel_bias_mm_per_s2=5.0,
-    accel_scale_ppm=200.0,
-    accel_misalignment_arcsec=60.0,
-    gyro_g_deg_per_h_per_g=0.05,
-    accel_delay_ms=1.0,
-    accel_position_mm=20.0,
-    mount_elasticity_arcsec_per_g=15.0,
-    gyro_elasticity_arcsec_per_g=1.5,
-    accel_bias_mm_per_s2_per_k=0.1,
-    accel_scale_ppm_per_k=10.0,
-    gyro_bias_deg_per_h_per_k=0.005,
-    gyro_scale_ppm_per_k=1.0,
-    second_bias_mm_per_s2=10.0,
-    second_scale_ppm=500.0,
+    convention=INCREMENT,
+    sd={name: pair[0] for name, pair in _SD.items()},
 )
 MEMS = Grade(
     # A tactical-to-industrial part with instantaneous readings over a digital bus.
@@ -90,25 +79,8 @@ MEMS = Grade(
         temp_sd_degc=0.05,
         table_sd_arcsec=60.0,
     ),
-    rate_convention=INSTANT,
-    force_convention=INSTANT,
-    gyro_bias_deg_per_h=500.0,
-    gyro_scale_ppm=3000.0,
-    gyro_misalignment_arcsec=600.0,
-    accel_bias_mm_per_s2=30.0,
-    accel_scale_ppm=3000.0,
-    accel_misalignment_arcsec=600.0,
-    gyro_g_deg_per_h_per_g=50.0,
-    accel_delay_ms=5.0,
-    accel_position_mm=10.0,
-    mount_elasticity_arcsec_per_g=120.0,
-    gyro_elasticity_arcsec_per_g=30.0,
-    accel_bias_mm_per_s2_per_k=1.0,
-    accel_scale_ppm_per_k=50.0,
-    gyro_bias_deg_per_h_per_k=10.0,
-    gyro_scale_ppm_per_k=50.0,
-    second_bias_mm_per_s2=50.0,
-    second_scale_ppm=5000.0,
+    convention=INSTANT,
+    sd={name: pair[1] for name, pair in _SD.items()},
 )
 GRADES = {grade.name: grade for grade in (AVIATION, MEMS)}
 
@@ -145,23 +117,24 @@ def draw_truth(grade: Grade, seed: int, effects: tuple[str, ...] = ()) -> ImuTru
     return ImuTruth(
         **drawn,
         noise=grade.noise,
-        rate_convention=grade.rate_convention,
-        force_convention=grade.force_convention,
+        rate_convention=grade.convention,
+        force_convention=grade.convention,
     )
 
 
 def _drawn(grade: Grade, name: str, seed: int) -> Any:
     names = list(ImuTruth.__dataclass_fields__)
     rng = np.random.Generator(np.random.PCG64([seed, names.index(name)]))
+    sd = grade.sd
     if name == "second":
         return SecondTriad(
-            bias_mm_per_s2=_tuple(grade.second_bias_mm_per_s2 * rng.standard_normal(3)),
-            scale_ppm=_tuple(grade.second_scale_ppm * rng.standard_normal(3)),
-            misalignment_arcsec=_tuple(grade.gyro_misalignment_arcsec * rng.standard_normal(6)),
-            delay_ms=grade.accel_delay_ms * float(rng.standard_normal()),
+            bias_mm_per_s2=_tuple(sd["second_bias_mm_per_s2"] * rng.standard_normal(3)),
+            scale_ppm=_tuple(sd["second_scale_ppm"] * rng.standard_normal(3)),
+            misalignment_arcsec=_tuple(sd["gyro_misalignment_arcsec"] * rng.standard_normal(6)),
+            delay_ms=sd["accel_delay_ms"] * float(rng.standard_normal()),
         )
     shape = np.shape(getattr(ImuTruth(), name))
-    values = getattr(grade, name) * rng.standard_normal(shape)
+    values = sd[name] * rng.standard_normal(shape)
     if name == "accel_position_mm":
         values[0] = 0.0
     return _tuple(values)

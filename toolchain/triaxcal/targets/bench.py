@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.forms import assembly
 from triaxcal.targets.bench_case import case_header, floating_macros, floating_tables
-from triaxcal.targets.build import TargetError, Toolset, build, run
+from triaxcal.targets.build import TargetError, Toolset, build, in_parallel, run
 from triaxcal.targets.cores.core import Core
 from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
 from triaxcal.targets.counting import Counts, build_plugin, measure
@@ -106,16 +105,11 @@ def run_bench(
     with tempfile.TemporaryDirectory(prefix="triaxcal-bench-") as name:
         work = Path(name)
         plugin = build_plugin(work)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            futures = {
-                pool.submit(cost_of, subject, core, work / str(i), plugin): i
-                for i, (subject, core) in enumerate(plan)
-            }
-            costs: dict[int, Cost] = {}
-            for future in as_completed(futures):
-                costs[futures[future]] = future.result()
-                progress(future.result())
-    return [costs[i] for i in range(len(plan))]
+        jobs = [
+            partial(cost_of, subject, core, work / str(i), plugin)
+            for i, (subject, core) in enumerate(plan)
+        ]
+        return in_parallel(jobs, progress)
 
 
 def _meant_for(arithmetic: int, core: Core) -> bool:

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
 from triaxcal.targets.bench import DOUBLE, FLOAT, OPTIMISATION, SIZE_OPTIMISATION, Cost
-from triaxcal.targets.counting import Span
 from triaxcal.targets.matrix import ARITHMETIC_NAMES
 from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT
 
@@ -46,17 +45,13 @@ def _head(columns: Sequence[str]) -> list[str]:
     return ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
 
 
-def _span(span: Span) -> str:
-    return str(span.least) if span.least == span.most else f"{span.least} to {span.most}"
-
-
 def _row(cost: Cost) -> str:
     n, f = cost.counts, cost.flash
     assert n is not None
     assert f is not None
     cells = [
-        cost.subject.label, cost.core.name, _span(n.set), _span(n.apply), _span(n.set_out),
-        _span(n.apply_out), f"{f.code} + {f.tables} + {f.helpers} = {f.total}",
+        cost.subject.label, cost.core.name, str(n.set), str(n.apply), str(n.set_out),
+        str(n.apply_out), f"{f.code} + {f.tables} + {f.helpers} = {f.total}",
         str(f.loader or "-"),
         f"{n.state_bytes}, {n.calib_bytes}", f"{n.stack_set}, {n.stack_apply}",
     ]  # fmt: skip

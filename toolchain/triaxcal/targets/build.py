@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import WARNINGS
 from triaxcal.targets.cores.core import Core
 
+T = TypeVar("T")
 RUN_SECONDS = 600.0
 """A program that runs longer hangs; the slowest of the matrix takes about 20 s."""
 
@@ -66,16 +70,28 @@ def build(
     TargetError
         With the compiler's first complaint.
     """
-    folder = program.parent
-    folder.mkdir(parents=True, exist_ok=True)
-    target = shipped("firmware_ref") / "target"
-    includes = [f"-I{path}" for path in (*include, target)]
-    objects = []
-    for source in (*sources, *_support(toolset.core)):
-        made = folder / f"{source.stem}.o"
-        run([*toolset.command(), *includes, "-c", str(source), "-o", str(made)])
-        objects.append(str(made))
+    objects = compiled(toolset, [*sources, *_support(toolset.core)], include, program.parent)
     run([*link_command(toolset.core), *objects, "-lgcc", "-o", str(program)])
+
+
+def compiled(
+    toolset: Toolset, sources: Sequence[Path], include: Sequence[Path], folder: Path
+) -> list[str]:
+    """Objects of `sources`, in a folder that is made where there is none.
+
+    Raises
+    ------
+    TargetError
+        With the compiler's first complaint.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    includes = [f"-I{path}" for path in (*include, shipped("firmware_ref") / "target")]
+    objects = []
+    for source in sources:
+        made = str(folder / f"{source.stem}.o")
+        run([*toolset.command(), *includes, "-c", str(source), "-o", made])
+        objects.append(made)
+    return objects
 
 
 def _support(core: Core) -> list[Path]:
@@ -96,6 +112,15 @@ def link_command(core: Core) -> list[str]:
         *(f"-Wl,--defsym={name}={value}" for name, value in core.memory.items()),
         f"-Wl,-T,{shipped('firmware_ref') / 'target' / script}", "-Wl,--no-warn-rwx-segments",
     ]  # fmt: skip
+
+
+def in_parallel(jobs: Sequence[Callable[[], T]], done: Callable[[T], None]) -> list[T]:
+    """Results of jobs, which run on all cores, in their order; `done` gets each as it ends."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        futures = [pool.submit(job) for job in jobs]
+        for future in as_completed(futures):
+            done(future.result())
+    return [future.result() for future in futures]
 
 
 def emulate(core: Core, program: Path, extra: Sequence[str] = ()) -> str:

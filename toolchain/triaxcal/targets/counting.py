@@ -22,6 +22,9 @@ class Span:
     most: int
     mean: float
 
+    def __str__(self) -> str:
+        return str(self.least) if self.least == self.most else f"{self.least} to {self.most}"
+
 
 @dataclass(frozen=True)
 class Counts:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import os
+import itertools
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from triaxcal.base.shipped import shipped
-from triaxcal.targets.build import TargetError, Toolset, build, emulate
+from triaxcal.targets.build import TargetError, Toolset, build, emulate, in_parallel
 from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
 from triaxcal.targets.shapes import CUBIC, Case
 from triaxcal.targets.vectors import case_header, expected_lines
@@ -86,20 +86,16 @@ def _builds(case: Case, ways: Sequence[tuple[str, str]]) -> Iterator[Build]:
 def run_builds(
     builds: Sequence[Build], progress: Callable[[Outcome, int], None] = lambda _o, _n: None
 ) -> list[Outcome]:
-    """Build, run and judge all, in the order given; `progress` hears of each as it ends."""
-    outcomes: dict[int, Outcome] = {}
+    """Build, run and judge all, in the order given; `progress` gets each as it ends."""
+    done = itertools.count(1)
     with tempfile.TemporaryDirectory(prefix="triaxcal-targets-") as name:
         work = Path(name)
         sources = _write_cases(builds, work)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            futures = {
-                pool.submit(_outcome, b, *sources[b.case.name], work / f"build-{i}"): i
-                for i, b in enumerate(builds)
-            }
-            for future in as_completed(futures):
-                outcomes[futures[future]] = future.result()
-                progress(future.result(), len(outcomes))
-    return [outcomes[i] for i in range(len(builds))]
+        jobs = [
+            partial(_outcome, b, *sources[b.case.name], work / f"build-{i}")
+            for i, b in enumerate(builds)
+        ]
+        return in_parallel(jobs, lambda outcome: progress(outcome, next(done)))
 
 
 def _write_cases(builds: Sequence[Build], work: Path) -> dict[str, tuple[Path, dict[str, int]]]:

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.base.shipped import shipped
-from triaxcal.targets.build import Toolset, link_command, run
+from triaxcal.targets.build import Toolset, compiled, link_command, run
 
 
 @dataclass(frozen=True)
@@ -45,13 +44,7 @@ def flash_of(
 
     `prefix` is that of its names: "triax", "triax_gyro" or "floating".
     """
-    work.mkdir(parents=True)
-    objects = []
-    for source in sources:
-        made = work / f"{source.stem}.o"
-        includes = [f"-I{path}" for path in (*include, shipped("firmware_ref") / "target")]
-        run([*toolset.command(), *includes, "-c", str(source), "-o", str(made)])
-        objects.append(made)
+    objects = compiled(toolset, sources, include, work)
     roots = [f"{prefix}_set_temperature", f"{prefix}_apply"]
     tables_root = f"{prefix.upper()}_CALIB"
     code, helpers = _text(toolset, objects, roots, work / "routine.elf")
@@ -64,16 +57,16 @@ def flash_of(
 
 
 def _text(
-    toolset: Toolset, objects: Sequence[Path], roots: Sequence[str], program: Path
+    toolset: Toolset, objects: Sequence[str], roots: Sequence[str], program: Path
 ) -> tuple[int, int]:
     """Bytes of code of the first object, and of everything else, that `roots` keep."""
     core = toolset.core
     link = [*link_command(core), f"-Wl,-e,{roots[0]}", *(f"-Wl,-u,{r}" for r in roots)]
-    run([*link, "-Wl,-z,noexecstack", *map(str, objects), "-lgcc", "-o", str(program)])
+    run([*link, "-Wl,-z,noexecstack", *objects, "-lgcc", "-o", str(program)])
     prefix = core.gcc.removesuffix("gcc")
     own = {
         line.split()[-1]
-        for line in run([f"{prefix}nm", str(objects[0])]).splitlines()
+        for line in run([f"{prefix}nm", objects[0]]).splitlines()
         if line.split()[-2] in "tTrR"
     }
     total = 0

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
+from functools import partial
 
 from triaxcal.codegen.forms import assembly
 from triaxcal.targets.bench import Cost, Subject, best_form, compiler_versions, cost_of
-from triaxcal.targets.build import TargetError
+from triaxcal.targets.build import TargetError, in_parallel
 from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
-from triaxcal.targets.counting import Span, build_plugin
+from triaxcal.targets.counting import build_plugin
 from triaxcal.targets.matrix import ARITHMETIC_NAMES
 from triaxcal.targets.shapes import Case
 from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
@@ -43,15 +42,11 @@ def check(work: Workspace) -> Outcome:
         plugin = build_plugin(folder)
     except TargetError as error:
         raise BrokenToolError(str(error)) from error
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        costs = list(
-            pool.map(
-                lambda core: cost_of(
-                    Subject(case, best_form(core), ""), core, folder / core.name, plugin
-                ),
-                cores,
-            )
-        )
+    jobs = [
+        partial(cost_of, Subject(case, best_form(core), ""), core, folder / core.name, plugin)
+        for core in cores
+    ]
+    costs = in_parallel(jobs, lambda _: None)
     for cost in costs:
         if cost.failure:
             raise BrokenToolError(f"{cost.core.name}: {cost.failure}")
@@ -70,7 +65,7 @@ def outcome_of(costs: list[Cost]) -> Outcome:
         assert cost.counts is not None
         assert cost.flash is not None
         n, name = cost.counts, cost.core.name.removeprefix("Cortex-")
-        ranges.append(f"{name} {_span(n.set)} + {_span(n.apply)}")
+        ranges.append(f"{name} {n.set} + {n.apply}")
         if n.apply.least != n.apply.most:
             varying.append(name)
             promised = bool(assembly(cost.subject.case.plan.shape)["thumb1"])
@@ -93,7 +88,3 @@ def outcome_of(costs: list[Cost]) -> Outcome:
         finding=finding,
         figures={"compilers": compiler_versions(), "cores": figures},
     )
-
-
-def _span(span: Span) -> str:
-    return str(span.least) if span.least == span.most else f"{span.least} to {span.most}"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, same, spread
+from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, bias_rows, spread
 from triaxcal.model.types import FloatArray
 
 MM_PER_S2 = 1e-3
@@ -27,10 +27,6 @@ def _element(name: str, i: int, j: int) -> State:
     return State(f"{name}{i + 1}{j + 1}", "arcsec", ARCSEC, 2e4)
 
 
-def _bias_rows(signals: Signals) -> FloatArray:
-    return same(len(signals.force))
-
-
 def _gamma_rows(signals: Signals) -> FloatArray:
     return spread(signals.force)[:, :, [3 * i + j for i, j in LOWER]]
 
@@ -43,7 +39,7 @@ ACCELEROMETER_BIAS = StateBlock(
     "accelerometer-bias",
     "accelerometer biases",
     tuple(State(f"df0_{i}", "mm/s^2", MM_PER_S2, 1000.0) for i in (1, 2, 3)),
-    force=_bias_rows,
+    force=bias_rows,
 )
 ACCELEROMETER_MATRIX = StateBlock(
     "accelerometer-matrix",
@@ -55,7 +51,7 @@ GYRO_BIAS = StateBlock(
     "gyro-bias",
     "gyro drifts",
     tuple(State(f"nu0_{i}", "deg/h", DEG_PER_H, 36000.0) for i in (1, 2, 3)),
-    rate=_bias_rows,
+    rate=bias_rows,
 )
 GYRO_MATRIX = StateBlock(
     "gyro-matrix",

@@ -161,6 +161,11 @@ def diagonal(values: FloatArray) -> FloatArray:
     return rows
 
 
+def bias_rows(signals: Signals) -> FloatArray:
+    """Rows of three biases: shape (n, 3, 3)."""
+    return same(len(signals.force))
+
+
 def same(n: int) -> FloatArray:
     """Rows of three states that are the error itself: shape (n, 3, 3)."""
     return np.broadcast_to(np.eye(3), (n, 3, 3))

@@ -7,13 +7,9 @@ is its own because its electronics are: with it the states of all blocks number 
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.base import ARCSEC, MM_PER_S2, PPM
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, same, spread
+from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, bias_rows, spread
 from triaxcal.dynamic.blocks.delay import curve, rows
 from triaxcal.model.types import FloatArray
-
-
-def _bias(signals: Signals) -> FloatArray:
-    return same(len(signals.force))
 
 
 def _matrix(signals: Signals) -> FloatArray:
@@ -24,7 +20,7 @@ BIAS = StateBlock(
     "second-bias",
     "biases of the second accelerometer triad",
     tuple(State(f"df0_{i}", "mm/s^2", MM_PER_S2, 1000.0) for i in (4, 5, 6)),
-    force2=_bias,
+    force2=bias_rows,
     needs="force2",
 )
 MATRIX = StateBlock(

@@ -21,6 +21,7 @@ from triaxcal.report.words.numbers import (
     percent,
     signed,
     significant,
+    superscript,
     with_uncertainty,
 )
 from triaxcal.uncertainty.budget import Budget, Line
@@ -75,7 +76,7 @@ def _identity(p: Passport) -> dict[str, Any]:
             ("Bias estimator", d.calibration.estimator),
             (
                 "Compensation",
-                f"{d.chosen.method.label}, LSB 2⁻{_superscript(d.plan.shape.output_q)} g",
+                f"{d.chosen.method.label}, LSB 2{superscript(-d.plan.shape.output_q)} g",
             ),
             ("Made by", f"triaxcal {__version__}, gcc {d.compiler}"),
             ("Inputs", f"sha256 {d.inputs_sha256[:16]}…"),
@@ -96,10 +97,6 @@ def _findings(p: Passport) -> tuple[str, ...]:
     """What was found in the readings, for the top of the page."""
     found = p.delivery.calibration.findings
     return tuple(signed(f[0].upper() + f[1:].replace("degC", "°C")) for f in found)
-
-
-def _superscript(number: int) -> str:
-    return str(number).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _acceptance(a: Acceptance, *, checked: bool) -> dict[str, Any]:

@@ -67,9 +67,14 @@ def in_unit(value: float, unit: str) -> str:
     return f"{significant(value * scale)} {name}"
 
 
-def thousands(number: int) -> str:
+def thousands(number: int, between: str = "\u202f") -> str:
     """Whole number in groups of three."""
-    return f"{number:,}".replace(",", "\u202f")
+    return f"{number:,}".replace(",", between)
+
+
+def superscript(number: int) -> str:
+    """Exponent as raised digits."""
+    return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def percent(share: float) -> str:
