@@ -59,13 +59,7 @@ class Channel:
         walk = DEG_PER_H * noise.gyro_walk_deg_per_h_per_sqrt_h / 60.0
         counts = truth.rate_convention == INCREMENT
         lsb = noise.gyro_lsb * (ARCSEC if counts else DEG_PER_H)
-        return cls(
-            white(seed, GYRO),
-            white(seed, GYRO + _WALK),
-            *_steps(arw, walk, step_s, counts),
-            lsb,
-            counts,
-        )
+        return cls._of(seed, GYRO, _steps(arw, walk, step_s, counts), lsb, counts)
 
     @classmethod
     def accelerometers(cls, truth: ImuTruth, step_s: float, seed: int, source: int) -> Channel:
@@ -75,13 +69,13 @@ class Channel:
         walk = MICRO_G * noise.accel_walk_ug_per_sqrt_h / 60.0
         counts = truth.force_convention == INCREMENT
         lsb = noise.accel_lsb * (1e-3 if counts else MICRO_G)
-        return cls(
-            white(seed, source),
-            white(seed, source + _WALK),
-            *_steps(vrw, walk, step_s, counts),
-            lsb,
-            counts,
-        )
+        return cls._of(seed, source, _steps(vrw, walk, step_s, counts), lsb, counts)
+
+    @classmethod
+    def _of(
+        cls, seed: int, source: int, steps: tuple[float, float], lsb: float, counts: bool
+    ) -> Channel:
+        return cls(white(seed, source), white(seed, source + _WALK), *steps, lsb, counts)
 
     def read(self, ideal: FloatArray) -> FloatArray:
         """Readings (n, 3) of the next n ideal ones."""

@@ -18,7 +18,7 @@ from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.model.methods.imu import EXAMPLE_SENSITIVITY, ImuCompensation
-from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS
+from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS, Terms
 from triaxcal.readings.measurements import MEASUREMENTS_FILE, read_measurements
 from triaxcal.unit.description import UnitDescription, read_unit
 
@@ -102,7 +102,10 @@ def shipped_cases(units: Path) -> tuple[Case, ...]:
     RefusedError
         When a unit is refused, or the cubic shapes are not of order 3.
     """
-    cases = tuple(_case(units / unit, name, note, change) for name, unit, note, change in _SHAPES)
+    cases = tuple(
+        made_case(units / unit, name, note, change, _TERMS.get(name, NO_TERMS))
+        for name, unit, note, change in _SHAPES
+    )
     for case in cases[:2]:
         if case.plan.shape.order != 3:
             raise RefusedError(
@@ -116,7 +119,7 @@ def shipped_cases(units: Path) -> tuple[Case, ...]:
 
 def unit_case(folder: Path) -> Case:
     """The shape of the unit in `folder`."""
-    return _case(folder, folder.absolute().name, "as described", lambda u: u)
+    return made_case(folder, folder.absolute().name, "as described", lambda u: u, NO_TERMS)
 
 
 @cache
@@ -125,10 +128,16 @@ def _calibrated(folder: Path) -> tuple[UnitDescription, Calibration]:
     return unit, calibrate(unit, read_measurements(folder / MEASUREMENTS_FILE, unit))
 
 
-def _case(folder: Path, name: str, note: str, change: Change) -> Case:
+def made_case(folder: Path, name: str, note: str, change: Change, terms: Terms) -> Case:
+    """A shape from the measurements of the unit in `folder`, its description changed.
+
+    Raises
+    ------
+    RefusedError
+        When the unit's files are refused.
+    """
     described, calibration = _calibrated(folder)
-    unit = change(described)
-    calibration = replace(calibration, terms=_TERMS.get(name, NO_TERMS))
+    unit, calibration = change(described), replace(calibration, terms=terms)
     compensation = compensation_of(unit, calibration, unit.method)
     plan = make_plan(compensation, unit)
     if name == GYRO:
@@ -136,6 +145,7 @@ def _case(folder: Path, name: str, note: str, change: Change) -> Case:
         imu = ImuCompensation(compensation, compensation, EXAMPLE_SENSITIVITY)
         plan = make_gyro_plan(imu, replace(unit, output_q=18), unit.output_q)
     files = render_routine(plan)
-    provenance = Provenance(unit.serial, inputs_sha256(folder), (f"shape {name}: {note}",))
+    told = f"shape {name}: {note}" if note else f"shape {name}"
+    provenance = Provenance(unit.serial, inputs_sha256(folder), (told,))
     files |= render_constants(plan, unit.temperature_sensor, provenance)
     return Case(name, note, plan, files, image_bytes(plan))

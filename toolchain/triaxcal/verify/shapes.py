@@ -9,21 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from triaxcal.codegen.constants import Provenance, render_constants
-from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.outputs.image import IMAGE_FILE
-from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.templates import names_of
-from triaxcal.delivery.firmware import compensation_of
-from triaxcal.delivery.inputs import inputs_sha256
-from triaxcal.fitting.tilter.calibrate import calibrate
-from triaxcal.fixedpoint.gyro import make_gyro_plan
-from triaxcal.fixedpoint.plan import Plan, make_plan
+from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound, prove
-from triaxcal.model.methods.imu import EXAMPLE_SENSITIVITY, ImuCompensation
-from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS
-from triaxcal.readings.measurements import MEASUREMENTS_FILE, read_measurements
-from triaxcal.unit.description import UnitDescription, read_unit
+from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS
+from triaxcal.targets.shapes import made_case
+from triaxcal.unit.description import UnitDescription
 
 
 @dataclass(frozen=True)
@@ -77,21 +69,8 @@ def subject(name: str, units: Path) -> Subject:
     RefusedError
         When the unit's files are refused.
     """
-    unit_name, change = ALL_SHAPES[name]
-    folder = units / unit_name
-    unit = change(read_unit(folder))
-    calibration = calibrate(unit, read_measurements(folder / MEASUREMENTS_FILE, unit))
-    if name in WITH_TERMS:
-        calibration = replace(calibration, terms=WITH_TERMS[name])
-    compensation = compensation_of(unit, calibration, unit.method)
-    plan = make_plan(compensation, unit)
-    if name == "gyro":
-        imu = ImuCompensation(compensation, compensation, EXAMPLE_SENSITIVITY)
-        # 1 rad/s in place of 1 g: the same curves, and a rate of some hundred deg/s.
-        plan = make_gyro_plan(imu, replace(unit, output_q=18), unit.output_q)
-    texts = render_routine(plan)
-    provenance = Provenance(unit.serial, inputs_sha256(folder), (f"shape {name}",))
-    texts |= render_constants(plan, unit.temperature_sensor, provenance)
-    files = {file: text.encode() for file, text in texts.items()}
-    files[names_of(plan.shape).file(IMAGE_FILE)] = image_bytes(plan)
-    return Subject(name, plan, prove(plan), files)
+    unit, change = ALL_SHAPES[name]
+    case = made_case(units / unit, name, "", change, WITH_TERMS.get(name, NO_TERMS))
+    files = {file: text.encode() for file, text in case.files.items()}
+    files[names_of(case.plan.shape).file(IMAGE_FILE)] = case.image
+    return Subject(name, case.plan, prove(case.plan), files)
