@@ -57,7 +57,7 @@ def calibrate_series(
     Parameters
     ----------
     units : paths, or a Work
-        Folders of units, or folders that contain them; or what `plan_work` made of them.
+        Folders of the units; or what `plan_work` made of them.
     build : path
         Receives a folder for each unit, and the page of the series.
     jobs : int or None

@@ -39,7 +39,7 @@ from triaxcal.cli.options import UnitFolder, build_option, example, say
 def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str | None) -> None:
     """Calibrate many units; unchanged ones are not repeated.
 
-    UNITS are folders of units, or folders that contain them. The series gets a page of its own.
+    UNITS are the folders of the units, as units/*. The series gets a page of its own.
     """
     if scheduler is not None and jobs is not None:
         raise click.UsageError("--jobs is for this machine; a cluster has its own workers")
