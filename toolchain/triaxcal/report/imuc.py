@@ -133,7 +133,9 @@ def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
     ]
     constant = constant_triads(made)
     if constant:
-        rows.append(("Constant over temperature", f"{' and '.join(constant)}: no block is on"))
+        rows.append(
+            ("Constant over temperature", f"{' and '.join(constant)}: no temperature block")
+        )
     return rows
 
 
