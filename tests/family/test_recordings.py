@@ -175,7 +175,8 @@ def test_gaps_and_missing_rows_are_told(tmp_path: Path) -> None:
     assert calibration.recording is not None
     missing, repeated, gap = calibration.recording.findings[:3]
     assert missing == "1 row without all readings left out, the first is line 101"
-    assert repeated.startswith("1 row with the time of the row before left out (1 of them the same")
+    told = "1 row with the time of the row before left out (1 of them identical in all columns)"
+    assert repeated.startswith(told)
     assert gap.startswith("1 gap in time, the longest 7.02 s before line 502")
 
 
