@@ -285,7 +285,11 @@ WRONG: dict[str, tuple[Callable[[triaxcal.Calibration, triaxcal.Firmware], objec
     "other length": (lambda c, _: c.apply(np.ones((3, 3)), [20, 21]), "temp_degc: found the shape"),
     "outside": (lambda c, _: c.constants([20, 200]), "temp_degc[1]: found 200 degC; expected"),
     "no temperature": (lambda c, _: c.constants(float("inf")), "temp_degc: found inf"),
+    "huge direction": (lambda c, _: c.uncertainty(20, (1e300, 1e300, 0)), "direction: found"),
     "no direction": (lambda c, _: c.uncertainty(20, (0, 0, 0)), "direction: found (0, 0, 0)"),
+    "two temperatures": (lambda c, _: c.uncertainty([20, 30]), "temp_degc: found the shape (2,)"),
+    "masked": (lambda c, _: c.apply(np.ma.masked_less([1, -1, 1], 0), 20), "found masked values"),
+    "float32": (lambda _, f: f.apply(np.full((1, 3), 2**31, np.float32), 0), "found 2147483648.0"),
     "no quantity": (lambda c, _: c.uncertainty(20, quantity="a"), "expected one of a_x, a_y, a_z"),
     "overflow": (lambda _, f: f.apply([[2**31, 0, 0]], 0), "raw_codes[0, 0]: found 2147483648"),
     "huge": (lambda _, f: f.apply([[2**70, 0, 0]], 0), "raw_codes: found an array of object"),
@@ -351,6 +355,7 @@ def test_a_series_is_refused_when_it_is_asked_for(tmp_path: Path) -> None:
         ({}, "missing column: position"),
         ({**columns(), "more": [1.0] * 78}, "readings, columns: unknown column: 'more'"),
         ({**columns(), "count": [1.0]}, "rows; expected one length for all"),
+        ({**columns(), "count": 100}, "rows; expected one length for all"),
         (_changed("ux_code", float("nan")), "readings, row 4, column ux_code: found 'nan'"),
         (_changed("ux_code", "x"), "readings, row 4, column ux_code: found 'x'"),
         (_changed("temp_code", 1e9), "expected -200 to 400 degC"),
@@ -419,3 +424,38 @@ def test_every_public_name_is_documented(name: str) -> None:
     assert member.__doc__
     module = importlib.import_module(member.__module__)
     assert getattr(module, name) is member
+
+
+def test_a_unit_file_that_changed_after_it_was_read_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "AT-SIM"
+    folder.mkdir()
+    for name in ("unit.toml", "measurements.csv"):
+        (folder / name).write_bytes((UNITS / "AT-SIM" / name).read_bytes())
+    unit = triaxcal.read_unit(folder)
+    text = (folder / "unit.toml").read_text(encoding="utf-8")
+    (folder / "unit.toml").write_text(text.replace("AT-SIM-001", "OTHER"), encoding="utf-8")
+    with pytest.raises(triaxcal.RefusedError, match=r"unit\.toml: changed while it was read"):
+        triaxcal.fit(unit)
+    assert triaxcal.fit(triaxcal.read_unit(folder)).serial == "OTHER"
+
+
+def test_units_and_calibrations_cannot_be_changed(cal: triaxcal.Calibration) -> None:
+    with pytest.raises(AttributeError):
+        cal.range_degc = (-400.0, 1000.0)  # type: ignore[misc]
+    assert cal.unit is not None
+    with pytest.raises(AttributeError):
+        cal.unit.serial = "X"  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: triaxcal.fit("units/AT-SIM"), "unit: found a str; expected a Unit"),
+        (lambda: triaxcal.firmware("x"), "calibration: found a str; expected a Calibration"),
+        (lambda: triaxcal.calibrate_series(["units"], jobs=0), "jobs: found 0; expected 1 or more"),
+    ],
+)
+def test_wrong_kinds_of_arguments_are_named(call: Callable[[], object], told: str) -> None:
+    with pytest.raises(triaxcal.RefusedError) as refusal:
+        call()
+    assert told in str(refusal.value)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -349,7 +351,7 @@ def test_an_entry_without_a_part_is_named(part: str) -> None:
         METHODS.add(wrong)
     assert str(caught.value) == (
         f"compensation method 'toy-broken': the compensation method lacks {part}; expected name, "
-        "label, doc, short_label, colour, form; define every part of the entry"
+        "label, doc, short_label, colour, form, functions; define every part of the entry"
     )
     assert "toy-broken" not in METHODS
 
@@ -384,6 +386,12 @@ BROKEN = {
         'ENTRY = CompensationMethod("x", "", "x", "x", "#000", "direct", None)',
         "the compensation method lacks label",
     ),
+    "lacks_a_function": (
+        'ENTRY = CompensationMethod("x", "x", "x", "x", "#000", "direct", None)',
+        "the compensation method lacks functions",
+    ),
+    "no_python": ("ENTRY = (", "SyntaxError: '(' was never closed"),
+    "raises": ("ENTRY = 1 / 0", "ZeroDivisionError: division by zero"),
     "another_class": ("ENTRY = 3", "a int; expected a CompensationMethod"),
     "missing_import": ("from triaxcal.model import nowhere", "cannot import name 'nowhere'"),
 }
@@ -407,6 +415,30 @@ def test_a_file_with_a_broken_entry_is_named_when_it_is_loaded(
         assert str(caught.value).startswith(f"{package.name}.broken: ")
         assert message in str(caught.value)
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "registry", [THERMAL_FUNCTIONS, METHODS, EXTENSIONS, OUTPUTS, CORES], ids=lambda r: r.kind
+)
+def test_threads_that_ask_first_get_every_entry(registry: Registry) -> None:  # type: ignore[type-arg]
+    fresh = Registry(registry.kind, registry._package, registry._type)
+    barrier = threading.Barrier(4)
+
+    def asked() -> tuple[str, ...]:
+        barrier.wait()
+        return fresh.names
+
+    with ThreadPoolExecutor(4) as pool:
+        found = [future.result() for future in [pool.submit(asked) for _ in range(4)]]
+    assert found == [fresh.names] * 4
+    assert len(fresh.names) >= 2
+
+
+def test_an_entry_that_is_there_stays_after_it_was_added_again() -> None:
+    names = METHODS.names
+    with METHODS.added(METHODS["matrix"]):
+        pass
+    assert METHODS.names == names
 
 
 @pytest.mark.parametrize(

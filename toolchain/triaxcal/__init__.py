@@ -48,15 +48,15 @@ if TYPE_CHECKING:
     from triaxcal.api.unit import Unit, read_unit
     from triaxcal.api.verification import Verification, verify_unit
     from triaxcal.base.errors import RefusedError, UsageError
-    from triaxcal.delivery.judgement import Tested, Verdict
+    from triaxcal.delivery.judgement import LimitCheck, Verdict
     from triaxcal.uncertainty.budget import Budget
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "Firmware", "Imu",
-    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "MeasurementPlan", "RefusedError",
-    "SeriesResult", "Study", "Tested", "Unit", "UsageError", "Verdict", "Verification",
+    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck", "MeasurementPlan",
+    "RefusedError", "SeriesResult", "Study", "Unit", "UsageError", "Verdict", "Verification",
     "__version__", "calibrate_series", "compare_history", "cross_coupling", "deliver", "find_poses",
     "firmware", "firmware_imu", "fit", "fit_imu", "key_schema", "load", "load_imu",
     "plan_measurements", "plan_motion", "read_imu", "read_unit", "simulate", "simulate_series",
@@ -80,7 +80,7 @@ _MODULES = {
     "triaxcal.api.unit": ("Unit", "read_unit"),
     "triaxcal.api.verification": ("Verification", "verify_unit"),
     "triaxcal.base.errors": ("RefusedError", "UsageError"),
-    "triaxcal.delivery.judgement": ("Tested", "Verdict"),
+    "triaxcal.delivery.judgement": ("LimitCheck", "Verdict"),
     "triaxcal.uncertainty.budget": ("Budget",),
 }  # fmt: skip
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}

@@ -54,28 +54,34 @@ class Calibration:
 
     Made by `fit` or `load`. U are readings in volts, or in the unit of the recording
     (`reading_unit`); a is specific force in g of 9.80665 m/s^2. Axes are x, y, z everywhere.
-
-    Attributes
-    ----------
-    unit : Unit or None
-        None for a file of triaxcal 0.1.0, which does not describe its unit.
-    serial : str
-    range_degc : tuple of two floats
-        Working range; other temperatures are refused.
-    reading_unit : str
-        Unit of U and U0; K is in it per g.
     """
 
     def __init__(self, unit: Unit | None, saved: Saved) -> None:
-        self.unit = unit
-        self._saved = saved
-        self.serial = saved.serial
-        self.range_degc = saved.range_degc
-        self.reading_unit = saved.reading_unit
+        self._unit, self._saved = unit, saved
 
     def __repr__(self) -> str:
         low, high = self.range_degc
         return f"<triaxcal.Calibration {self.serial}, {low:g} to {high:g} degC>"
+
+    @property
+    def unit(self) -> Unit | None:
+        """The unit; None for a file of triaxcal 0.1.0, which does not describe it."""
+        return self._unit
+
+    @property
+    def serial(self) -> str:
+        """Serial number."""
+        return self._saved.serial
+
+    @property
+    def range_degc(self) -> tuple[float, float]:
+        """Working range; no other temperature is answered."""
+        return self._saved.range_degc
+
+    @property
+    def reading_unit(self) -> str:
+        """Unit of U and U0; K is in it per g."""
+        return self._saved.reading_unit
 
     @property
     def fitted(self) -> Fitted:
@@ -171,10 +177,18 @@ class Calibration:
                 "quantity", f"found {quantity!r}", expected="one of " + ", ".join(QUANTITIES)
             )
         vector = finite("direction", direction, 3)
-        length = float(np.linalg.norm(vector))
-        if vector.ndim != 1 or length == 0.0:
-            raise RefusedError("direction", f"found {direction!r}", expected="one vector, not nil")
-        at = float(self._inside(float(temp_degc)))
+        with np.errstate(over="ignore"):
+            length = float(np.linalg.norm(vector))
+        if vector.ndim != 1 or not 0.0 < length < np.inf:
+            raise RefusedError(
+                "direction", f"found {direction!r}", expected="one vector of a finite length, not 0"
+            )
+        temp = self._inside(temp_degc)
+        if temp.ndim:
+            raise RefusedError(
+                "temp_degc", f"found the shape {temp.shape}", expected="one temperature"
+            )
+        at = float(temp)
         done = self.fitted
         temps = np.unique([at, done.unit.t0_degc])
         found = uncertainty(done.unit, done.measurements, done.calibration, None, temps)
@@ -263,8 +277,15 @@ def fit(unit: Unit, readings: Any = None) -> Calibration:
     RefusedError
         When the readings break a rule of the file formats, or do not determine a calibration.
     """
+    if not isinstance(unit, Unit):
+        raise RefusedError(
+            "unit",
+            f"found a {type(unit).__name__}",
+            expected="a Unit",
+            remedy="read it with read_unit(folder), or make it with Unit(...)",
+        )
     if readings is not None:
-        return _of_fitted(unit, fit_columns(unit.description, unit.toml, readings))
+        return _of_fitted(unit, fit_columns(unit.description, readings))
     if unit.folder is None:
         raise RefusedError(
             f"unit {unit.name}",
@@ -285,7 +306,7 @@ def load(path: str | Path) -> Calibration:
     """
     saved = read_saved(Path(path))
     done = saved.fitted
-    unit = None if done is None else Unit.of(done.unit, done.unit_toml, None)
+    unit = None if done is None else Unit.of(done.unit, None)
     return Calibration(unit, saved)
 
 

@@ -87,7 +87,7 @@ def _deliver_unit(unit: Path, build: Path, reference: Compilation) -> Delivered:
     files = all_files(delivery, made)
     target = build / delivery.unit.name
     publish(files, target, SOMETIMES)
-    calibration = Calibration(Unit.of(delivery.unit, delivery.unit_toml, unit), Saved.of(delivery))
+    calibration = Calibration(Unit.of(delivery.unit, unit), Saved.of(delivery))
     text = summary(made, files, str(target))
     return Delivered(target, tuple(files), calibration, text, warnings)
 

@@ -189,5 +189,9 @@ def firmware(calibration: Calibration) -> Firmware:
     RefusedError
         When the calibration is beyond its unit's limits, or its integers do not fit the format.
     """
+    if not isinstance(calibration, Calibration):
+        raise RefusedError(
+            "calibration", f"found a {type(calibration).__name__}", expected="a Calibration"
+        )
     refuse_beyond_limits(calibration.fitted)
     return Firmware(calibration)

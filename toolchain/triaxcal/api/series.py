@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import renew
 from triaxcal.batch import journal
 from triaxcal.batch.cluster import connect, run_cluster, workers
@@ -74,6 +75,8 @@ def calibrate_series(
     RefusedError
         When there is no unit, the journal cannot be written, or the cluster is lost.
     """
+    if jobs is not None and jobs < 1:
+        raise RefusedError("jobs", f"found {jobs}", expected="1 or more, or None")
     target = Path(build)
     work = units if isinstance(units, Work) else plan_work([Path(u) for u in units], target)
     start = time.monotonic()

@@ -26,42 +26,48 @@ class Unit:
         Tables of unit.toml by name, with the same keys, checks and defaults:
         ``Unit("SN-7", serial="7", adc={"bits": 24, "full_scale_v": 2.5}, ...)``.
 
-    Attributes
-    ----------
-    name, serial : str
-    description : UnitDescription
-        Everything, validated.
-    toml : str
-        The text of unit.toml.
-    folder : Path or None
-        Where it was read; None for a unit that was made from arguments.
-
     Raises
     ------
     RefusedError
         When a key is missing, unknown, of a wrong type or out of its range.
     """
 
-    name: str
-    serial: str
-    description: UnitDescription
-    toml: str
-    folder: Path | None
-
     def __init__(self, name: str, *, serial: str, **tables: Any) -> None:
         text = toml_text({"format": UNIT_FORMAT, "serial": serial, **tables})
-        self._set(unit_of_text(name, text, f"Unit({name!r})"), text, None)
+        self._description = unit_of_text(name, text, f"Unit({name!r})")
+        self._folder: Path | None = None
 
     @classmethod
-    def of(cls, description: UnitDescription, toml: str, folder: Path | None) -> Unit:
+    def of(cls, description: UnitDescription, folder: Path | None) -> Unit:
         """Unit of a description that has been read."""
         unit = cls.__new__(cls)
-        unit._set(description, toml, folder)
+        unit._description, unit._folder = description, folder
         return unit
 
-    def _set(self, description: UnitDescription, toml: str, folder: Path | None) -> None:
-        self.name, self.serial = description.name, description.serial
-        self.description, self.toml, self.folder = description, toml, folder
+    @property
+    def name(self) -> str:
+        """Name of its folder."""
+        return self._description.name
+
+    @property
+    def serial(self) -> str:
+        """Serial number."""
+        return self._description.serial
+
+    @property
+    def toml(self) -> str:
+        """Text of unit.toml."""
+        return self._description.toml
+
+    @property
+    def description(self) -> UnitDescription:
+        """Everything, validated."""
+        return self._description
+
+    @property
+    def folder(self) -> Path | None:
+        """Where it was read."""
+        return self._folder
 
     def __repr__(self) -> str:
         return f"<triaxcal.Unit {self.name}, serial {self.serial}>"
@@ -101,5 +107,4 @@ def read_unit(folder: str | Path) -> Unit:
             expected="the unit of one accelerometer",
             remedy=f"use read_imu, or `triaxcal dynamic {path}`",
         )
-    description = read_description(path)
-    return Unit.of(description, (path / UNIT_FILE).read_text(encoding="utf-8-sig"), path)
+    return Unit.of(read_description(path), path)

@@ -36,6 +36,8 @@ def int32(name: str, value: Any, columns: int | None = None) -> npt.NDArray[np.i
         As `finite`; for a number that is no whole number, or beyond int32.
     """
     array = _numbers(name, value)
+    if array.dtype.kind == "f":
+        array = array.astype(np.float64)  # as a float32, the largest int32 would round up
     _refuse_shape(name, array, columns)
     with np.errstate(invalid="ignore"):
         whole = np.isfinite(array) & (array == np.rint(array)) if array.dtype.kind == "f" else True
@@ -46,6 +48,10 @@ def int32(name: str, value: Any, columns: int | None = None) -> npt.NDArray[np.i
 
 
 def _numbers(name: str, value: Any) -> npt.NDArray[Any]:
+    if getattr(value, "mask", np.False_) is not np.False_ and np.any(value.mask):
+        raise RefusedError(
+            name, "found masked values", expected="a number in every place", remedy="leave them out"
+        )
     try:
         array = np.asarray(value)
     except (ValueError, TypeError) as error:  # lists of uneven lengths

@@ -6,11 +6,13 @@ a plug-in or a test does. Whatever lists, explains or draws the kinds asks the r
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import pkgutil
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import did_you_mean
@@ -42,7 +44,8 @@ class Registry(Generic[E]):
     entry_type : type
         Class of the entries.
     parts : tuple of str
-        Attributes that an entry must have, and not empty, besides name, label and doc.
+        Attributes that must not be empty, besides name, label and doc. Fields of the class without
+        a default must be there as well, and be callable where they are declared so.
     """
 
     def __init__(
@@ -51,44 +54,39 @@ class Registry(Generic[E]):
         self.kind = kind
         self._package = package
         self._type = entry_type
-        self._parts = ("name", "label", "doc", *parts)
-        self._entries: dict[str, E] = {}
-        self._read = False
+        self._wanted = ("name", "label", "doc", *parts)
+        own = [
+            f for f in dataclasses.fields(cast("Any", entry_type)) if f.default is f.default_factory
+        ]
+        self._functions = {f.name for f in own if str(f.type).startswith("Callable")}
+        self._parts = tuple(dict.fromkeys((*self._wanted, *(f.name for f in own))))
+        self._entries: dict[str, E] | None = None
+        self._lock = threading.RLock()
 
-    def add(self, entry: E, source: str = "") -> None:
+    def add(self, entry: E) -> None:
         """Add an entry.
 
         Raises
         ------
         RefusedError
-            When it is of another class, lacks a part, or its name is taken; names `source`.
+            When it is of another class, lacks a part, or its name is taken.
         """
-        where = source or f"{self.kind} {getattr(entry, 'name', '') or type(entry).__name__!r}"
-        if not isinstance(entry, self._type):
-            raise RefusedError(
-                where, f"a {type(entry).__name__}", expected=f"a {self._type.__name__}"
-            )
-        missing = [part for part in self._parts if not getattr(entry, part, None)]
-        if missing:
-            raise RefusedError(
-                where,
-                f"the {self.kind} lacks {', '.join(missing)}",
-                expected=", ".join(self._parts),
-                remedy="define every part of the entry",
-            )
-        if entry.name in self.entries() and self._entries[entry.name] is not entry:
-            raise RefusedError(where, f"the name {entry.name!r} is taken", expected="another name")
-        self._entries[entry.name] = entry
-        self._sort()
+        where = f"{self.kind} {getattr(entry, 'name', '') or type(entry).__name__!r}"
+        with self._lock:
+            self._entries = self._with(self.entries(), entry, where)
 
     @contextmanager
     def added(self, entry: E) -> Iterator[E]:
         """`entry` for the time of a `with` block."""
+        before = self.entries()
         self.add(entry)
         try:
             yield entry
         finally:
-            del self._entries[entry.name]
+            with self._lock:
+                now = self.entries()
+                if entry.name not in before:
+                    self._entries = {name: e for name, e in now.items() if name != entry.name}
 
     def entries(self) -> dict[str, E]:
         """All entries by name.
@@ -98,28 +96,55 @@ class Registry(Generic[E]):
         RefusedError
             When a file of the folder cannot be loaded, or its entry lacks a part.
         """
-        if not self._read:
-            self._read = True
-            try:
-                self._load()
-            except RefusedError:
-                self._read = False
-                raise
+        if self._entries is None:
+            with self._lock:  # another thread may load them at this moment
+                if self._entries is None:
+                    self._entries = self._loaded()
         return self._entries
 
-    def _load(self) -> None:
+    def _loaded(self) -> dict[str, E]:
+        found: dict[str, E] = {}
         package = importlib.import_module(self._package)
         for module in pkgutil.iter_modules(package.__path__, self._package + "."):
             try:
                 entry = getattr(importlib.import_module(module.name), "ENTRY", None)
-            except (AttributeError, ImportError, TypeError) as fault:
+            except Exception as fault:
                 raise RefusedError(
                     module.name,
-                    f"the {self.kind} cannot be loaded: {fault}",
+                    f"the {self.kind} cannot be loaded: {type(fault).__name__}: {fault}",
                     expected=f"an ENTRY with {', '.join(self._parts)}",
                 ) from fault
             if entry is not None:
-                self.add(entry, module.name)
+                found = self._with(found, entry, module.name)
+        return found
+
+    def _with(self, entries: Mapping[str, E], entry: E, where: str) -> dict[str, E]:
+        """`entries` and one more, in order."""
+        if not isinstance(entry, self._type):
+            raise RefusedError(
+                where, f"a {type(entry).__name__}", expected=f"a {self._type.__name__}"
+            )
+        missing = [part for part in self._parts if self._lacks(entry, part)]
+        if missing:
+            raise RefusedError(
+                where,
+                f"the {self.kind} lacks {', '.join(missing)}",
+                expected=", ".join(self._parts),
+                remedy="define every part of the entry",
+            )
+        if entries.get(entry.name, entry) is not entry:
+            raise RefusedError(where, f"the name {entry.name!r} is taken", expected="another name")
+        ordered = sorted(
+            {**entries, entry.name: entry}.items(),
+            key=lambda item: (getattr(item[1], "rank", 100), item[0]),
+        )
+        return dict(ordered)
+
+    def _lacks(self, entry: E, part: str) -> bool:
+        value = getattr(entry, part, None)
+        if part in self._wanted:
+            return not value
+        return value is None or (part in self._functions and not callable(value))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -153,7 +178,3 @@ class Registry(Generic[E]):
                 f"found {name!r}{did_you_mean(name, self.names)}",
                 expected="one of " + ", ".join(self.names),
             ) from None
-
-    def _sort(self) -> None:
-        ordered = sorted(self._entries.items(), key=lambda e: (getattr(e[1], "rank", 100), e[0]))
-        self._entries = dict(ordered)

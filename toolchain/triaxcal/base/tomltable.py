@@ -47,7 +47,7 @@ def read_toml(path: Path) -> dict[str, object]:
     RefusedError
         When the file cannot be read, is not UTF-8, or is not TOML.
     """
-    return toml_document(str(path), _content(path))
+    return toml_document(str(path), content_of(path))
 
 
 def has_table(path: Path, name: str) -> bool:
@@ -59,11 +59,23 @@ def has_table(path: Path, name: str) -> bool:
         As `read_toml`; a file without the letters of `name` is not parsed.
     """
     # Most files have none of the tables that are asked for: a thousand parses are saved.
-    content = _content(path)
+    content = content_of(path)
     return name.encode() in content and name in toml_document(str(path), content)
 
 
-def _content(path: Path) -> bytes:
+def text_of(content: bytes) -> str:
+    """Text of the content of a file that has been read as UTF-8, without a byte order mark."""
+    return content.decode("utf-8-sig")
+
+
+def content_of(path: Path) -> bytes:
+    """Content of a file.
+
+    Raises
+    ------
+    RefusedError
+        When it cannot be read.
+    """
     try:
         return path.read_bytes()
     except OSError as error:
@@ -80,7 +92,7 @@ def toml_document(where: str, content: bytes) -> dict[str, object]:
     """
     try:
         # utf-8-sig: editors that write a byte order mark are common, and it is harmless.
-        text = content.decode("utf-8-sig")
+        text = text_of(content)
     except UnicodeDecodeError as error:
         raise RefusedError(
             where, f"byte {error.start} is not UTF-8", remedy="save the file as UTF-8"

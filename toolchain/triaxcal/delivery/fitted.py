@@ -11,6 +11,7 @@ from typing import Any
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.base.plaindata import plain
+from triaxcal.base.tomltable import content_of, text_of
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.pair.cross_coupling import stated_pair
@@ -39,15 +40,12 @@ class Fitted:
     inputs_sha256 : str
         Hash of the files, or of the arrays, that went in.
     calibration : Calibration
-    unit_toml : str
-        Text of its unit.toml.
     """
 
     unit: UnitDescription
     measurements: MeasurementSet
     inputs_sha256: str
     calibration: Calibration
-    unit_toml: str
 
 
 def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
@@ -59,7 +57,8 @@ def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
         When the readings cannot be read, do not carry a calibration, or change meanwhile.
     """
     inputs = inputs_sha256(folder, unit)
-    unit_toml = (folder / UNIT_FILE).read_text(encoding="utf-8-sig")
+    if text_of(content_of(folder / UNIT_FILE)) != unit.toml:
+        raise _changed(folder / UNIT_FILE)
     if unit.recording is not None:
         # SciPy's optimizers take as long to import as a whole tilter's calibration does.
         from triaxcal.fitting.route import calibrate_recording  # noqa: PLC0415
@@ -69,11 +68,15 @@ def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
         measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
         calibration = calibrate(unit, measurements, stated_pair(unit, folder))
     if inputs_sha256(folder, unit) != inputs:
-        raise RefusedError(str(folder), "changed while it was read", remedy="run it again")
-    return Fitted(unit, measurements, inputs, calibration, unit_toml)
+        raise _changed(folder)
+    return Fitted(unit, measurements, inputs, calibration)
 
 
-def fit_columns(unit: UnitDescription, unit_toml: str, readings: Any) -> Fitted:
+def _changed(path: Path) -> RefusedError:
+    return RefusedError(str(path), "changed while it was read", remedy="read it again")
+
+
+def fit_columns(unit: UnitDescription, readings: Any) -> Fitted:
     """Calibration of a unit from columns by name: a mapping, data frame or structured array.
 
     Raises
@@ -90,10 +93,10 @@ def fit_columns(unit: UnitDescription, unit_toml: str, readings: Any) -> Fitted:
             remedy="read the unit with read_unit(folder) and call fit(unit)",
         )
     measurements = measurements_of(columns, unit)
-    digest = hashlib.sha256(unit_toml.encode())
+    digest = hashlib.sha256(unit.toml.encode())
     digest.update(json_bytes(plain(measurements)))
     calibration = calibrate(unit, measurements, None)
-    return Fitted(unit, measurements, digest.hexdigest(), calibration, unit_toml)
+    return Fitted(unit, measurements, digest.hexdigest(), calibration)
 
 
 def columns_of(readings: Any) -> Mapping[str, Any]:

@@ -14,7 +14,7 @@ from triaxcal.unit.thermal import near_t0
 
 
 @dataclass(frozen=True)
-class Tested:
+class LimitCheck:
     """One limit, and the dwells it was held against.
 
     Attributes
@@ -48,7 +48,7 @@ class Verdict:
     passed : bool
     refusal : RefusedError or None
         Why it did not pass: place, found, expected, remedy.
-    tested : tuple of Tested
+    tested : tuple of LimitCheck
     held_out_g : float or None
         Rms error of the chosen functions on readings that their fit did not use.
     checked : bool
@@ -57,7 +57,7 @@ class Verdict:
 
     passed: bool
     refusal: RefusedError | None
-    tested: tuple[Tested, ...]
+    tested: tuple[LimitCheck, ...]
     held_out_g: float | None
     checked: bool
 
@@ -88,7 +88,7 @@ def judge(fitted: Fitted) -> Verdict:
     )
 
 
-def _tested(fitted: Fitted) -> tuple[Tested, ...]:
+def _tested(fitted: Fitted) -> tuple[LimitCheck, ...]:
     unit, calibration = fitted.unit, fitted.calibration
     dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
     temps = np.array([d.temp_degc for d in dwells])
@@ -98,7 +98,7 @@ def _tested(fitted: Fitted) -> tuple[Tested, ...]:
     errors = np.abs(np.linalg.norm(force, axis=1) - unit.gravity_g)
     at_t0 = np.array([near_t0(t, unit.t0_degc) for t in temps], dtype=bool)
     return tuple(
-        Tested(where, limit_g, float(errors[own].max(initial=-np.inf)) if own.any() else np.nan,
+        LimitCheck(where, limit_g, float(errors[own].max(initial=-np.inf)) if own.any() else np.nan,
                int(own.sum()))
         for where, limit_g, own in (
             ("at T0", unit.limits.at_t0_g, at_t0),

@@ -163,7 +163,7 @@ def _state(fitted: Fitted) -> dict[str, Any]:
         found = replace(found, recording=replace(found.recording, poses=poses))
     rest = {key: value for key, value in plain(found, _CUSTOM).items() if key not in _ELSEWHERE}
     return {
-        "unit_toml": fitted.unit_toml,
+        "unit_toml": fitted.unit.toml,
         "adc": plain(fitted.unit.adc),
         "measurements": plain(replace(measurements, source=Path(measurements.source).name)),
         "calibration": rest,
@@ -214,7 +214,7 @@ def _saved(source: str, document: Mapping[str, Any]) -> Saved:
     unit = replace(unit, adc=rebuilt(Adc, state["adc"]))
     measurements = rebuilt(MeasurementSet, state["measurements"])
     inputs, calibration = str(document["inputs_sha256"]), rebuilt(Calibration, whole, _CUSTOM)
-    fitted = Fitted(unit, measurements, inputs, calibration, state["unit_toml"])
+    fitted = Fitted(unit, measurements, inputs, calibration)
     return Saved.of(fitted, source)
 
 

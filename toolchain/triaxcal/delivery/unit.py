@@ -131,7 +131,7 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
         _refuse_wrong_bound(unit, bound, check)
         methods = _on_dwells(fitted, plan, ours(), Reference(theirs()))
         compiler = Generated(ours()).compiler
-    parts = unit, fitted.measurements, fitted.inputs_sha256, fitted.calibration, fitted.unit_toml
+    parts = unit, fitted.measurements, fitted.inputs_sha256, fitted.calibration
     delivery = Delivery(*parts, firmware, bound, check, methods, compiler)
     _refuse_beyond_limits(delivery)
     return delivery

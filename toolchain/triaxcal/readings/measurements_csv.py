@@ -130,7 +130,7 @@ def rows_of(columns: Mapping[str, Any]) -> tuple[Header, list[Row]]:
     names = tuple(str(name).strip() for name in columns)
     header = _header("readings, columns", names)
     cells = {
-        name: [_cell(v) for v in np.asarray(columns[c]).tolist()]
+        name: [_cell(v) for v in np.atleast_1d(np.asarray(columns[c])).tolist()]
         for name, c in zip(names, columns, strict=True)
     }
     lengths = {name: len(values) for name, values in cells.items()}

@@ -6,11 +6,11 @@ Each table of it is a file of this room; `tilter_file` and `recording_file` put 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from triaxcal.base.keys import DESCRIPTION, FileKeys, TableKeys, Values
-from triaxcal.base.tomltable import read_toml, shown, toml_document
+from triaxcal.base.tomltable import content_of, shown, text_of, toml_document
 from triaxcal.unit.adc import ADC, RECORDED_ADC, Adc, adc_of, recorded_adc
 from triaxcal.unit.certificate import CERTIFICATE, CertificateDetails, certificate_details
 from triaxcal.unit.choices import FIT, SENSOR, Compensation, Fit, Sensor, compensation_table
@@ -80,6 +80,8 @@ class UnitDescription:
         Whether a recording may widen [adc], which says nothing of its bits.
     pair : PairSource or None
         Readings of a pair whose cross-coupling is taken off.
+    toml : str
+        Text of unit.toml that this was read from.
     """
 
     name: str
@@ -104,6 +106,7 @@ class UnitDescription:
     adc_open: bool = False
     pair: PairSource | None = None
     measured: Measured = field(default_factory=Measured)
+    toml: str = field(default="", repr=False, compare=False)
 
 
 def read_unit(folder: Path) -> UnitDescription:
@@ -116,7 +119,7 @@ def read_unit(folder: Path) -> UnitDescription:
         unit beside it has the same serial number.
     """
     path = find_unit(folder)
-    unit = _unit_of_document(folder.absolute().name, read_toml(path), str(path))
+    unit = _unit_of_content(folder.absolute().name, content_of(path), str(path))
     refuse_duplicate_serial(folder, unit.serial)
     return unit
 
@@ -130,12 +133,13 @@ def unit_of_text(name: str, text: str, source: str) -> UnitDescription:
         When the name is unfit, or the text breaks a rule of unit.toml.
     """
     check_unit_name(name, f"unit {shown(name)}")
-    return _unit_of_document(name, toml_document(source, text.encode()), source)
+    return _unit_of_content(name, text.encode(), source)
 
 
-def _unit_of_document(name: str, document: Mapping[str, object], source: str) -> UnitDescription:
+def _unit_of_content(name: str, content: bytes, source: str) -> UnitDescription:
+    document = toml_document(source, content)
     file = recording_file() if "recording" in document else tilter_file()
-    return _unit_of(name, file.check(source, document))
+    return replace(_unit_of(name, file.check(source, document)), toml=text_of(content))
 
 
 def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
