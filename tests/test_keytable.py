@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,14 @@ from triaxcal.keytable.starter import starter_text, write_starter
 from triaxcal.rig.plan import read_plan
 from triaxcal.simulation.truth import read_truth
 from triaxcal.simulation.unit import write_simulated_unit
+from triaxcal.uncertainty.rig_sources import (
+    DRIFT_DEGC,
+    GRAVITY_M_PER_S2,
+    LEVEL_ARCSEC,
+    THERMOMETER_DEGC,
+)
 from triaxcal.unit.description import read_unit
+from triaxcal.unit.uncertainty import StatedUncertainty
 
 REPO = Path(__file__).parent.parent
 SHIPPED = {
@@ -97,6 +105,42 @@ def test_every_example_is_of_its_kind(kind: str) -> None:
         for key in table.keys:
             key.kind.parse(found[key.name])
     assert faults(kind, text) == []
+
+
+@pytest.mark.parametrize("kind", ["tilter", "recording"])
+def test_a_commented_value_is_the_default_or_called_an_example(kind: str, tmp_path: Path) -> None:
+    """Each key put in force alone leaves the unit as it was, or its comment warns."""
+    path, _ = write_starter(tmp_path / "U-7", kind)
+    text, default = path.read_text(encoding="utf-8"), read_unit(path.parent)
+    examples = []
+    for table in FILES[kind]().tables:
+        if any(key.required for key in table.keys) and table.optional:
+            continue  # its keys mean something together only
+        start = text.index(f"[{table.name}]\n") if table.name else 0
+        for key in table.keys:
+            place = text.index(f"{key.name} = ", start)
+            if text[place - 2 : place] != "# ":
+                continue
+            comment = text[:place].rpartition("\n\n")[2].replace("\n# ", " ")
+            if "The value is an example." in comment:
+                examples.append(key.name)
+                continue
+            alone = text[: place - 2] + text[place:]
+            path.write_text(alone.replace(f"# [{table.name}]\n", f"[{table.name}]\n"), "utf-8")
+            assert read_unit(path.parent) == default, key.name
+    assert {"polarity", "range_degc", "level_arcsec"} <= set(examples)
+
+
+def test_an_uncertainty_in_force_is_the_one_that_is_assumed(tmp_path: Path) -> None:
+    """A stated uncertainty of 0 by mistake would make the interval far too small."""
+    stated = StatedUncertainty(10.0, 5.0, LEVEL_ARCSEC, GRAVITY_M_PER_S2, THERMOMETER_DEGC)
+    path, _ = write_starter(tmp_path / "U-7", "tilter")
+    text = path.read_text(encoding="utf-8")
+    table = text[text.index("# [uncertainty]") :].partition("\n\n# The ")[0]
+    keys = re.findall(r"(?m)^# (\w+ = .*)$", table)[:6]
+    path.write_text("\n".join([text, "[uncertainty]", *keys]) + "\n", encoding="utf-8")
+    found = read_unit(path.parent).stated
+    assert found == replace(stated, thermometer_drift_degc=DRIFT_DEGC)
 
 
 READERS: dict[str, Callable[[Path], object]] = {

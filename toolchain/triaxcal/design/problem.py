@@ -123,7 +123,7 @@ class _Target:
     """
 
     expanded_micro_g: float | None = setting(
-        number(1e-3, 1e6), None, "micro-g", words="that of the usual plan"
+        number(1e-3, 1e6), None, "micro-g", words="that of the usual plan", example="100"
     )
 
 

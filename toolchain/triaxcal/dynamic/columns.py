@@ -89,11 +89,11 @@ class DynamicTable(WrittenFile, _RecordedFile):
 
     time_column: tuple[Column, ...] = setting(TIMES, (), words="none", example='"time_s"')
     time_unit: tuple[str, ...] = setting(STAMPS, ("s",), words='`"s"`', example='"s"')
-    rate_hz: float | None = setting(number(1.0, 1e5), None, "Hz")
+    rate_hz: float | None = setting(number(1.0, 1e5), None, "Hz", example="200")
     rate_columns: tuple[SignedColumn, ...] = setting(SIGNED_COLUMNS, example='["gx", "gy", "gz"]')
     rate_unit: str = setting(word((*_RATE_UNITS, *_ANGLE_UNITS)), example='"deg/s"')
     rate_samples: str = setting(word(CONVENTIONS), example='"instant"')
-    rate_max: float | None = setting(number(1e-3, 1e5), None, "deg/s")
+    rate_max: float | None = setting(number(1e-3, 1e5), None, "deg/s", example="300")
     force_columns: tuple[SignedColumn, ...] = setting(SIGNED_COLUMNS, example='["ax", "ay", "az"]')
     force_unit: str = setting(word((*_FORCE_UNITS, *_VELOCITY_UNITS)), example='"m/s^2"')
     force_samples: str = setting(word(CONVENTIONS), example='"instant"')

@@ -44,11 +44,11 @@ class DataSheet:
         number(1e-3, 1e5), unit="micro-g/sqrt(Hz)", example="100"
     )
     second_vrw_ug_per_sqrt_hz: float | None = setting(
-        number(1e-3, 1e5), None, "micro-g/sqrt(Hz)", words="as the first"
+        number(1e-3, 1e5), None, "micro-g/sqrt(Hz)", words="as the first", example="100"
     )
     accel_lsb: float = setting(number(0.0, 1e6), 0.0, "micro-g or mm/s")
-    table_sd_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec")
-    axis_wobble_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec")
+    table_sd_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec", example="60")
+    axis_wobble_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec", example="30")
 
     @property
     def rate_density(self) -> float:

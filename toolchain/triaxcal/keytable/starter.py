@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import textwrap
+import tomllib
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +32,8 @@ def starter_text(file: FileKeys, schema: str = "") -> str:
     head = f"#:schema ./{schema}\n" if schema else ""
     head += _comment(
         f"{file.title}. Replace the examples. A key that is commented out has the default that its "
-        "comment names."
+        "comment names; its value here is that default, unless the comment says that it is an "
+        "example."
     )
     return head + "".join(_table(table, file.first) for table in file.tables)
 
@@ -77,6 +80,7 @@ def _table(table: TableKeys, first: tuple[str, ...]) -> str:
 def _key(key: Key[Any], stands: bool) -> str:
     expected, unit = key.kind.expected, f", {key.unit}" if key.unit else ""
     more = f" Default: {default_words(key)}."
+    more += "" if stands or _is_default(key) else " The value is an example."
     if key.required:
         more = "" if stands else " Required in this table."
     about = _comment(f"{key.doc} {expected[0].upper()}{expected[1:]}{unit}.{more}")
@@ -89,6 +93,12 @@ def example(key: Key[Any]) -> str:
     if stated and (not key.kind.choices or key.default in key.kind.choices):
         return key.example or toml_value(key.default)
     return key.example or key.kind.example
+
+
+def _is_default(key: Key[Any]) -> bool:
+    """Whether the example says what an absent key says."""
+    found = tomllib.loads(f"value = {example(key)}", parse_float=Decimal)["value"]
+    return bool(key.kind.parse(found) == key.default)
 
 
 def _comment(text: str) -> str:

@@ -140,7 +140,7 @@ class Plan:
     check_temperatures_degc: tuple[float, ...] = setting(
         rising(*PLAUSIBLE_DEGC, 0, 64), unit="degC", example="[20]"
     )
-    rig_seed: int | None = setting(SEED, None, words="a rig of its own")
+    rig_seed: int | None = setting(SEED, None, words="a rig of its own", example="1")
 
 
 T0 = Key("t0_degc", number(*PLAUSIBLE_DEGC), "Where dT = 0.", unit="degC", example="20")

@@ -32,13 +32,21 @@ class StatedUncertainty:
         Of the thermometer's change between calibration and use.
     """
 
-    squareness_arcsec: float | None = setting(_TILT, None, "arcsec", words="from the residuals")
-    repeatability_arcsec: float | None = setting(_TILT, None, "arcsec", words="from the residuals")
-    level_arcsec: float | None = setting(_TILT, None, "arcsec", words="20, assumed")
-    gravity_m_per_s2: float | None = setting(number(0.0, 0.1), None, "m/s^2", words="5e-5, assumed")
-    thermometer_degc: float | None = setting(number(0.0, 10.0), None, "degC", words="0.1, assumed")
+    squareness_arcsec: float | None = setting(
+        _TILT, None, "arcsec", words="from the residuals", example="10"
+    )
+    repeatability_arcsec: float | None = setting(
+        _TILT, None, "arcsec", words="from the residuals", example="5"
+    )
+    level_arcsec: float | None = setting(_TILT, None, "arcsec", words="20, assumed", example="20")
+    gravity_m_per_s2: float | None = setting(
+        number(0.0, 0.1), None, "m/s^2", words="5e-5, assumed", example="5e-5"
+    )
+    thermometer_degc: float | None = setting(
+        number(0.0, 10.0), None, "degC", words="0.1, assumed", example="0.1"
+    )
     thermometer_drift_degc: float | None = setting(
-        number(0.0, 10.0), None, "degC", words="0.02, assumed"
+        number(0.0, 10.0), None, "degC", words="0.02, assumed", example="0.02"
     )
 
 
