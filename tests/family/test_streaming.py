@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +113,22 @@ def test_rows_out_of_order_are_left_out_and_reported(tmp_path: Path) -> None:
         f"{len(late)} rows out of order in time left out, by at most 0.01 s, the first is line 51",
     )
     assert len(poses_of(tmp_path / "U").poses) == 12
+
+
+@pytest.mark.parametrize(
+    ("bad", "ahead_s"),
+    [([700, 701, 702], 1000.0), (range(9, 700, 40), 10.0), (range(9, 700, 40), 0.03)],
+    ids=["three in a row", "single", "by one step and a half"],
+)
+def test_only_rows_with_a_time_ahead_are_left_out(
+    tmp_path: Path, bad: Sequence[int], ahead_s: float
+) -> None:
+    rows = ROWS[:800].copy()
+    rows[list(bad), 0] += ahead_s
+    found = samples_of(write_unit(tmp_path / "U", rows))
+    # Column 1 counts lines: the header is line 1.
+    assert set(range(800)) - set((found.part("row") - 2).ravel().astype(int)) == set(bad)
+    assert found.findings[0].startswith(f"{len(bad)} rows out of order in time left out, by at ")
 
 
 def test_one_stamp_ahead_does_not_cost_all_rows_after_it(tmp_path: Path) -> None:

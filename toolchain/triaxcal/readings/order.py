@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from itertools import islice
+
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
@@ -14,6 +17,12 @@ A pose is cut where time goes on by more than five steps, which takes five neigh
 5 % of rows, each for a reason of its own, that is once in 1 / 0.05^5 = 3 million rows; at 10 % it
 is once in 100 000, and longer poses would be cut.
 """
+
+AHEAD = 256
+"""Rows that wait for those after them: wrong times in a row, at most, that cost no other row."""
+_NEAR = 16
+_EVENER = 1.1
+"""By how much the steps on both sides of a row must be more even than those of an earlier row."""
 
 
 class _Tally:
@@ -57,28 +66,26 @@ class Order:
     def kept(self, rows: FloatArray, *, last: bool) -> FloatArray:
         """Rows to keep of the next ones; column 0 is the time, column 1 the number of the row.
 
-        A row is left out that is not later than all before it; but where the next two rows are
-        earlier than one, that one is wrong. So two rows wait for the next block, unless `last`.
+        As many as can be kept with rising times; so `AHEAD` rows wait for the next block, unless
+        `last`.
         """
         if self._waiting is not None:
             rows = np.vstack([self._waiting, rows])
-        count = len(rows) if last else max(len(rows) - 2, 0)
+        count = len(rows) if last else max(len(rows) - AHEAD, 0)
         self._waiting = rows[count:]
         if not count:
             return rows[:0]
-        time_s = rows[:, 0]
-        wrong = np.zeros(len(rows), dtype=np.bool_)
-        earlier = np.append(self._newest, time_s[:-1])
-        wrong[:-2] = (time_s[:-2] > np.maximum(time_s[1:-1], time_s[2:])) & (
-            time_s[1:-1] > earlier[:-2]
-        )
-        newest = np.maximum.accumulate(np.append(self._newest, np.where(wrong, -np.inf, time_s)))
-        step = (time_s - newest[:-1])[:count]
-        back, repeated = (step < 0.0) | wrong[:count], step == 0.0
+        rising = _rising(rows[:, 0], self._newest)
+        keep, time_s = rising[:count], rows[:count, 0]
+        newest = np.maximum.accumulate(np.append(self._newest, np.where(keep, time_s, -np.inf)))
+        later = np.minimum.accumulate(np.where(rising, rows[:, 0], np.inf)[::-1])[::-1][:count]
+        step = time_s - newest[:-1]
+        repeated = ~keep & (step == 0.0)
+        back = ~keep & ~repeated
         self._back.add(back, rows[:, 1])
         self._repeated.add(repeated, rows[:, 1])
         if back.any():
-            late = np.where(wrong[:count], time_s[:count] - np.append(time_s[1:], 0)[:count], -step)
+            late = np.where(step > 0.0, np.maximum(time_s - later, 0.0), -step)
             self._largest_s = max(self._largest_s, float(late[back].max()))
         if repeated.any():
             previous = np.vstack([rows[:1] if self._before is None else self._before, rows[:-1]])
@@ -86,7 +93,7 @@ class Order:
             self._equal += int(equal[repeated].sum())
         self._count += count
         self._before, self._newest = rows[count - 1 : count], float(newest[count])
-        kept: FloatArray = rows[:count][~(back | repeated)]
+        kept: FloatArray = rows[:count][keep]
         return kept
 
     def findings(self) -> tuple[str, ...]:
@@ -127,3 +134,55 @@ class Order:
             remedy="if the clock is coarser than the readings, leave out the time and give "
             f"{rate}; if rows are doubled, remove them",
         )
+
+
+def _rising(time_s: FloatArray, before: float) -> BoolArray:
+    """Rows of the longest sequence whose times rise, all later than `before`.
+
+    A row that is later than all before it and earlier than all after it is in every such sequence;
+    only the others, with their neighbours, are searched.
+    """
+    highest = np.maximum.accumulate(np.append(before, time_s[:-1]))
+    lowest = np.append(np.minimum.accumulate(time_s[:0:-1])[::-1], np.inf)
+    rising = (time_s > highest) & (time_s < lowest)
+    searched = ~rising
+    searched[1:] |= ~rising[:-1]
+    searched[:-1] |= ~rising[1:]
+    index = np.flatnonzero(searched & (time_s > before))
+    if len(index):
+        rising[index] = False
+        rising[index[_longest(time_s[index].tolist())]] = True
+    return rising
+
+
+def _longest(times: list[float]) -> list[int]:
+    """Indices of the longest rising sequence; of several, one with even steps, then the earlier.
+
+    Schensted's algorithm (Canadian Journal of Mathematics 13, 1961): place n has the times that can
+    end a sequence of n, in falling order.
+    """
+    ends: list[float] = []
+    places: list[list[int]] = []
+    previous, square = [-1] * len(times), [0.0] * len(times)
+    for k, time in enumerate(times):
+        place = bisect_left(ends, time)
+        if place < len(ends) and ends[place] == time:
+            continue
+        least = float("inf")
+        for j in islice(reversed(places[place - 1] if place else ()), _NEAR):
+            if times[j] >= time:
+                break
+            step = (time - times[j]) ** 2
+            if step + square[j] <= _EVENER * least:
+                least = min(least, step + square[j])
+                previous[k], square[k] = j, step
+        if place == len(ends):
+            ends.append(time)
+            places.append([k])
+        else:
+            ends[place] = time
+            places[place].append(k)
+    found = [places[-1][0]]
+    while previous[found[-1]] >= 0:
+        found.append(previous[found[-1]])
+    return found[::-1]
