@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from threading import Thread
+from types import ModuleType
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from family_cases import UNIT
+from scipy.io import savemat
 from test_recordings import calibrated, found
 from written import AXES, CASES, Case, Times, csv, readings
 
@@ -28,6 +33,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.readings.arrays import ArraySource
 from triaxcal.readings.format import FORMATS, Format, starts_with
 from triaxcal.readings.opened import RecordingFile
+from triaxcal.readings.quiet import quiet
 from triaxcal.report.series.unit import make_unit
 from triaxcal.unit.recordingfile import FileLayout
 
@@ -354,6 +360,59 @@ def test_a_reader_added_at_run_time_reaches_every_page(tmp_path: Path) -> None:
     assert "log.toy: a binary file; expected " in str(without.exception)
 
 
+def test_a_reader_without_a_package_shows_damage_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "log.toy"
+    path.write_bytes(b"TOYTOYTO" + bytes(33))
+    with FORMATS.added(replace(TOY, package="")), pytest.raises(RefusedError) as refusal:
+        RecordingFile(path, LAYOUT)
+    assert str(refusal.value) == (
+        f"{path}: damaged, or not a toy of doubles: buffer size must be a multiple of element size"
+    )
+
+
+# ---- Nothing of the process is changed ----
+
+
+@pytest.mark.parametrize("name", ["ulog", "dataflash", "mf4"])
+def test_reading_leaves_the_streams_of_other_threads(
+    name: str, files: Callable[[str], Path]
+) -> None:
+    path, before = files(name), (sys.stdout, sys.stderr, sys.unraisablehook)
+    seen = set()
+
+    def trace(*_: object) -> None:
+        seen.add((sys.stdout, sys.stderr, sys.unraisablehook) == before)
+
+    sys.setprofile(trace)
+    try:
+        read(path, CASES[name])
+    finally:
+        sys.setprofile(None)
+    assert seen == {True}
+
+
+def test_a_package_is_silent_in_the_thread_that_reads_alone(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    module = ModuleType("package")
+    exec("def tell(text): print(text)", vars(module))
+    with quiet(module):
+        module.tell("mine")
+        other = Thread(target=module.tell, args=("other's",))
+        other.start()
+        other.join()
+    module.tell("later")
+    assert capsys.readouterr().out == "other's\nlater\n"
+
+
+def test_an_hdf5_file_is_closed_with_its_reader(files: Callable[[str], Path]) -> None:
+    path = files("hdf5")
+    read(path, CASES["hdf5"])
+    gc.collect()
+    held = {link.readlink() for link in Path("/proc/self/fd").iterdir() if link.is_symlink()}
+    assert path not in held
+
+
 # ---- Two columns of one name ----
 
 
@@ -492,11 +551,38 @@ def test_matlab_vectors_either_way_and_a_matrix_of_rows(tmp_path: Path) -> None:
     with h5py.File(path, "w", userblock_size=512) as file:
         file["column"] = np.arange(4.0)[None, :]  # 4 x 1 in MATLAB
         file["row"] = np.arange(4.0)[:, None]
-        file["wide"] = np.arange(12.0).reshape(4, 3)  # 3 x 4 in MATLAB
+        file["wide"] = np.arange(36.0).reshape(12, 3)  # 3 x 12 in MATLAB
     with path.open("r+b") as out:
         out.write(b"MATLAB 7.3 MAT-file")
     assert values(path, "column") == values(path, "row") == [0.0, 1.0, 2.0, 3.0]
-    assert values(path, "wide[1]") == values(path, 2) == [1.0, 4.0, 7.0, 10.0]
+    assert values(path, "wide[1]") == values(path, 2) == list(np.arange(1.0, 36.0, 3.0))
+    assert RecordingFile(path, LAYOUT).source.findings == (
+        "wide: wider than long, so its rows are taken as columns",
+    )
+
+
+@pytest.mark.parametrize("kind", ["mat5", "mat73"])
+def test_a_few_poses_of_many_columns_are_not_turned(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    for shape, wanted, turned in (
+        ((12, 14), (2, 3, 4), False),
+        ((3, 12), ("m[0]", "m[2]"), True),
+        ((3, 12), ("m[3]",), False),
+        ((3, 12), (12,), False),
+    ):
+        m = np.arange(1.0 * shape[0] * shape[1]).reshape(shape)
+        if kind == "mat5":
+            savemat(path, {"m": m})
+        else:
+            h5py = pytest.importorskip("h5py")
+            with h5py.File(path, "w", userblock_size=512) as file:
+                file["m"] = m.T
+            with path.open("r+b") as out:
+                out.write(b"MATLAB 7.3 MAT-file")
+        layout = FileLayout("recording", wanted)
+        expected = m.T if turned else m
+        assert values(path, 2, layout) == expected[:, 1].tolist()
+        assert bool(RecordingFile(path, layout).source.findings) == turned
 
 
 # ---- Recordings of other makers ----

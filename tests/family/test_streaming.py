@@ -90,6 +90,20 @@ def test_clocks_that_start_again_or_have_two_columns(
     assert [finding.split(":")[0] for finding in found.findings] == [told] * bool(told)
 
 
+def test_a_pause_across_midnight_is_a_pause(tmp_path: Path) -> None:
+    """At 23:00 it stops, at 6:00 it goes on: 7 hours, back by 17 on the clock."""
+    row = len(ROWS) // 2
+    pause = np.where(np.arange(len(ROWS)) < row, 0.0, 7 * 3600.0)
+    lines = [
+        f"{day(t - 3600.0 + p)},{x!r},{y!r},{z!r}"
+        for (t, x, y, z), p in zip(ROWS.tolist(), pause, strict=True)
+    ]
+    keys = READINGS + 'time = "t"\ntime_unit = "iso"'
+    found = samples_of(write_unit(tmp_path / "U", "\n".join(["t,ax,ay,az", *lines]), keys))
+    np.testing.assert_allclose(found.part("time_s"), ROWS[:, 0] + pause, rtol=0, atol=1.01e-6)
+    assert found.findings[0].split(":")[0] == "the clock starts again once (midnight)"
+
+
 def test_a_list_of_units_has_one_for_each_column(tmp_path: Path) -> None:
     keys = READINGS + 'time = "t"\ntime_unit = ["s", "ns"]'
     with pytest.raises(

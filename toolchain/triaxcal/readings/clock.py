@@ -18,6 +18,8 @@ _DAY_S = 86400.0
 _COUNTERS = (2.0**16, 2.0**32)
 _WHOLE = 0.98
 """Of its range: a clock that falls by more than this has started again."""
+_HALF = 0.5
+"""Of a day: times of day that fall by more than this are of the next day, whatever the pause."""
 
 
 class Clock:
@@ -96,7 +98,7 @@ class Clock:
         step = np.diff(seconds, prepend=seconds[0] if self._last is None else self._last)
         self._last = float(seconds[-1])
         for period in periods:
-            back = step < -_WHOLE * period
+            back = step < -(_HALF if self._of_day else _WHOLE) * period
             if self._turns == 0 and not back.any():
                 continue
             # A late row beside a new start jumps forward by as much and back again.

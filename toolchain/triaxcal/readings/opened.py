@@ -10,6 +10,7 @@ from pathlib import Path
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.readings.format import FORMATS, Block, Format, Source
+from triaxcal.readings.formats.text import ENTRY as TEXT
 from triaxcal.readings.names import meant
 from triaxcal.unit.recordingfile import Column, FileLayout
 
@@ -138,8 +139,8 @@ class RecordingFile:
         except ImportError as error:
             raise self._missing((error.name or str(error)).split(".")[0]) from error
         except Exception as error:
-            if not self._format.package:
-                raise
+            if self._format is TEXT:
+                raise  # a fault of our own
             text = str(error).strip().split("\n")[0] or type(error).__name__
             raise RefusedError(
                 str(self.path), f"damaged, or not {self._format.label}: {text[:200]}"

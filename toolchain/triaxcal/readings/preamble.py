@@ -74,7 +74,7 @@ def find_table(lines: Sequence[Line], layout: FileLayout) -> FoundTable:
     width = len(_trimmed(cells))
     above = [line for line in lines if line.number < plain[first].number]
     if layout.header is None:
-        wanted = {name.lower() for name in layout.wanted}
+        wanted = {str(column).lower() for column in layout.wanted}
         header = _header(above, wanted, delimiter, width)
         if len(plain) == 1 and not any(map(_numeric, cells)):
             header = plain[0]

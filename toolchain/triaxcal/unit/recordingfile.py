@@ -133,9 +133,8 @@ class WrittenFile:
 
     def layout(self, table: str, columns: Sequence[Column]) -> FileLayout:
         """Layout of the file of `table`, of which `columns` will be asked for."""
-        wanted = tuple(column for column in columns if isinstance(column, str))
         written = {f.name: getattr(self, f.name) for f in fields(WrittenFile)}
-        return FileLayout(table, wanted, **written)
+        return FileLayout(table, tuple(columns), **written)
 
 
 @dataclass(frozen=True)
@@ -146,12 +145,12 @@ class FileLayout(WrittenFile):
     ----------
     table : str
         Name of the table that says it, "recording" or "dynamic", for messages.
-    wanted : tuple of str
-        Names of columns that will be asked for: they distinguish a header from a remark.
+    wanted : tuple of Column
+        Columns that will be asked for: their names distinguish a header from a remark.
     """
 
     table: str
-    wanted: tuple[str, ...] = ()
+    wanted: tuple[Column, ...] = ()
 
 
 def check_units(values: Values, time: Sequence[Column], units: Sequence[str]) -> None:

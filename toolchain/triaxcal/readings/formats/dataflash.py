@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import IntArray
 from triaxcal.readings.arrays import ArraySource
 from triaxcal.readings.format import PIECE, Format, Source, starts_with
+from triaxcal.readings.quiet import quiet
 from triaxcal.unit.recordingfile import FileLayout
 
 _HEAD = 3
@@ -63,8 +62,7 @@ def _open(path: Path, layout: FileLayout) -> Source:
         def init_clock(self) -> None:
             """Time of day is not needed; without GPS it costs a pass through the log."""
 
-    quiet = redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO())
-    with quiet[0], quiet[1], Log(str(path)) as log:
+    with quiet(DFReader), Log(str(path)) as log:
         kinds = [(kind, log.formats[kind]) for kind in range(256) if log.counts[kind] > 0]
     data = np.memmap(path, np.uint8, "r")
     starts = {kind: np.array(log.offsets[kind], np.int64) for kind, _ in kinds}

@@ -25,7 +25,7 @@ def data_sets(path: Path) -> dict[str, Any]:
             found[name] = item
 
     h5py.File(path, "r").visititems(visit)
-    return found
+    return found  # the last of them closes the file
 
 
 ENTRY = Format(

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import gc
-import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
+from traceback import walk_tb
 from typing import Any
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
 from triaxcal.readings.arrays import Pieces
 from triaxcal.readings.format import PIECE, Block, Format, Source, starts_with
 from triaxcal.unit.recordingfile import FileLayout
@@ -54,18 +53,16 @@ class _Mf4(Source):
 def _opened(path: Path) -> Any:
     from asammdf import MDF  # noqa: PLC0415  optional, and slow to import
 
-    # asammdf prints a traceback when it lets go of a file that it could not open.
-    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
-    text = ""
     try:
         return MDF(path)
     except Exception as error:
-        text = str(error) or type(error).__name__
-    finally:
-        if text:
-            gc.collect()
-        sys.unraisablehook = hook
-    raise RefusedError(str(path), f"damaged, or not {ENTRY.label}: {text[:200]}")
+        # asammdf closes what it could not open when Python lets go of it, fails, and prints that.
+        # It closes once only, so it is done here.
+        for frame, _ in walk_tb(error.__traceback__):
+            half: Any = frame.f_locals.get("self")
+            with suppress(Exception):
+                half.close()
+        raise
 
 
 def _title(number: int, group: Any) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import io
-from contextlib import redirect_stdout
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.readings.arrays import ArraySource
 from triaxcal.readings.format import Format, Source, starts_with
+from triaxcal.readings.quiet import quiet
 from triaxcal.unit.recordingfile import FileLayout
 
 
@@ -25,10 +25,10 @@ class _File(io.BufferedReader):
 
 
 def _open(path: Path, layout: FileLayout) -> Source:
-    from pyulog import ULog  # noqa: PLC0415  optional
+    from pyulog import core  # noqa: PLC0415  optional
 
-    with _File(io.FileIO(path)) as file, redirect_stdout(io.StringIO()):
-        log = ULog(file)
+    with _File(io.FileIO(path)) as file, quiet(core):
+        log = core.ULog(file)
     if log.file_corruption:
         raise RefusedError(
             str(path),
