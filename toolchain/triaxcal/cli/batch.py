@@ -20,10 +20,10 @@ from triaxcal import SeriesResult, calibrate_series
 from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Outcome
 from triaxcal.batch.plan import Work, plan_work
-from triaxcal.cli.options import UnitFolder, build_option, example, say
+from triaxcal.cli.options import UnitFolder, build_option, command, example, say
 
 
-@click.command(
+@command(
     epilog=example(
         "triaxcal batch units/* --build build/spring", "triaxcal batch AT-SIM AT-CHERNIAK"
     )

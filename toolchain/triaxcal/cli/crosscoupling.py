@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import PICTURE, example, show
+from triaxcal.cli.options import PICTURE, command, example, show
 
 
-@click.command(epilog=example("triaxcal crosscoupling pair.csv --picture pair.svg"))
+@command(epilog=example("triaxcal crosscoupling pair.csv --picture pair.svg"))
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "--gravity",

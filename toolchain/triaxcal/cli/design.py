@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 
 from triaxcal.base.publish import renew
-from triaxcal.cli.options import example, show
+from triaxcal.cli.options import command, example, show
 
 
-@click.command(epilog=example("triaxcal design rig/design.toml --plan my-plan.toml"))
+@command(epilog=example("triaxcal design rig/design.toml --plan my-plan.toml"))
 @click.argument("question", type=click.Path(path_type=Path))
 @click.option("--plan", type=click.Path(path_type=Path), help="Write the plan for `rig run` here.")
 def design(question: Path, plan: Path | None) -> None:

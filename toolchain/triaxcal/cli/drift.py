@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import PICTURE, UnitFolder, example, show
+from triaxcal.cli.options import PICTURE, UnitFolder, command, example, show
 
 
-@click.command(epilog=example("triaxcal drift MPU-1 --picture drift.svg"))
+@command(epilog=example("triaxcal drift MPU-1 --picture drift.svg"))
 @click.argument("unit", type=UnitFolder())
 @PICTURE
 def drift(unit: Path, picture: Path | None) -> None:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import example, show, unit_and_build
+from triaxcal.cli.options import command, example, show, unit_and_build
 from triaxcal.cli.progress import bar, calibrate
 
 
-@click.command(epilog=example("triaxcal dynamic IMU-SIM", "triaxcal dynamic IMU-SIM --plan"))
+@command(epilog=example("triaxcal dynamic IMU-SIM", "triaxcal dynamic IMU-SIM --plan"))
 @unit_and_build
 @click.option(
     "--plan",

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import UnitFolder, example, show
+from triaxcal.cli.options import UnitFolder, command, example, show
 
 
-@click.command(epilog=example("triaxcal history AT-0042"))
+@command(epilog=example("triaxcal history AT-0042"))
 @click.argument("unit", type=UnitFolder())
 def history(unit: Path) -> None:
     """Compare the calibrations of a unit over time.

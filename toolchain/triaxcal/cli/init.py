@@ -7,13 +7,11 @@ from pathlib import Path
 import click
 
 import triaxcal
-from triaxcal.cli.options import example
+from triaxcal.cli.options import command, example
 from triaxcal.keytable.catalogue import FILES
 
 
-@click.command(
-    epilog=example("triaxcal init units/SN-0042", "triaxcal init units/IMU-7 --kind imu")
-)
+@command(epilog=example("triaxcal init units/SN-0042", "triaxcal init units/IMU-7 --kind imu"))
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option(
     "--kind",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -96,6 +97,11 @@ class WithKinds(click.Command):
         ):
             with formatter.section(title):
                 formatter.write_dl(rows)
+
+
+HELP = {"help_option_names": ["-h", "--help"]}
+command = functools.partial(click.command, context_settings=HELP)
+"""As `click.command`; the help does not depend on what the command is started from."""
 
 
 def example(*lines: str) -> str:

@@ -7,11 +7,11 @@ import json
 import click
 
 import triaxcal
-from triaxcal.cli.options import example
+from triaxcal.cli.options import command, example
 from triaxcal.keytable.catalogue import FILES
 
 
-@click.command(epilog=example("triaxcal schema tilter"))
+@command(epilog=example("triaxcal schema tilter"))
 @click.argument("kind", type=click.Choice(tuple(FILES)))
 def schema(kind: str) -> None:
     """Print the JSON Schema of a kind of TOML file.

@@ -5,12 +5,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import click
-
-from triaxcal.cli.options import example, say, unit_and_build
+from triaxcal.cli.options import command, example, say, unit_and_build
 
 
-@click.command(epilog=example("triaxcal verify AT-SIM"))
+@command(epilog=example("triaxcal verify AT-SIM"))
 @unit_and_build
 def verify(unit: Path, build: Path) -> None:
     """Verify the generated C with independent tools.
