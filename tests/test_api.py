@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import importlib
+import json
 import pickle
 import pkgutil
 import subprocess
@@ -208,6 +209,90 @@ def test_what_is_no_calibration_is_refused(tmp_path: Path, content: str | None, 
     with pytest.raises(triaxcal.RefusedError) as refusal:
         triaxcal.load(path)
     assert told in str(refusal.value)
+
+
+def _edited(cal: triaxcal.Calibration, path: Path, edit: Callable[[Any], object]) -> Path:
+    document = json.loads(cal.save(path).read_bytes())
+    edit(document)
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+def test_a_candidate_of_an_unknown_function_does_not_matter(
+    cal: triaxcal.Calibration, tmp_path: Path
+) -> None:
+    path = tmp_path / "calibration.json"
+    _edited(cal, path, lambda d: d["candidates"][0]["shape"].update(function="akima"))
+    loaded = triaxcal.load(path)
+    assert loaded.fitted.calibration.candidates[0].shape is None
+    again = triaxcal.load(loaded.save(tmp_path / "again.json"))
+    assert [c.label for c in again.diagnosis.candidates] == [
+        c.label for c in cal.diagnosis.candidates
+    ]
+    assert triaxcal.firmware(again).files == triaxcal.firmware(cal).files
+
+
+def test_constants_of_an_unknown_function_are_read(
+    cal: triaxcal.Calibration, tmp_path: Path
+) -> None:
+    path = tmp_path / "calibration.json"
+    _edited(cal, path, lambda d: d["fit"]["calibration"]["shape"].update(function="akima"))
+    loaded = triaxcal.load(path)
+    np.testing.assert_array_equal(loaded.constants(33.0)[0], cal.constants(33.0)[0])
+    with pytest.raises(triaxcal.RefusedError) as refusal:
+        triaxcal.firmware(loaded)
+    assert str(refusal.value) == (
+        f"{path}: its thermal function 'akima' is unknown here: only the constants were read; "
+        "expected a calibration.json with its fit; calibrate the unit again"
+    )
+
+
+DAMAGED: dict[str, tuple[Callable[[Any], object], str]] = {
+    "no number in a curve": (
+        lambda d: d["thermal_model"]["coefficients"][0][3].__setitem__(1, None),
+        "thermal_model: a number is not finite; expected numbers",
+    ),
+    "infinite term": (
+        lambda d: d.update(rate_term={"offset_g_s_per_k": [1e999, 0, 0], "range_k_per_s": [0, 1]}),
+        "rate_term: a number is not finite; expected numbers",
+    ),
+    "another value at T0": (
+        lambda d: d["at_t0"].__setitem__(0, d["at_t0"][0] + 1e-9),
+        (
+            "at_t0: not the values of the curves in thermal_model at t0_degc; expected the file as "
+            "`triaxcal calib` wrote it"
+        ),
+    ),
+    "another serial": (
+        lambda d: d.update(serial="X"),
+        "serial: found 'X'; expected 'AT-SIM-001' of unit_toml",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_a_file_that_contradicts_itself_is_refused(
+    name: str, cal: triaxcal.Calibration, tmp_path: Path
+) -> None:
+    edit, expected = DAMAGED[name]
+    path = _edited(cal, tmp_path / "calibration.json", edit)
+    with pytest.raises(triaxcal.RefusedError) as refusal:
+        triaxcal.load(path)
+    assert str(refusal.value) == f"{path}, {expected}"
+
+
+def test_the_curves_that_everyone_reads_are_computed_with(
+    cal: triaxcal.Calibration, tmp_path: Path
+) -> None:
+    def double_slopes(document: Any) -> None:
+        for row in document["thermal_model"]["coefficients"][0]:
+            row[1] *= 2
+
+    path = _edited(cal, tmp_path / "calibration.json", double_slopes)
+    loaded = triaxcal.load(path)
+    thermal = loaded.fitted.calibration.thermal
+    np.testing.assert_array_equal(loaded.constants(33.0)[0].ravel(), thermal.constants_at(33.0)[:9])
+    assert not np.array_equal(loaded.constants(33.0)[0], cal.constants(33.0)[0])
 
 
 def test_a_truncated_file_is_refused_at_every_length(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from triaxcal.api.arguments import refuse_other_length, temperatures
 from triaxcal.api.unit import Unit
 from triaxcal.base.arrays import finite
 from triaxcal.base.errors import RefusedError
@@ -95,8 +96,8 @@ class Calibration:
         if self._saved.fitted is None:
             raise RefusedError(
                 self._saved.source,
-                "written by triaxcal 0.1.0: it holds the constants, not the fit behind them",
-                expected="a calibration.json of this version",
+                self._saved.without_fit,
+                expected="a calibration.json with its fit",
                 remedy="calibrate the unit again",
             )
         return self._saved.fitted
@@ -145,7 +146,7 @@ class Calibration:
         """
         voltage = finite("readings", readings, 3)
         temp, rate = self._inside(temp_degc), finite("rate_k_per_s", rate_k_per_s)
-        _refuse_other_length(voltage, temp_degc=temp, rate_k_per_s=rate)
+        refuse_other_length(voltage, temp_degc=temp, rate_k_per_s=rate)
         linear = force_from_voltage(self._saved.thermal.constants_at(temp), voltage)
         return self._saved.terms.force_g(linear, rate)
 
@@ -229,28 +230,7 @@ class Calibration:
         return target
 
     def _inside(self, temp_degc: Any) -> FloatArray:
-        temp = finite("temp_degc", temp_degc)
-        low, high = self.range_degc
-        outside = np.argwhere((temp < low) | (temp > high))
-        if len(outside):
-            place = ", ".join(str(i) for i in outside[0].tolist())
-            raise RefusedError(
-                f"temp_degc[{place}]" if place else "temp_degc",
-                f"found {temp[tuple(outside[0])]:g} degC",
-                expected=f"{low:g} to {high:g} degC, the working range",
-                remedy="calibrate over a wider range: the curves are not extrapolated",
-            )
-        return temp
-
-
-def _refuse_other_length(voltage: FloatArray, **others: FloatArray) -> None:
-    for name, array in others.items():
-        if array.ndim and array.shape != voltage.shape[:-1]:
-            raise RefusedError(
-                name,
-                f"found the shape {array.shape}",
-                expected=f"one value, or {voltage.shape[:-1]} as the readings have",
-            )
+        return temperatures(temp_degc, self.range_degc)
 
 
 def fit(unit: Unit, readings: Any = None) -> Calibration:

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from triaxcal.api.arguments import refuse_other_length, temperatures
 from triaxcal.base.arrays import finite
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.progress import Progress
 from triaxcal.base.publish import renew
-from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
+from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_described
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
@@ -24,6 +25,10 @@ from triaxcal.model.methods.imu import ImuModel
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
+
+FORMAT = 1
+"""Of the calibration.json that `load_imu` reads."""
+_DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
 
 
 @dataclass(frozen=True)
@@ -87,6 +92,8 @@ class ImuCalibration:
         Of the states, in SI units.
     reference_degc : float
         Temperature of the biases and scales; the others follow the temperature blocks.
+    range_degc : tuple of two floats, or None
+        Working range; no other temperature is answered. None where no temperature was recorded.
     document : dict
         calibration.json.
     """
@@ -95,6 +102,8 @@ class ImuCalibration:
         self.document = document
         self.serial: str = document["serial"]
         self.reference_degc = float(document["reference_degc"])
+        limits = document.get("range_degc")  # files of triaxcal 0.1.0 have none
+        self.range_degc = limits and (float(limits[0]), float(limits[1]))
         self.covariance: FloatArray = np.array(document["covariance"], dtype=np.float64)
         rows = document["states"]
         self.states = {
@@ -117,12 +126,16 @@ class ImuCalibration:
         return f"<triaxcal.ImuCalibration {self.serial}, {len(self.states)} states>"
 
     @cached_property
-    def _model(self) -> ImuModel:
+    def layout(self) -> Layout:
+        """Blocks of states that were on."""
         blocks = (b for name in self.document["blocks"] for b in EXTENSIONS[name].blocks)
+        return Layout((*BASE, *blocks))
+
+    @cached_property
+    def _model(self) -> ImuModel:
         gravity = float(self.document["local_gravity_m_per_s2"])
         anywhere = (self.reference_degc - 1.0, self.reference_degc + 1.0)
-        layout = Layout((*BASE, *blocks))
-        return model_of_states(layout, self._p, self.reference_degc, gravity, anywhere)
+        return model_of_states(self.layout, self._p, self.reference_degc, gravity, anywhere)
 
     @property
     def verdict(self) -> str:
@@ -135,7 +148,7 @@ class ImuCalibration:
         Raises
         ------
         RefusedError
-            For a temperature that is no number.
+            For a temperature that is no number, or outside of `range_degc`.
         """
         temp = self._temperature(temp_degc)
         (K, U0), (L, W0) = (
@@ -159,7 +172,7 @@ class ImuCalibration:
         Raises
         ------
         RefusedError
-            For another shape, or a number that is not finite.
+            For another shape, a number that is not finite, or a temperature out of `range_degc`.
         """
         force = finite("force_m_per_s2", force_m_per_s2, 3)
         rate = finite("rate_rad_per_s", rate_rad_per_s, 3)
@@ -168,6 +181,7 @@ class ImuCalibration:
                 "rate_rad_per_s", f"found the shape {rate.shape}", expected=f"{force.shape}"
             )
         temp, model = self._temperature(temp_degc), self._model
+        refuse_other_length(force, temp_degc=temp)
         a = force_from_voltage(model.accel.constants_at(temp), force / STANDARD_GRAVITY_M_PER_S2)
         w = force_from_voltage(model.gyro.constants_at(temp), rate) - a @ model.g_sensitivity.T
         return a * STANDARD_GRAVITY_M_PER_S2, w
@@ -181,7 +195,9 @@ class ImuCalibration:
         return target
 
     def _temperature(self, temp_degc: Any) -> FloatArray:
-        return finite("temp_degc", self.reference_degc if temp_degc is None else temp_degc)
+        if temp_degc is None:
+            return np.array(self.reference_degc)
+        return temperatures(temp_degc, self.range_degc)
 
     @property
     def c(self) -> ImuC:
@@ -220,7 +236,7 @@ def fit_imu(imu: Imu, progress: Progress | None = None) -> ImuCalibration:
     RefusedError
         When the recording cannot be read, or does not determine a calibration.
     """
-    return ImuCalibration.of(deliver_imu(imu.folder, progress))
+    return ImuCalibration.of(deliver_described(imu.description, progress))
 
 
 def load_imu(path: str | Path) -> ImuCalibration:
@@ -235,13 +251,54 @@ def load_imu(path: str | Path) -> ImuCalibration:
         document = json.loads(Path(path).read_bytes())
         if document["kind"] != "dynamic":
             raise KeyError("kind")
-        return ImuCalibration(document)
+        if document["format"] != FORMAT:
+            raise RefusedError(
+                f"{path}, format", f"found {document['format']!r}", expected=f"{FORMAT}"
+            )
+        found = ImuCalibration(document)
+        _refuse_damage(str(path), found)
     except OSError as error:
         raise refused_by_system(path, "read", error) from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except _DAMAGE as error:
         raise RefusedError(
             str(path),
             f"no calibration.json of an IMU: {type(error).__name__} {error}",
             expected="the file that `triaxcal calib` wrote for an IMU",
             remedy="load a triad's calibration with load(path)",
         ) from error
+    return found
+
+
+def _refuse_damage(path: str, found: ImuCalibration) -> None:
+    """Refuse states of another layout, and numbers that are none."""
+    document, size = found.document, len(found.states)
+    for name in document["blocks"]:
+        if name not in EXTENSIONS:
+            raise RefusedError(
+                f"{path}, blocks",
+                f"found {name!r}",
+                expected=f"some of {', '.join(EXTENSIONS.names)}",
+            )
+    names = [state.name for state in found.layout.states]
+    if [row["name"] for row in document["states"]] != names:
+        raise RefusedError(
+            f"{path}, states",
+            "not the states of its blocks, in their order",
+            expected=f"{len(names)} states, {names[0]} to {names[-1]}",
+        )
+    numbers: dict[str, Any] = {
+        "states": [(s.value, s.sd) for s in found.states.values()],
+        "covariance": found.covariance,
+        "reference_degc": found.reference_degc,
+        "local_gravity_m_per_s2": float(document["local_gravity_m_per_s2"]),
+        "range_degc": found.range_degc or 0.0,
+    }
+    for key, value in numbers.items():
+        if not np.isfinite(value).all():
+            raise RefusedError(f"{path}, {key}", "a number is not finite", expected="numbers")
+    if found.covariance.shape != (size, size):
+        raise RefusedError(
+            f"{path}, covariance",
+            f"found the shape {found.covariance.shape}",
+            expected=f"({size}, {size})",
+        )

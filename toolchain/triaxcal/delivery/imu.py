@@ -20,7 +20,7 @@ from triaxcal.delivery.inputs import files_sha256
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.device import Device
 from triaxcal.dynamic.imumodel import imu_model, left_out
-from triaxcal.dynamic.unit import DynamicUnit, calibrate_unit
+from triaxcal.dynamic.unit import DynamicUnit, calibrate_described
 from triaxcal.fixedpoint.gyro import TriadDescription
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.curves import ThermalModel
@@ -75,15 +75,27 @@ def deliver_imu(folder: Path, progress: Progress | None = None) -> ImuDelivery:
     Raises
     ------
     RefusedError
-        As `calibrate_unit` and `build_imu`; when the inputs change meanwhile.
+        As `read_dynamic` and `deliver_described`.
     """
-    unit = read_dynamic(folder)
+    return deliver_described(read_dynamic(folder), progress)
+
+
+def deliver_described(unit: DynamicDescription, progress: Progress | None = None) -> ImuDelivery:
+    """As `deliver_imu`, for a description that was read.
+
+    Raises
+    ------
+    RefusedError
+        As `calibrate_described` and `build_imu`; when the inputs change meanwhile.
+    """
     if unit.device is not None:
         find_compiler()  # before minutes of filtering, not after
     inputs = _inputs_sha256(unit) if unit.recording.exists() else ""
-    done = calibrate_unit(folder, progress)
+    done = calibrate_described(unit, progress)
     if _inputs_sha256(unit) != inputs:
-        raise RefusedError(str(folder), "changed while it was read", remedy="run it again")
+        raise RefusedError(
+            str(unit.path.parent), "changed while it was read", remedy="run it again"
+        )
     c = None if unit.device is None else _imu_c(done, unit.device, inputs)
     return ImuDelivery(done, inputs, c)
 

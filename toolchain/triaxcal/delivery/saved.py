@@ -25,13 +25,19 @@ from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.terms import NO_TERMS, PRODUCT_NAMES, RateTerm, Terms
 from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
 from triaxcal.model.thermal.shape import ThermalShape
+from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.adc import Adc
 from triaxcal.unit.description import unit_of_text
 
 FORMAT = 1
-_ELSEWHERE = ("points", "parameter_covariance", "candidates")
-"""Parts of a `Calibration` that keys of format 1 hold."""
+_ELSEWHERE = (
+    "serial", "estimator", "range_degc", "points", "parameter_covariance", "covariance_source",
+    "candidates", "selection_reason",
+)  # fmt: skip
+"""Parts of a `Calibration` that keys of format 1 hold, under its own names."""
+_CURVES = ("thermal", "terms", "reading_unit")
+"""Those that they hold in another form."""
 
 
 def _shape_data(shape: ThermalShape) -> dict[str, Any]:
@@ -39,7 +45,9 @@ def _shape_data(shape: ThermalShape) -> dict[str, Any]:
     return {"function": shape.name, **plain(rest)}
 
 
-def _shape(data: Mapping[str, Any]) -> ThermalShape:
+def _shape(data: Mapping[str, Any]) -> ThermalShape | None:
+    if data["function"] not in THERMAL_FUNCTIONS:
+        return None
     ends = np.unique(np.array(data["ends_degc"], dtype=np.float64))
     function = THERMAL_FUNCTIONS[data["function"]]
     settings = {key.name: data[key.name] for key in function.keys if key.name in data}
@@ -59,7 +67,9 @@ class Saved:
     source : str
         The file, for messages.
     fitted : Fitted or None
-        None in a file of triaxcal 0.1.0, which has the curves alone.
+        None where the file has the curves alone, or its thermal function is unknown here.
+    without_fit : str
+        Why `fitted` is None.
     """
 
     source: str
@@ -69,6 +79,7 @@ class Saved:
     range_degc: tuple[float, float]
     reading_unit: str
     fitted: Fitted | None
+    without_fit: str = ""
 
     @staticmethod
     def of(fitted: Fitted, source: str = "") -> Saved:
@@ -161,7 +172,8 @@ def _state(fitted: Fitted) -> dict[str, Any]:
         poses = found.recording.poses
         poses = replace(poses, stillness=None, source=Path(poses.source).name)
         found = replace(found, recording=replace(found.recording, poses=poses))
-    rest = {key: value for key, value in plain(found, _CUSTOM).items() if key not in _ELSEWHERE}
+    skipped = (*_ELSEWHERE, *_CURVES)
+    rest = {key: value for key, value in plain(found, _CUSTOM).items() if key not in skipped}
     return {
         "unit_toml": fitted.unit.toml,
         "adc": plain(fitted.unit.adc),
@@ -206,33 +218,61 @@ def read_saved(path: Path) -> Saved:
 
 
 def _saved(source: str, document: Mapping[str, Any]) -> Saved:
+    public = _curves(source, document)
     state = document.get("fit")
     if state is None:
-        return _of_0_1_0(source, document)
-    whole = {**state["calibration"], **{key: document[key] for key in _ELSEWHERE}}
+        why = "written by triaxcal 0.1.0: it holds the constants, not the fit behind them"
+        return replace(public, without_fit=why)
+    function = state["calibration"]["shape"]["function"]
+    if function not in THERMAL_FUNCTIONS:
+        why = f"its thermal function {function!r} is unknown here: only the constants were read"
+        return replace(public, without_fit=why)
+    held = {key: document[key] for key in _ELSEWHERE}
+    held |= plain({"thermal": public.thermal, "terms": public.terms})
+    whole = {**state["calibration"], **held, "reading_unit": public.reading_unit}
     unit = unit_of_text(document["unit"], state["unit_toml"], f"{source}, unit_toml")
     unit = replace(unit, adc=rebuilt(Adc, state["adc"]))
+    if unit.serial != public.serial:
+        raise RefusedError(
+            f"{source}, serial",
+            f"found {public.serial!r}",
+            expected=f"{unit.serial!r} of unit_toml",
+        )
     measurements = rebuilt(MeasurementSet, state["measurements"])
     inputs, calibration = str(document["inputs_sha256"]), rebuilt(Calibration, whole, _CUSTOM)
     fitted = Fitted(unit, measurements, inputs, calibration)
     return Saved.of(fitted, source)
 
 
-def _of_0_1_0(source: str, document: Mapping[str, Any]) -> Saved:
-    model = document["thermal_model"]
-    curves = PiecewisePolynomial(
-        tuple(map(float, model["breaks_degc"])),
-        tuple(map(float, model["origins_degc"])),
-        np.array(model["coefficients"], dtype=np.float64),
-    )
-    terms = NO_TERMS
-    if quadratic := document.get("quadratic_terms"):
-        terms = replace(terms, quadratic_per_g=np.array(quadratic["per_g"], dtype=np.float64))
-    if rate := document.get("rate_term"):
-        offset = np.array(rate["offset_g_s_per_k"], dtype=np.float64)
-        low, high = map(float, rate["range_k_per_s"])
-        terms = replace(terms, rate=RateTerm(offset, (low, high)))
-    low, high = map(float, document["range_degc"])
+def _curves(source: str, document: Mapping[str, Any]) -> Saved:
+    """What the keys of format 1 say, without the fit."""
+
+    def numbers(key: str, values: Any) -> FloatArray:
+        found = np.array(values, dtype=np.float64)
+        if not np.isfinite(found).all():
+            raise RefusedError(f"{source}, {key}", "a number is not finite", expected="numbers")
+        return found
+
+    model, terms = document["thermal_model"], NO_TERMS
+    coefficients = numbers("thermal_model", model["coefficients"])
+    breaks, origins = (tuple(map(float, model[k])) for k in ("breaks_degc", "origins_degc"))
+    curves = PiecewisePolynomial(breaks, origins, coefficients)
     thermal = ThermalModel(float(model["t0_degc"]), curves)
+    if quadratic := document.get("quadratic_terms"):
+        terms = replace(terms, quadratic_per_g=numbers("quadratic_terms", quadratic["per_g"]))
+    if rate := document.get("rate_term"):
+        offset = numbers("rate_term", rate["offset_g_s_per_k"])
+        slowest, fastest = map(float, rate["range_k_per_s"])
+        terms = replace(terms, rate=RateTerm(offset, (slowest, fastest)))
+    low, high = map(float, numbers("range_degc", document["range_degc"]))
+    # What other programs read must be what is computed with; a rounding of another machine is far
+    # below a part in 10^12 of the largest constant.
+    at_t0 = numbers("at_t0", document["at_t0"])
+    if np.abs(thermal.constants_at(thermal.t0_degc) - at_t0).max() > 1e-12 * np.abs(at_t0).max():
+        raise RefusedError(
+            f"{source}, at_t0",
+            "not the values of the curves in thermal_model at t0_degc",
+            expected="the file as `triaxcal calib` wrote it",
+        )
     unit = document["units"][-1]
     return Saved(source, document["serial"], thermal, terms, (low, high), unit, None)

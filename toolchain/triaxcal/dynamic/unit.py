@@ -11,6 +11,8 @@ from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.missing import Effect, missing_effects
 from triaxcal.dynamic.observability import Observability, observability
 from triaxcal.dynamic.reading import read_recording
+from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.model.thermal.shape import ends_of
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,8 @@ class DynamicUnit:
         Effects that are switched off, tested on the recording.
     findings : tuple of str
         What was left out or repaired when the recording was read.
+    range_degc : tuple of two floats, or None
+        Working temperatures: those of [device], else of the recording; None where it has none.
     """
 
     unit: DynamicDescription
@@ -33,6 +37,7 @@ class DynamicUnit:
     seen: Observability
     off: tuple[Effect, ...]
     findings: tuple[str, ...]
+    range_degc: tuple[float, float] | None = None
 
 
 def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUnit:
@@ -43,8 +48,18 @@ def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUni
     RefusedError
         As `read_dynamic`, `read_recording` and `calibrate_dynamic`.
     """
+    return calibrate_described(read_dynamic(folder), progress)
+
+
+def calibrate_described(unit: DynamicDescription, progress: Progress | None = None) -> DynamicUnit:
+    """Calibrate the unit of a description from its recording.
+
+    Raises
+    ------
+    RefusedError
+        As `read_recording` and `calibrate_dynamic`.
+    """
     report = progress or (lambda _step, _part: None)
-    unit = read_dynamic(folder)
     recording = read_recording(unit)
     result = calibrate_dynamic(
         recording,
@@ -55,4 +70,11 @@ def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUni
     )
     off = missing_effects(recording, unit.noise, result, lambda part: report("effects off", part))
     seen = observability(result.layout, result.covariance)
-    return DynamicUnit(unit, result, seen, off, recording.findings)
+    range_degc = _recorded_degc(recording) if unit.device is None else unit.device.range_degc
+    return DynamicUnit(unit, result, seen, off, recording.findings, range_degc)
+
+
+def _recorded_degc(recording: ImuRecording) -> tuple[float, float] | None:
+    temps = (piece.temp_degc for piece in recording.pieces())
+    ends = [ends_of(t) for t in temps if t is not None and len(t)]
+    return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None

@@ -43,6 +43,7 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
         "inputs_sha256": inputs_sha256,
         "recording": unit.recording.name,
         "reference_degc": unit.reference_degc,
+        "range_degc": done.range_degc and list(done.range_degc),
         "local_gravity_m_per_s2": unit.gravity_m_per_s2,
         "latitude_deg": unit.latitude_deg,
         "blocks": list(unit.blocks),

@@ -22,8 +22,8 @@ class Candidate:
     Attributes
     ----------
     estimator : str
-    shape : ThermalShape
-        The thermal function.
+    shape : ThermalShape or None
+        The thermal function; None in a loaded calibration where it is unknown here.
     parameters : int
         Of each constant's curve.
     held_out_g : float or None
@@ -38,7 +38,7 @@ class Candidate:
     """
 
     estimator: str
-    shape: ThermalShape
+    shape: ThermalShape | None
     parameters: int
     held_out_g: float | None
     fit_residual_g: float
