@@ -625,3 +625,14 @@ def test_readings_of_the_cases_are_exact_in_single_precision() -> None:
     t_us, a = readings()
     assert np.array_equal(a.astype(np.float32).astype(np.float64), a)
     assert len(np.unique(t_us)) == len(a)
+
+
+def test_an_unknown_format_names_the_table_and_what_there_is(tmp_path: Path) -> None:
+    path = tmp_path / "log.npy"
+    np.save(path, np.zeros(3))
+    with pytest.raises(RefusedError) as refusal:
+        RecordingFile(path, FileLayout("recording", format="numpi"))
+    assert str(refusal.value) == (
+        f"{path}, [recording] format: found 'numpi' (did you mean \"numpy\"?); "
+        f"expected one of {', '.join(FORMATS.names)}"
+    )

@@ -114,6 +114,8 @@ class Format:
         Package that reads it; "" for the project's own reader.
     extra : str
         Extra of pyproject.toml that installs it.
+    ours : bool
+        Whether it is read by code of this project alone: what that raises is a fault, no damage.
     rank : int
         Formats of a lower one are asked first.
     """
@@ -126,6 +128,7 @@ class Format:
     sniff: Callable[[bytes], bool] = lambda head: False  # noqa: ARG005
     package: str = ""
     extra: str = "recordings"
+    ours: bool = False
     rank: int = 100
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.readings.format import FORMATS, Block, Format, Source
-from triaxcal.readings.formats.text import ENTRY as TEXT
 from triaxcal.readings.names import meant
 from triaxcal.unit.recordingfile import Column, FileLayout
 
@@ -139,8 +138,8 @@ class RecordingFile:
         except ImportError as error:
             raise self._missing((error.name or str(error)).split(".")[0]) from error
         except Exception as error:
-            if self._format is TEXT:
-                raise  # a fault of our own
+            if self._format.ours:
+                raise
             text = str(error).strip().split("\n")[0] or type(error).__name__
             raise RefusedError(
                 str(self.path), f"damaged, or not {self._format.label}: {text[:200]}"
@@ -176,7 +175,11 @@ def _unreadable(path: Path, layout: FileLayout, error: OSError) -> RefusedError:
 
 def _format_of(path: Path, layout: FileLayout) -> Format:
     if layout.format is not None:
-        return FORMATS[layout.format]
+        try:
+            return FORMATS[layout.format]
+        except RefusedError as unknown:
+            where = f"{path}, [{layout.table}] format"
+            raise RefusedError(where, unknown.found, expected=unknown.expected) from None
     try:
         # Of a folder, as ROS 2 writes bags, the file that describes it is asked.
         with (path / _FOLDERS_FILE if path.is_dir() else path).open("rb") as file:

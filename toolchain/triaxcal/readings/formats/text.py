@@ -281,4 +281,5 @@ ENTRY = Format(
     open=TextSource,
     sniff=_is_text,
     rank=900,
+    ours=True,
 )
