@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -26,7 +27,9 @@ from triaxcal.batch.local import run_local
 from triaxcal.batch.order import Make, Order, Outcome, filled
 from triaxcal.batch.plan import Work, plan_work
 from triaxcal.batch.run import Series, run_series
+from triaxcal.batch.toolchain import _toolchain, toolchain
 from triaxcal.cli.batch import batch
+from triaxcal.readings.format import FORMATS, Source
 from triaxcal.report.series.unit import make_unit
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -93,6 +96,24 @@ def test_another_toolchain_makes_everything_again(
     run(folder, build)
     monkeypatch.setattr("triaxcal.batch.plan.toolchain", lambda: "another")
     assert len(plan_work(folder.iterdir(), build).orders) == 2
+
+
+def test_the_toolchain_is_another_with_other_packages_or_entries(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shipped = toolchain()
+    assert toolchain() == shipped
+    with FORMATS.added(replace(FORMATS["text"], name="toy", open=lambda _path, _layout: Source())):
+        added = toolchain()
+    found = metadata.version
+    for package in ("scipy", "rosbags"):
+        _toolchain.cache_clear()
+        version = {package: "0.0.1"}
+        monkeypatch.setattr(metadata, "version", lambda p, v=version: v.get(p) or found(p))
+        assert toolchain() not in (shipped, added)
+    monkeypatch.undo()
+    _toolchain.cache_clear()
+    assert added != shipped == toolchain()
 
 
 def test_a_file_that_verify_renews_is_no_damage(tmp_path: Path) -> None:

@@ -124,6 +124,6 @@ def _refuse_other_workers(client: Any, address: str) -> None:
             raise RefusedError(
                 f"--scheduler {address}, worker {worker}",
                 f"has triaxcal {found}" if isinstance(answer, str) else found,
-                expected=f"triaxcal {mine}: files, numpy, Python and gcc as here",
+                expected=f"triaxcal {mine}: files, packages, Python and gcc as here",
                 remedy="install the same there",
             )

@@ -1,4 +1,4 @@
-"""What a result was made by: this triaxcal to the last byte, its libraries and its compiler."""
+"""What a result was made by: triaxcal to the last byte, what was added, libraries, compiler."""
 
 from __future__ import annotations
 
@@ -6,16 +6,20 @@ import hashlib
 import subprocess
 import sys
 from functools import cache
+from importlib import metadata
 from pathlib import Path
-
-import numpy as np
 
 from triaxcal import __version__
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import find_compiler
+from triaxcal.codegen.outputs.registry import OUTPUTS
+from triaxcal.model.methods.registry import METHODS
+from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
+from triaxcal.readings.format import FORMATS
+
+_REGISTRIES = (THERMAL_FUNCTIONS, METHODS, OUTPUTS, FORMATS)
 
 
-@cache
 def toolchain() -> str:
     """Version and 16 hex digits; equal where equal inputs give equal files.
 
@@ -24,6 +28,19 @@ def toolchain() -> str:
     RefusedError
         When there is no compiler.
     """
+    return _toolchain(tuple(_entry(e) for r in _REGISTRIES for e in r))
+
+
+def _entry(entry: object) -> tuple[str, ...]:
+    """Name of an entry, and the files outside of the package that its functions are from."""
+    modules = {getattr(value, "__module__", "") for value in vars(entry).values()}
+    added = {m for m in modules if m and m.partition(".")[0] != "triaxcal"}
+    files = {getattr(sys.modules.get(m), "__file__", None) or "" for m in added}
+    return str(vars(entry)["name"]), *sorted(files)
+
+
+@cache
+def _toolchain(entries: tuple[tuple[str, ...], ...]) -> str:
     digest = hashlib.sha256()
     package = Path(__file__).resolve().parents[1]
     for root, pattern in (
@@ -34,7 +51,19 @@ def toolchain() -> str:
         for path in sorted(root.rglob(pattern)):
             digest.update(f"{path.relative_to(root)}\0".encode())
             digest.update(hashlib.sha256(path.read_bytes()).digest())
-    digest.update(f"{np.__version__} {sys.version_info[:2]}".encode())
+    for name, *files in entries:
+        digest.update(f"{name}\0".encode())
+        for file in filter(None, files):
+            digest.update(hashlib.sha256(Path(file).read_bytes()).digest())
+    packages = sorted({"numpy", "scipy", *(f.package for f in FORMATS if f.package)})
+    digest.update(f"{[_version(p) for p in packages]} {sys.version_info[:2]}".encode())
     version = subprocess.run([find_compiler(), "--version"], capture_output=True, check=False)
     digest.update(version.stdout)
     return f"{__version__} {digest.hexdigest()[:16]}"
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""
