@@ -62,7 +62,7 @@ def test_a_plan_tells_the_deviations_of_its_recording(tmp_path: Path) -> None:
     np.testing.assert_allclose(planned.result.sd, recorded.result.sd, rtol=0.02)
     told = CliRunner().invoke(main, ["dynamic", str(folder), "--plan"])
     assert told.exit_code == 0
-    assert "standard deviations that a recording of it will give" in told.output
+    assert "expected standard deviations from a recording of this motion" in told.output
 
 
 @pytest.mark.parametrize(
