@@ -105,6 +105,19 @@ def test_readings_from_a_program_give_the_constants_of_the_file(
         np.testing.assert_array_equal(mine, theirs)
 
 
+def test_a_recording_from_a_program_gives_the_constants_of_the_file(tmp_path: Path) -> None:
+    write_unit(tmp_path / "U", log(directions(12)), recording=COLUMNS)
+    unit = triaxcal.read_unit(tmp_path / "U")
+    rows = np.loadtxt(tmp_path / "U" / "log.csv", delimiter=",", skiprows=1)
+    given = dict(zip(("t", "ax", "ay", "az"), rows.T, strict=True))
+    found, of_file = triaxcal.fit(unit, given), triaxcal.fit(unit)
+    for mine, theirs in zip(found.constants(20.0), of_file.constants(20.0), strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+    assert triaxcal.load(found.save(tmp_path / "c.json")).serial == found.serial
+    with pytest.raises(triaxcal.RefusedError, match="readings: no column 'az'"):
+        triaxcal.fit(unit, {name: values for name, values in given.items() if name != "az"})
+
+
 def test_a_unit_from_arguments_is_the_unit_of_the_file(
     unit: triaxcal.Unit, cal: triaxcal.Calibration, tmp_path: Path
 ) -> None:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.base.plaindata import plain
@@ -85,17 +87,26 @@ def fit_columns(unit: UnitDescription, readings: Any) -> Fitted:
         When there are no columns, or they do not carry a calibration.
     """
     columns = columns_of(readings)
-    if unit.recording is not None or unit.pair is not None:
+    if unit.pair is not None:
         raise RefusedError(
             f"unit {unit.name}",
-            "has [recording] or [quadratic], whose readings are files",
-            expected="the unit's folder with them",
+            "has [quadratic], whose readings are a file",
+            expected="the unit's folder with it",
             remedy="read the unit with read_unit(folder) and call fit(unit)",
         )
-    measurements = measurements_of(columns, unit)
     digest = hashlib.sha256(unit.toml.encode())
-    digest.update(json_bytes(plain(measurements)))
-    calibration = calibrate(unit, measurements, None)
+    if unit.recording is not None:
+        from triaxcal.fitting.route import calibrate_recording  # noqa: PLC0415
+
+        for name, values in sorted(columns.items()):
+            digest.update(
+                f"{name} {hashlib.sha256(np.asarray(values).tobytes()).digest()!r}".encode()
+            )
+        unit, measurements, calibration = calibrate_recording(unit, unit.recording, Path(), columns)
+    else:
+        measurements = measurements_of(columns, unit)
+        digest.update(json_bytes(plain(measurements)))
+        calibration = calibrate(unit, measurements, None)
     return Fitted(unit, measurements, digest.hexdigest(), calibration)
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +28,14 @@ _WIDTHS = (16, 17, 20, 24, 25, 32)
 
 
 def calibrate_recording(
-    unit: UnitDescription, layout: RecordingLayout, folder: Path
+    unit: UnitDescription,
+    layout: RecordingLayout,
+    folder: Path,
+    given: Mapping[str, Any] | None = None,
 ) -> tuple[UnitDescription, MeasurementSet, Calibration]:
     """Unit with its raw codes settled, the poses as dwells, and the calibration.
+
+    `given` are columns of a program, in place of the recording's file.
 
     Raises
     ------
@@ -37,7 +44,7 @@ def calibrate_recording(
     """
     pair = stated_pair(unit, folder)
     known = np.zeros((3, 6)) if pair is None else pair.quadratic
-    samples = read_samples(folder, layout, unit.temperature_sensor)
+    samples = read_samples(folder, layout, unit.temperature_sensor, given)
     unit = replace(unit, adc=_wide_enough(unit, layout, samples))
     if layout.faces:
         measurements = face_measurements(unit, layout, samples)

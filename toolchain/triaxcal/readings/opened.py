@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.tomltable import did_you_mean, shown
+from triaxcal.readings.arrays import ArraySource
 from triaxcal.readings.format import FORMATS, Block, Format, Source
 from triaxcal.readings.names import meant
 from triaxcal.unit.recordingfile import Column, FileLayout
@@ -35,8 +39,10 @@ class RecordingFile:
     source : Source
     """
 
-    def __init__(self, path: Path, layout: FileLayout) -> None:
-        """Open `path`.
+    def __init__(
+        self, path: Path, layout: FileLayout, columns: Mapping[str, Any] | None = None
+    ) -> None:
+        """Open `path`, or take the `columns` of a program; `path` is then only for messages.
 
         Raises
         ------
@@ -45,12 +51,18 @@ class RecordingFile:
             is missing.
         """
         self.path, self.layout = path, layout
+        self._given = columns is not None
+        if columns is not None:
+            arrays = {str(name): np.asarray(values) for name, values in columns.items()}
+            self._format = TEXT  # what is raised over arrays is a fault of our own
+            self.source: Source = ArraySource(str(path), arrays, layout)
+            return
         self._stamp = _stamp(path, layout)
         self._format = _format_of(path, layout)
         if self._format.package and importlib.util.find_spec(self._format.package) is None:
             raise self._missing(self._format.package)
         with self._one_line():
-            self.source: Source = self._format.open(path, layout)
+            self.source = self._format.open(path, layout)
 
     def index(self, column: Column, key: str) -> int:
         """Index of a column by its name or number; `key` is the key that names it.
@@ -121,7 +133,7 @@ class RecordingFile:
             )
         with self._one_line():
             yield from self.source.blocks(numbers, texts)
-        if _stamp(self.path, self.layout) != self._stamp:
+        if not self._given and _stamp(self.path, self.layout) != self._stamp:
             raise self._refused(
                 "changed while it was read",
                 "a recording that is complete",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -123,8 +124,13 @@ class Samples:
         return list(zip(starts, [*starts[1:], len(self)], strict=True))
 
 
-def read_samples(folder: Path, layout: RecordingLayout, sensor: TemperatureSensor) -> Samples:
-    """Samples of the file of a layout.
+def read_samples(
+    folder: Path,
+    layout: RecordingLayout,
+    sensor: TemperatureSensor,
+    given: Mapping[str, Any] | None = None,
+) -> Samples:
+    """Samples of the file of a layout, or of the columns that a program gives in its place.
 
     Raises
     ------
@@ -147,9 +153,8 @@ def read_samples(folder: Path, layout: RecordingLayout, sensor: TemperatureSenso
         absent = RefusedError(place, "missing", expected="a time column, or sample_rate_hz")
         clock = replace(clock, absent=absent)
     ordered = layout.rows == SAMPLES
-    table = read_table(
-        folder / layout.file, layout.written, clock, quantities, label, ordered=ordered
-    )
+    path = folder / layout.file if given is None else Path("readings")
+    table = read_table(path, layout.written, clock, quantities, label, ordered=ordered, given=given)
     samples = Samples(table, table.median_step(), table.findings)
     if TEMP in samples:
         _refuse_implausible(samples, layout)

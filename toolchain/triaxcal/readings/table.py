@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -112,6 +113,7 @@ def read_table(
     label: tuple[str, Column] | None = None,
     *,
     ordered: bool = True,
+    given: Mapping[str, Any] | None = None,
 ) -> ReadTable:
     """Rows of a file with all needed readings, in the order of time.
 
@@ -119,13 +121,14 @@ def read_table(
     ----------
     label : (key, column) or None
     ordered : whether times must rise
+    given : columns of a program in place of the file; `path` is then only for messages
 
     Raises
     ------
     RefusedError
         As `RecordingFile`, `order.Order`; where half of the rows lack a reading.
     """
-    file = RecordingFile(path, layout)
+    file = RecordingFile(path, layout, given)
     clock = _clock_of(file, clock, quantities)
     ordered = ordered and clock.columns != ()
     reading = _Reading(file, clock, quantities, label)
