@@ -54,7 +54,7 @@ class RecordingFile:
         self._given = columns is not None
         if columns is not None:
             arrays = {str(name): np.asarray(values) for name, values in columns.items()}
-            self._format = TEXT  # what is raised over arrays is a fault of our own
+            self._format = FORMATS["text"]  # what is raised over arrays is a fault of our own
             self.source: Source = ArraySource(str(path), arrays, layout)
             return
         self._stamp = _stamp(path, layout)
