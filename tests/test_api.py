@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib
 import json
+import os
 import pickle
 import pkgutil
 import subprocess
@@ -19,6 +20,9 @@ import pytest
 import triaxcal
 from builds import UNITS
 from family.family_cases import COLUMNS, directions, log, write_unit
+from triaxcal.base.errors import RefusedError
+from triaxcal.base.publish import renew
+from triaxcal.readings.measurements_csv import rows_of
 from triaxcal.uncertainty.evaluate import uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS
 
@@ -557,3 +561,30 @@ def test_wrong_kinds_of_arguments_are_named(call: Callable[[], object], told: st
     with pytest.raises(triaxcal.RefusedError) as refusal:
         call()
     assert told in str(refusal.value)
+
+
+def test_nothing_but_a_file_is_replaced(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(RefusedError) as refusal:
+        renew({"pipe": b"new"}, tmp_path)
+    assert str(refusal.value) == (
+        f"{pipe}: is no regular file; expected a file, or nothing there; name another file"
+    )
+    assert pipe.is_fifo()
+
+
+def test_masked_readings_are_refused() -> None:
+    columns = {
+        "position": [1, 2],
+        "temp_degc": [20.0, 20.0],
+        "ux_v": [0.1, 0.2],
+        "uy_v": [0.1, 0.2],
+    }
+    masked = np.ma.array([0.1, 0.2], mask=[False, True])
+    with pytest.raises(RefusedError) as refusal:
+        rows_of({**columns, "uz_v": masked})
+    assert str(refusal.value) == (
+        "readings, column uz_v: found masked values; expected a number in each row; "
+        "leave out the rows that are masked"
+    )

@@ -7,8 +7,10 @@ import gc
 import os
 import shutil
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from threading import Thread
 from types import ModuleType
@@ -30,12 +32,14 @@ from triaxcal.delivery.inputs import files_sha256
 from triaxcal.delivery.unit import deliver
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.types import FloatArray
-from triaxcal.readings.arrays import ArraySource
-from triaxcal.readings.format import FORMATS, Format, starts_with
+from triaxcal.readings.arrays import ArraySource, texts_of
+from triaxcal.readings.clock import Clock
+from triaxcal.readings.format import FORMATS, Block, Format, starts_with
 from triaxcal.readings.opened import RecordingFile
 from triaxcal.readings.quiet import quiet
+from triaxcal.readings.spool import Spool
 from triaxcal.report.series.unit import make_unit
-from triaxcal.unit.recordingfile import FileLayout
+from triaxcal.unit.recordingfile import ClockLayout, FileLayout
 
 LAYOUT = FileLayout("recording")
 every_format = pytest.mark.parametrize("name", CASES)
@@ -515,11 +519,11 @@ def test_an_excel_sheet_without_names_is_numbered(tmp_path: Path) -> None:
     path = tmp_path / "log.xlsx"
     book = openpyxl.Workbook()
     book.create_sheet("raw").append([0.5, 1.5])
-    book["raw"].append([2.5, "n/a"])
+    book["raw"].append([2.5, "high"])
     book.save(path)
     layout = FileLayout("recording", variable="raw")
     assert values(path, 1, layout) == [0.5, 2.5]
-    with pytest.raises(RefusedError, match=r"row 2, column : found 'n/a'; expected a number"):
+    with pytest.raises(RefusedError, match=r"row 2, column : found 'high'; expected a number"):
         values(path, 2, layout)
 
 
@@ -583,6 +587,138 @@ def test_a_few_poses_of_many_columns_are_not_turned(kind: str, tmp_path: Path) -
         expected = m.T if turned else m
         assert values(path, 2, layout) == expected[:, 1].tolist()
         assert bool(RecordingFile(path, layout).source.findings) == turned
+
+
+# ---- Cells that are no plain numbers: one rule for every format ----
+
+
+def unread(path: Path, column: str) -> str:
+    with pytest.raises(RefusedError) as refusal:
+        values(path, column)
+    return str(refusal.value).removeprefix(f"{path}")
+
+
+def book(path: Path, *rows: list[object]) -> Path:
+    openpyxl = pytest.importorskip("openpyxl")
+    made = openpyxl.Workbook()
+    for row in rows:
+        made.active.append(row)
+    made.save(path)
+    return path
+
+
+def test_json_of_two_columns_with_one_full_name_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.json"
+    for text in (
+        '{"imu.ax": [1, 2], "imu": {"ax": [3, 4]}}',
+        '[{"imu.ax": 1, "imu": {"ax": 3}}]',
+        '{"imu.ax": 1, "imu": {"ax": 3}}\n{"imu.ax": 1, "imu": {"ax": 3}}\n',
+    ):
+        path.write_text(text)
+        told = "damaged, or not JSON: two columns of one name, 'imu.ax'"
+        assert refused(path, "imu.ax") == told
+
+
+def test_true_and_false_are_no_numbers(tmp_path: Path) -> None:
+    told = (
+        ", row 1, column ax: found 'True'; expected a number; "
+        "write the column as numbers, or name another"
+    )
+    path = tmp_path / "log.json"
+    for text in ('{"ax": [true, false]}', '{"ax": [true, 1.5]}', '[{"ax": true}, {"ax": 1.5}]'):
+        path.write_text(text)
+        assert unread(path, "ax") == told
+    path.write_text('{"acc": [[true, 1.5], [2.5, 1.5]]}')
+    assert unread(path, "acc[0]") == told.replace("ax", "acc[0]")
+    np.savez(tmp_path / "log.npz", ax=np.array([True, False]))
+    assert unread(tmp_path / "log.npz", "ax") == told
+    sheet = book(tmp_path / "log.xlsx", ["t", "ax", "ay"], [0, True, 1])
+    assert unread(sheet, "ax") == told.replace("row 1", "row 2").replace("ax", "Sheet.ax")
+
+
+def test_excel_has_the_rules_of_text(tmp_path: Path) -> None:
+    path = book(
+        tmp_path / "log.xlsx",
+        ["t", "ax", "ay"],
+        ["s", "m/s^2", "m/s^2"],
+        [0, "#N/A", 1],
+        [1, "-", 1],
+        [2, "1,5", 1],
+        [3, 2.5, 1],
+    )
+    file = RecordingFile(path, FileLayout("recording", decimal=","))
+    (block,) = file.blocks([file.index("ax", "acceleration")])
+    np.testing.assert_array_equal(block.numbers[:, 0], [np.nan, np.nan, 1.5, 2.5])
+    assert file.source.findings == ("1 row left out above the rows, from row 2 on",)
+    assert unread(path, "ax") == (
+        ", row 5, column Sheet.ax: found '1,5'; expected a number; "
+        'if the decimals have a comma, decimal = ","'
+    )
+
+
+def test_times_without_their_unit_name_it(tmp_path: Path) -> None:
+    remedy = 'expected a number; if these are times, time_unit = "iso"'
+    sheet = book(tmp_path / "log.xlsx", ["t", "a", "b"], [datetime(2026, 3, 30, 12), 1, 1])
+    found = "found '2026-03-30T12:00:00'"
+    assert unread(sheet, "t") == f", row 2, column Sheet.t: {found}; {remedy}"
+    np.savez(tmp_path / "log.npz", t=np.array(["2026-03-30T12:00:00"], dtype="M8[s]"))
+    assert unread(tmp_path / "log.npz", "t") == f", row 1, column t: {found}; {remedy}"
+    text = tmp_path / "log.csv"
+    text.write_text("t,a,b,c\n23:59:30.000,1,2,3\n23:59:30.010,1,2,3\n")
+    assert unread(text, "t") == f", line 2, column t: found '23:59:30.000'; {remedy}"
+
+
+def test_a_missing_time_is_a_missing_cell() -> None:
+    times = np.array(["2026-03-30T12:00:00", "NaT", "2026-03-30T12:00:02"], dtype="M8[s]")
+    assert texts_of(times) == ["2026-03-30T12:00:00", "", "2026-03-30T12:00:02"]
+    clock = Clock(ClockLayout(columns=("t",), units=("iso",)), "log", "row")
+    block = Block(np.empty((3, 0)), (), np.arange(1, 4))
+    np.testing.assert_array_equal(
+        clock.seconds(block, block.numbers, [texts_of(times)]), [0.0, np.nan, 2.0]
+    )
+
+
+@pytest.mark.parametrize("date", ["2026-03-30", "2026-03-30T00:00:00"])
+def test_a_date_and_a_time_of_two_columns(date: str) -> None:
+    """Excel's date column has a time of its own; hours may have one digit."""
+    clock = Clock(ClockLayout(columns=("d", "t"), units=("iso", "iso")), "log", "row")
+    block = Block(np.empty((2, 0)), (), np.arange(1, 3))
+    seconds = clock.seconds(block, block.numbers, [[date] * 2, ["9:59:59", "10:00:01"]])
+    assert seconds.tolist() == [0.0, 2.0]
+
+
+def test_a_short_line_in_the_middle_has_its_own_count(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = [f"{k},1,2,3" for k in range(60)]
+    path.write_text("\n".join(["t,a,b,c", *rows[:49], "49,1", *rows[50:], ""]))
+    assert unread(path, "a") == (
+        ", line 51: 2 cells; expected 4, as in line 2; "
+        "check delimiter and decimal in [recording], or remove the line"
+    )
+
+
+def test_a_document_on_one_line_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("1.5," * 300_000)
+    assert (
+        refused(path, 1) == f"{path}, line 1: more than 1048576 characters; expected a row of the "
+        "recording in each line; export the recording as CSV, a line for each row"
+    )
+
+
+def test_a_full_temporary_folder_names_what_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    spool = Spool(4)
+
+    def full(_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(spool._file, "write", full)
+    with pytest.raises(RefusedError) as refusal:
+        spool.append(np.zeros((1 << 16, 4)))
+    assert str(refusal.value) == (
+        f"{tempfile.gettempdir()}: cannot be written: no space left on device; expected more than "
+        "2 MiB free: 8 bytes for each number of a recording; set TMPDIR to a folder with more space"
+    )
 
 
 # ---- Recordings of other makers ----

@@ -47,9 +47,18 @@ def renew(files: Mapping[str, bytes], target: Path) -> None:
     Raises
     ------
     RefusedError
-        When the disk refuses; a file is then either as it was or new.
+        When the disk refuses, or a name is that of a device; a file is then either as it was or
+        new.
     """
     for name, content in files.items():
+        path = target / name
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise RefusedError(
+                str(path),
+                "is no regular file",
+                expected="a file, or nothing there",
+                remedy="name another file",
+            )
         try:
             handle, staging = tempfile.mkstemp(prefix=f".{name}.", dir=target)
             try:

@@ -13,6 +13,7 @@ from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.readings.format import PIECE, Block, Source
 from triaxcal.readings.names import in_table
+from triaxcal.readings.numbertext import number_of, remedy_of
 from triaxcal.unit.recordingfile import FileLayout
 
 
@@ -31,7 +32,7 @@ class ArraySource(Source):
     """
 
     def __init__(self, path: str, arrays: Mapping[str, Any], layout: FileLayout) -> None:
-        self._path = path
+        self._path, self._decimal = path, layout.decimal
         self._columns: list[tuple[str, Any, str, int | None]] = []
         matrices: dict[str, range] = {}
         for name, array in arrays.items():
@@ -71,7 +72,7 @@ class ArraySource(Source):
                 remedy="name columns that belong together, or save them at one rate",
             )
         count = next(iter(lengths.values()))
-        pieces = Pieces(self._path, self.names, numbers, texts)
+        pieces = Pieces(self._path, self.names, numbers, texts, self._decimal)
         for start in range(0, count, PIECE):
             part = slice(start, min(start + PIECE, count))
             yield pieces.block({k: self._cut(k, part) for k in pieces.wanted})
@@ -94,12 +95,19 @@ class Pieces:
         Of all columns, for messages.
     numbers, texts : indices into `names`
         As of `Source.blocks`; `wanted` has both, each once and in order.
+    decimal : str
+        Sign before the decimals of numbers that are text.
     """
 
     def __init__(
-        self, path: str, names: Sequence[str], numbers: Sequence[int], texts: Sequence[int]
+        self,
+        path: str,
+        names: Sequence[str],
+        numbers: Sequence[int],
+        texts: Sequence[int],
+        decimal: str = ".",
     ) -> None:
-        self._path, self._names = path, names
+        self._path, self._names, self._decimal = path, names, decimal
         self._numbers, self._texts = numbers, texts
         self._count = 0
         self._starts: dict[int, int] = {}
@@ -128,14 +136,14 @@ class Pieces:
         for place, k in enumerate(self._numbers):
             start = self._starts.setdefault(k, _start(columns[k]))
             try:
-                numbers[:, place] = _doubles(columns[k], start)
+                numbers[:, place] = _doubles(columns[k], start, self._decimal)
             except (ValueError, TypeError) as error:
-                row, cell = _no_number(columns[k])
+                row, cell = _no_number(columns[k], self._decimal)
                 raise RefusedError(
                     f"{self._path}, row {rows[row]}, column {self._names[k]}",
-                    f"found {str(cell)[:40]!r}",
+                    f"found {cell[:40]!r}",
                     expected="a number",
-                    remedy="write the column as numbers, or name another",
+                    remedy=remedy_of(cell) or "write the column as numbers, or name another",
                 ) from error
         return Block(numbers, tuple(texts_of(columns[k]) for k in self._texts), rows)
 
@@ -155,10 +163,12 @@ def _start(values: Any) -> int:
     return first if abs(first) >= 2**53 else 0
 
 
-def _doubles(values: Any, start: int) -> FloatArray:
+def _doubles(values: Any, start: int, decimal: str) -> FloatArray:
     """Numbers less `start`; NaN stands for None and for infinities."""
-    if values.dtype.kind not in "biufO":
+    if values.dtype.kind not in "iufO":
         raise ValueError
+    if values.dtype.kind == "O" and {type(value) for value in values} & {str, bool}:
+        values = np.array([_double(value, decimal) for value in values])
     if start:
         # Two's complement: exact for unsigned values as well.
         values = values.astype(np.int64) - np.array(start, values.dtype).astype(np.int64)
@@ -167,21 +177,29 @@ def _doubles(values: Any, start: int) -> FloatArray:
     return found
 
 
-def _no_number(values: Any) -> tuple[int, object]:
-    """Index and value of the first that is no number."""
+def _double(value: Any, decimal: str) -> float:
+    if isinstance(value, bool):
+        raise TypeError
+    if isinstance(value, str):
+        return number_of(value, decimal)
+    return float("nan") if value is None else float(value)
+
+
+def _no_number(values: Any, decimal: str) -> tuple[int, str]:
+    """Index and text of the first that is no number."""
     for index, value in enumerate(values.tolist() if values.dtype.kind == "O" else ()):
         try:
-            float(value if value is not None else 0.0)
+            _double(value, decimal)
         except (ValueError, TypeError):
-            return index, value
-    return 0, values[0]
+            return index, _text(value)
+    return 0, texts_of(values[:1])[0]
 
 
 def texts_of(values: Any) -> list[str]:
     """Text of a column of any type: dates as ISO 8601, whole numbers without a point."""
     array = np.asarray(values)
     if array.dtype.kind == "M":
-        return [str(text) for text in np.datetime_as_string(array)]
+        return ["" if text == "NaT" else str(text) for text in np.datetime_as_string(array)]
     return [_text(value) for value in array.tolist()]
 
 

@@ -14,6 +14,9 @@ from triaxcal.readings.format import Block
 from triaxcal.unit.recordingfile import ISO, TIME_UNITS, ClockLayout
 
 _TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d([.,]\d+)?")
+_MIDNIGHT = re.compile(r"[T ]00:00:00(\.0+)?$")
+"""Of a date in a column of its own: Excel gives dates a time as well."""
+_ONE_DIGIT = re.compile(r"[T ](?=\d:)")
 _DAY_S = 86400.0
 _COUNTERS = (2.0**16, 2.0**32)
 _WHOLE = 0.98
@@ -111,7 +114,8 @@ class Clock:
         """Seconds from the first moment, of one column or of a date and a time."""
         seconds = np.full(len(rows), np.nan)
         for k, cells in enumerate(zip(*texts, strict=True)):
-            text = "T".join(cell.strip("\"' ") for cell in cells)
+            first, *rest = (cell.strip("\"' ") for cell in cells)
+            text = "T".join([_MIDNIGHT.sub("", first), *rest]) if rest else first
             if not text.strip("T"):
                 continue
             try:
@@ -132,4 +136,4 @@ class Clock:
             self._of_day = True
             hours, rest = text.split(":", 1)
             return datetime.datetime.fromisoformat(f"2000-01-01T{hours.zfill(2)}:{rest}")
-        return datetime.datetime.fromisoformat(text.replace("/", "-"))
+        return datetime.datetime.fromisoformat(_ONE_DIGIT.sub("T0", text.replace("/", "-")))

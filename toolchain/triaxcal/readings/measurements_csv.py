@@ -129,6 +129,14 @@ def rows_of(columns: Mapping[str, Any]) -> tuple[Header, list[Row]]:
     """
     names = tuple(str(name).strip() for name in columns)
     header = _header("readings, columns", names)
+    for name in columns:
+        if np.ma.is_masked(columns[name]):
+            raise RefusedError(
+                f"readings, column {name}",
+                "found masked values",
+                expected="a number in each row",
+                remedy="leave out the rows that are masked",
+            )
     cells = {
         name: [_cell(v) for v in np.atleast_1d(np.asarray(columns[c])).tolist()]
         for name, c in zip(names, columns, strict=True)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from triaxcal.base.errors import refused_by_system
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.format import PIECE
 
@@ -34,9 +35,25 @@ class Spool:
         return self._count
 
     def append(self, rows: FloatArray) -> None:
-        """Add rows, shape (n, columns)."""
-        self._file.seek(0, 2)
-        self._file.write(np.ascontiguousarray(rows, dtype=np.float64).data)
+        """Add rows, shape (n, columns).
+
+        Raises
+        ------
+        RefusedError
+            When the temporary folder is full or cannot be written.
+        """
+        try:
+            self._file.seek(0, 2)
+            self._file.write(np.ascontiguousarray(rows, dtype=np.float64).data)
+        except OSError as error:
+            needed = 8 * self.columns * (self._count + len(rows)) / 2**20
+            raise refused_by_system(
+                tempfile.gettempdir(),
+                "written",
+                error,
+                expected=f"more than {needed:.0f} MiB free: 8 bytes for each number of a recording",
+                remedy="set TMPDIR to a folder with more space",
+            ) from error
         self._count += len(rows)
 
     def rows(self, start: int, stop: int) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
-from itertools import islice
+from itertools import chain, islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from triaxcal.readings.arrays import Pieces, column_of
 from triaxcal.readings.format import PIECE, Block, Format, Source
+from triaxcal.readings.numbertext import is_word
 from triaxcal.unit.recordingfile import FileLayout
 
 _HEADER_WITHIN, _HEADER_CELLS = 20, 3
@@ -41,13 +42,18 @@ class _Excel(Source):
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
         """As `Source.blocks`."""
-        pieces = Pieces(str(self._path), self.names, numbers, texts)
+        pieces = Pieces(str(self._path), self.names, numbers, texts, self._layout.decimal)
         for sheet, rows in self._sheets():
             if sheet.title != self.tables[pieces.wanted[0]]:
                 continue
             top = list(islice(rows, _HEADER_WITHIN))
             header = self._header(top)
-            body = (row for part in (top, rows) for row in part if not header or row[0] > header[0])
+            below = [row for row in top if not header or row[0] > header[0]]
+            words = list(takewhile(self._words, below)) if header else []
+            if words:
+                rows_word = f"{len(words)} row{'s' * (len(words) != 1)}"
+                self.findings = (f"{rows_word} left out above the rows, from row {words[0][0]} on",)
+            body = chain(below[len(words) :], rows)
             while part := list(islice(body, PIECE)):
                 yield pieces.block(
                     {k: column_of([_cell(row, self._place[k]) for _, row in part])
@@ -75,6 +81,11 @@ class _Excel(Source):
             return None
         texts = ((sum(isinstance(cell, str) for cell in row[1]), row) for row in top)
         return next((row for count, row in texts if count >= _HEADER_CELLS), None)
+
+    def _words(self, row: _Row) -> bool:
+        """Whether all cells of a row are words, as units below the names are."""
+        decimal = self._layout.decimal
+        return all(isinstance(c, str) and is_word(c, decimal) for c in row[1] if c is not None)
 
 
 def _cell(row: tuple[Any, ...], place: int) -> Any:

@@ -31,6 +31,17 @@ def _open(path: Path, layout: FileLayout) -> Source:
     return ArraySource(str(path), _columns(found), layout)
 
 
+def _once(parts: Iterator[dict[str, Any]]) -> dict[str, Any]:
+    """All columns; two of one full name, as of "imu.ax" and of "ax" in "imu", are refused."""
+    found: dict[str, Any] = {}
+    for part in parts:
+        twice = found.keys() & part.keys()
+        if twice:
+            raise ValueError(f"two columns of one name, {min(twice)!r}")
+        found |= part
+    return found
+
+
 class _Lines(Source):
     """A record a line."""
 
@@ -82,26 +93,28 @@ def _columns(value: Any, prefix: str = "") -> dict[str, Any]:
     """Arrays by name; those of an object or of records as prefix.name."""
     if isinstance(value, Mapping):
         parts = (_columns(v, f"{prefix}.{k}" if prefix else k) for k, v in value.items())
-        return {name: array for part in parts for name, array in part.items()}
+        return _once(parts)
     if not isinstance(value, list) or not value:
         return {}
     if all(isinstance(item, Mapping) for item in value):
         ways = {n: way for item in value for n, way in _paths(item, prefix).items()}
         return {name: column_of([_at(item, way) for item in value]) for name, way in ways.items()}
     if all(isinstance(item, list) and len(item) == len(value[0]) for item in value):
-        return {prefix: np.array(value)}
+        # Beside numbers numpy takes true and false for 1 and 0.
+        bools = any(isinstance(cell, bool) for row in value for cell in row)
+        return {prefix: np.array(value, dtype=object if bools else None)}
     return {prefix: column_of(value)}
 
 
 def _paths(value: Any, name: str = "", way: _Path = ()) -> dict[str, _Path]:
     """Ways to the values of one record by their names: name.field, name[0]."""
     if isinstance(value, Mapping):
-        parts = [_paths(v, f"{name}.{k}" if name else k, (*way, k)) for k, v in value.items()]
+        parts = (_paths(v, f"{name}.{k}" if name else k, (*way, k)) for k, v in value.items())
     elif isinstance(value, list):
-        parts = [_paths(v, f"{name}[{k}]", (*way, k)) for k, v in enumerate(value)]
+        parts = (_paths(v, f"{name}[{k}]", (*way, k)) for k, v in enumerate(value))
     else:
         return {name: way}
-    return {leaf: found for part in parts for leaf, found in part.items()}
+    return _once(parts)
 
 
 def _at(record: Any, way: _Path) -> Any:

@@ -19,11 +19,12 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import shown
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.format import PIECE, Block, Format, Source
-from triaxcal.readings.numbertext import is_number
+from triaxcal.readings.numbertext import number_of, remedy_of
 from triaxcal.readings.preamble import LOOKED_AT, Line, find_table, split_cells
 from triaxcal.unit.recordingfile import FileLayout
 
-_MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "inf", "-inf", "+inf"})
+_LINE_MAX = 1 << 20
+"""Characters of a line at most: a document on one line is no table."""
 _NEIGHBOURS = 8
 """Lines beyond those looked at: the last of them has neighbours too."""
 _BYTES = 1 << 20
@@ -72,7 +73,14 @@ class TextSource(Source):
         plain = 0
         comment = self._layout.comment
         with self._opened() as file:
-            for number, line in enumerate(file, start=1):
+            for number, line in enumerate(iter(lambda: file.readline(_LINE_MAX + 1), ""), start=1):
+                if len(line) > _LINE_MAX:
+                    raise RefusedError(
+                        f"{self._path}, line {number}",
+                        f"more than {_LINE_MAX} characters",
+                        expected="a row of the recording in each line",
+                        remedy="export the recording as CSV, a line for each row",
+                    )
                 if number <= self._layout.skip_rows or not line.strip():
                     continue
                 is_comment = bool(comment) and line.lstrip().startswith(comment)
@@ -151,7 +159,7 @@ class TextSource(Source):
         width, comment = self._found.width, self._layout.comment
         rows: list[list[str]] = []
         places: list[int] = []
-        short = 0
+        short = short_cells = 0
         for place, line in enumerate(lines, start=first):
             if not line.strip() or (comment and line.lstrip().startswith(comment)):
                 continue
@@ -162,14 +170,14 @@ class TextSource(Source):
             if self._found.closed and len(cells) == width + 1 and not cells[-1]:
                 cells.pop()
             if short or len(cells) > width or (len(cells) < width and not last):
-                raise self._ragged(short or place, len(cells))
+                raise self._ragged(*((short, short_cells) if short else (place, len(cells))))
             if len(cells) < width:
-                short = place
+                short, short_cells = place, len(cells)
                 continue
             rows.append(cells)
             places.append(place)
         if short and not rows:
-            raise self._ragged(short, len(split_cells(lines[short - first], self._found.delimiter)))
+            raise self._ragged(short, short_cells)
         if short:
             self.findings = (
                 *self._found.findings,
@@ -191,17 +199,15 @@ class TextSource(Source):
             return np.array([self._number(cell, place, column) for cell, place in pairs])
 
     def _number(self, cell: str, place: int, column: int) -> float:
-        if is_number(cell):
-            return float(cell)
-        if cell.lower() in _MISSING:
-            return float("nan")
-        comma = "," in cell and self._layout.decimal == "."
-        raise RefusedError(
-            f"{self._path}, line {place}, column {self.names[column] or column + 1}",
-            f"found {shown(cell)}",
-            expected="a number",
-            remedy='if the decimals have a comma, decimal = ","' if comma else "",
-        )
+        try:
+            return number_of(cell, self._layout.decimal)
+        except ValueError as error:
+            raise RefusedError(
+                f"{self._path}, line {place}, column {self.names[column] or column + 1}",
+                f"found {shown(cell)}",
+                expected="a number",
+                remedy=remedy_of(cell),
+            ) from error
 
     def _ragged(self, place: int, cells: int) -> RefusedError:
         return RefusedError(
