@@ -46,6 +46,7 @@ Truth = Callable[[FloatArray], FloatArray]
 def unit(**changes: object) -> UnitDescription:
     """AT-TEST: T0 +20 degC, 1 g, everything by itself."""
     base = UnitDescription(
+        source="units/AT-TEST/unit.toml",
         name="AT-TEST",
         serial="T-1",
         adc=Adc(24, 2.5, -(2**23), 2**23 - 1),

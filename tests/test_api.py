@@ -153,9 +153,23 @@ def test_uncertainty_is_that_of_the_passport(cal: triaxcal.Calibration) -> None:
     assert "a_y at 55" in budget.quantity
 
 
+def test_a_budget_is_a_table_of_a_screen(cal: triaxcal.Calibration) -> None:
+    budget = cal.uncertainty(20.0)
+    head, names, *rows = repr(budget).splitlines()
+    assert head == (f"{budget.quantity}: +-{budget.expanded:.3g} g (95 %, k = {budget.factor:.2f})")
+    assert names.split() == ["source", "size", "unit", "gives,", "g", "share"]
+    assert [row.split("  ")[1] for row in rows] == [
+        line.source.key.replace("_", " ") for line in budget.lines
+    ]
+    assert max(map(len, [head, names, *rows])) <= 80
+    assert repr(budget) == str(budget)
+
+
 def test_verdict_and_diagnosis(unit: triaxcal.Unit, cal: triaxcal.Calibration) -> None:
     assert cal.verdict.passed
     assert [t.dwells for t in cal.verdict.tested] == [6, 72]
+    assert repr(cal.verdict) == str(cal.verdict)
+    assert repr(cal.diagnosis) == str(cal.diagnosis)
     assert str(cal.verdict).startswith("passed\nat T0: 0.00135")
     assert [c.label for c in cal.diagnosis.candidates if c.chosen] == ["polynomial of order 3"]
     strict = triaxcal.Unit("U", serial="1", **_tables(unit), limits={"over_range_g": 1e-6})
@@ -397,7 +411,14 @@ WRONG: dict[str, tuple[Callable[[triaxcal.Calibration, triaxcal.Firmware], objec
     "huge": (lambda _, f: f.apply([[2**70, 0, 0]], 0), "raw_codes: found an array of object"),
     "half a code": (lambda _, f: f.apply([[0.5, 0, 0]], 0), "raw_codes[0, 0]: found 0.5"),
     "nan code": (lambda _, f: f.apply([[0, 0, 0]], [float("nan")]), "temp_codes[0]: found nan"),
-    "one row": (lambda _, f: f.apply([1, 2, 3], 0), "raw_codes: found the shape (3,)"),
+    "one row": (
+        lambda _, f: f.apply([1, 2, 3], 0),
+        "raw_codes: found the shape (3,); expected (n, 3), one row a reading",
+    ),
+    "two columns of codes": (
+        lambda _, f: f.apply([[1, 2]], 0),
+        "raw_codes: found the shape (1, 2); expected (n, 3), one row a reading",
+    ),
     "codes' length": (lambda _, f: f.apply([[1, 2, 3]], [1, 2]), "temp_codes: found the shape"),
 }  # fmt: skip
 

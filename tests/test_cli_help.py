@@ -17,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.extras import install_command
 from triaxcal.base.screentext import WIDTH, table, wrapped
 from triaxcal.cli import entry, rig_options
 from triaxcal.cli.main import SECTIONS, main
@@ -93,8 +94,29 @@ def test_the_help_of_rig_needs_no_optional_package(monkeypatch: pytest.MonkeyPat
             main, ["rig", "status", "--unit", "AT-SIM-BENCH"], catch_exceptions=False
         )
     assert str(refusal.value) == (
-        "triaxcal rig: missing packages: no_such_package; install them: pip install 'triaxcal[rig]'"
+        "triaxcal rig: missing packages: no_such_package; install them: " + install_command("rig")
     )
+
+
+def test_the_command_that_installs_runs_in_the_folder_where_one_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    python = tmp_path / "my lab" / ".venv" / "bin" / "python"
+    python.parent.mkdir(parents=True)
+    python.symlink_to(sys.executable)
+    monkeypatch.setattr(sys, "executable", str(python))
+    monkeypatch.setenv("PATH", "/usr/bin")
+    monkeypatch.chdir(tmp_path / "my lab")
+    assert install_command("ulog") == ".venv/bin/python -m pip install 'triaxcal[ulog]'"
+    monkeypatch.chdir(python.parent)
+    assert install_command("ulog") == "./python -m pip install 'triaxcal[ulog]'"
+    monkeypatch.chdir("/")
+    monkeypatch.setattr(sys, "executable", "/opt/my lab/python")
+    monkeypatch.chdir(tmp_path)
+    assert install_command("ulog") == "'/opt/my lab/python' -m pip install 'triaxcal[ulog]'"
+    monkeypatch.setattr(sys, "executable", str(python))
+    monkeypatch.setenv("PATH", str(python.parent))
+    assert install_command("ulog") == "python -m pip install 'triaxcal[ulog]'"
 
 
 # ---- the name of a unit ----

@@ -238,7 +238,7 @@ def test_a_range_beyond_the_calibrated_temperatures_is_refused():
     for wrong in ((-40.51, 70.0), (-40.0, 70.51), (-60.0, 90.0)):
         message = refusal(data, range_degc=wrong)
         assert message.startswith(
-            f"AT-TEST/unit.toml, [thermal] range_degc: {wrong[0]:g} to {wrong[1]:g} degC; "
+            f"units/AT-TEST/unit.toml, [thermal] range_degc: {wrong[0]:g} to {wrong[1]:g} degC; "
             "expected within 0.5 degC of the calibrated temperatures, -40 to 70 degC"
         )
 

@@ -228,7 +228,7 @@ def test_a_knot_without_data_is_found():
 
 
 def refusal(shape: ThermalShape, temps) -> str:
-    reason = shape.undetermined("AT-TEST/unit.toml", np.array(temps))
+    reason = shape.undetermined("units/AT-TEST/unit.toml", np.array(temps))
     assert isinstance(reason, RefusedError)
     assert "\n" not in str(reason)
     return str(reason)
@@ -238,7 +238,7 @@ def refusal(shape: ThermalShape, temps) -> str:
 def test_too_high_an_order_tells_the_highest_possible(order):
     message = refusal(PolynomialShape.over(np.array(TABLE_TEMPS), 20.0, order), TABLE_TEMPS)
     assert message == (
-        f"AT-TEST/unit.toml, [thermal] order: order {order} with 3 calibrated temperatures "
+        f"units/AT-TEST/unit.toml, [thermal] order: order {order} with 3 calibrated temperatures "
         f"(-40, 20, 70 degC); expected {order + 1} temperatures for this order; "
         "the highest order possible is 2"
     )
@@ -254,7 +254,7 @@ def test_knots_that_nothing_determines(knots, named):
     temps = np.array(TABLE_TEMPS)
     message = refusal(PiecewiseLinearShape.over(temps, 20.0, knots), TABLE_TEMPS)
     assert message.startswith(
-        "AT-TEST/unit.toml, [thermal] knots_degc: nothing determines the knot"
+        "units/AT-TEST/unit.toml, [thermal] knots_degc: nothing determines the knot"
     )
     assert "calibrated temperatures are -40, 20, 70 degC" in message
     if named:

@@ -114,7 +114,9 @@ def test_a_knot_that_nothing_determines_is_named() -> None:
             unit(thermal=ThermalChoice("cubic-spline", knots)), readings(spline_truth(), SEVEN)
         )
     message = str(caught.value)
-    assert message.startswith("AT-TEST/unit.toml, [thermal] knots_degc: nothing determines the")
+    assert message.startswith(
+        "units/AT-TEST/unit.toml, [thermal] knots_degc: nothing determines the"
+    )
     assert "calibrated temperatures are -40, -20, 0, 20, 40, 55, 70 degC" in message
     assert "\n" not in message
 
@@ -243,6 +245,6 @@ def test_a_recording_tries_nested_functions_only() -> None:
     with pytest.raises(RefusedError) as caught:
         thermal_shapes(unit(thermal=ThermalChoice("cubic-spline")), temps, groups)
     assert str(caught.value) == (
-        'AT-TEST/unit.toml, [thermal] model: "cubic-spline" for a recording; '
+        'units/AT-TEST/unit.toml, [thermal] model: "cubic-spline" for a recording; '
         'expected "polynomial" or "auto"'
     )

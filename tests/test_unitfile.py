@@ -312,6 +312,20 @@ def test_toml_syntax_error_names_the_line(tmp_path: Path) -> None:
     assert "line 4" in message
 
 
+@pytest.mark.parametrize(
+    ("line", "remedy"),
+    [
+        ("bits = 24,5", "; write a decimal point for the decimal comma"),
+        ("bits = -0,0078 # V", "; write a decimal point for the decimal comma"),
+        ('bits = "0,5" 3', ""),
+        ("bits = [1, 2", ""),
+    ],
+)
+def test_a_decimal_comma_is_named(tmp_path: Path, line: str, remedy: str) -> None:
+    message = refusal(tmp_path, MINIMAL.replace("bits = 24", line))
+    assert message.partition(")")[2] == remedy
+
+
 @pytest.mark.parametrize("text", ["x = " + "9" * 5000, "x = 0x" + "f" * 9000, "x = " + "[" * 9999])
 def test_toml_bombs_are_refused(tmp_path: Path, text: str) -> None:
     assert len(refusal(tmp_path, f"{text}\n{MINIMAL}")) < 300
@@ -390,6 +404,17 @@ def test_the_folder_of_units_is_no_unit(tmp_path: Path) -> None:
     make_unit(tmp_path / "units", MINIMAL, "A-1")
     with pytest.raises(RefusedError, match=r"units: no unit.toml in it; units in .*: A-1"):
         find_unit(tmp_path / "units")
+
+
+def test_a_near_miss_of_a_units_name_is_named(tmp_path: Path) -> None:
+    make_unit(tmp_path / "units", MINIMAL, "AT-SIM")
+    make_unit(tmp_path / "units", MINIMAL, "QQ-7")
+    with pytest.raises(RefusedError) as caught:
+        find_unit(tmp_path / "units" / "at-sm")
+    assert str(caught.value) == (
+        f'{tmp_path}/units/at-sm: no such unit (did you mean "AT-SIM"?); '
+        f"units in {tmp_path}/units: AT-SIM, QQ-7"
+    )
 
 
 def test_no_units_at_all_points_at_the_guide(tmp_path: Path) -> None:

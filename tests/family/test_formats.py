@@ -25,6 +25,7 @@ from written import AXES, CASES, Case, Times, csv, readings
 
 from recordings import recording
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.extras import install_command
 from triaxcal.batch.order import filled
 from triaxcal.batch.plan import plan_work
 from triaxcal.cli.main import main
@@ -211,7 +212,7 @@ def test_a_missing_package_names_the_command(
         RecordingFile(path, LAYOUT)
     assert str(refusal.value) == (
         f"{path}: the package {package} is missing; expected it, to read {label}; "
-        f"install it: pip install 'triaxcal[{EXTRAS[package]}]'"
+        f"install it: {install_command(EXTRAS[package])}"
     )
 
 

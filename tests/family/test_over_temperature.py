@@ -203,7 +203,8 @@ def test_kelvin_taken_for_degc_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RefusedError) as refusal:
         calibrated(unit_with(tmp_path / "U", rows))
     assert str(refusal.value) == (
-        "U/unit.toml, [recording] temperature_unit: poses at 273.2 to 313.2 degC, and T0 at 20 "
+        f"{tmp_path}/U/unit.toml, [recording] temperature_unit: poses at 273.2 to 313.2 degC, "
+        "and T0 at 20 "
         'degC; expected T0 among the poses\' temperatures; temperature_unit = "K" if they are '
         "kelvin, else state [thermal] t0_degc"
     )

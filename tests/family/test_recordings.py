@@ -299,6 +299,11 @@ REFUSED = {
         {"header": "t,ax,ay,a_z"},
         "no column 'az' ([recording] acceleration) (did you mean \"a_z\"?)",
     ),
+    "another-delimiter": (
+        log(directions(12)),
+        {"recording": COLUMNS + '\ndelimiter = "semicolon"'},
+        "a line is one cell when semicolon separates the cells; if another sign does, name it",
+    ),
     "doubled-column": (
         log(directions(12)),
         {"header": "t,ax,ax,az"},

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
     """Findings about the readings, and the candidates of the fit.
 
@@ -48,6 +48,8 @@ class Diagnosis:
 
     def __str__(self) -> str:
         return "\n".join([*self.findings, self.reason])
+
+    __repr__ = __str__
 
 
 class Calibration:

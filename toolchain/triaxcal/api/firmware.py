@@ -148,10 +148,6 @@ class Firmware:
     ) -> tuple[Int32Array, Int32Array, Int32Array]:
         """Arguments of `apply`, checked: (n, 3), (n,), (n,)."""
         raw = int32("raw_codes", raw_codes, 3)
-        if raw.ndim != 2:
-            raise RefusedError(
-                "raw_codes", f"found the shape {raw.shape}", expected="(n, 3), one row a reading"
-            )
         temp = _one_or_all("temp_codes", temp_codes, len(raw))
         rate = _one_or_all("rate_codes", 0 if rate_codes is None else rate_codes, len(raw))
         return raw, temp, rate

@@ -19,7 +19,10 @@ def finite(name: str, value: Any, columns: int | None = None) -> npt.NDArray[np.
         For what is no array of numbers, another shape, or a value that is not finite.
     """
     array = _numbers(name, value)
-    _refuse_shape(name, array, columns)
+    if columns is not None and (array.ndim == 0 or array.shape[-1] != columns):
+        raise RefusedError(
+            name, f"found the shape {array.shape}", expected=f"({columns},) or (n, {columns})"
+        )
     found = array.astype(np.float64)
     bad = np.argwhere(~np.isfinite(found))
     if len(bad):
@@ -28,7 +31,7 @@ def finite(name: str, value: Any, columns: int | None = None) -> npt.NDArray[np.
 
 
 def int32(name: str, value: Any, columns: int | None = None) -> npt.NDArray[np.int32]:
-    """`value` as int32, of shape (..., columns) where `columns` is given; nothing wraps around.
+    """`value` as int32, of shape (n, columns) where `columns` is given; nothing wraps around.
 
     Raises
     ------
@@ -38,7 +41,10 @@ def int32(name: str, value: Any, columns: int | None = None) -> npt.NDArray[np.i
     array = _numbers(name, value)
     if array.dtype.kind == "f":
         array = array.astype(np.float64)  # as a float32, the largest int32 would round up
-    _refuse_shape(name, array, columns)
+    if columns is not None and (array.ndim != 2 or array.shape[1] != columns):
+        raise RefusedError(
+            name, f"found the shape {array.shape}", expected=f"(n, {columns}), one row a reading"
+        )
     with np.errstate(invalid="ignore"):
         whole = np.isfinite(array) & (array == np.rint(array)) if array.dtype.kind == "f" else True
         bad = np.argwhere(~(whole & (array >= -(2**31)) & (array <= 2**31 - 1)))
@@ -59,13 +65,6 @@ def _numbers(name: str, value: Any) -> npt.NDArray[Any]:
     if array.dtype.kind not in "iuf":
         raise RefusedError(name, f"found an array of {array.dtype}", expected="an array of numbers")
     return array
-
-
-def _refuse_shape(name: str, array: npt.NDArray[Any], columns: int | None) -> None:
-    if columns is not None and (array.ndim == 0 or array.shape[-1] != columns):
-        raise RefusedError(
-            name, f"found the shape {array.shape}", expected=f"({columns},) or (n, {columns})"
-        )
 
 
 def _wrong(

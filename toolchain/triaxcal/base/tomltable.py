@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import datetime
 import difflib
+import re
 import tomllib
 from collections.abc import Iterable
 from decimal import Decimal
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
+
+_DECIMAL_COMMA = re.compile(r"[^#\"\'=\[]*=\s*[-+]?\d+,\d")
 
 
 def shown(value: object) -> str:
@@ -100,7 +103,10 @@ def toml_document(where: str, content: bytes) -> dict[str, object]:
     try:
         return tomllib.loads(text, parse_float=Decimal)
     except (ValueError, ArithmeticError, RecursionError) as error:
-        raise RefusedError(where, f"not TOML: {error}") from error
+        at = re.search(r"at line (\d+)", str(error))
+        comma = at and _DECIMAL_COMMA.match(text.splitlines()[int(at[1]) - 1])
+        remedy = "write a decimal point for the decimal comma" if comma else ""
+        raise RefusedError(where, f"not TOML: {error}", remedy=remedy) from error
 
 
 def key_name(table: str, key: str) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.extras import install_command
 from triaxcal.batch.order import Make, Order, Outcome, filled, refused
 from triaxcal.batch.toolchain import toolchain
 
@@ -106,7 +107,7 @@ def _distributed() -> Any:
         raise RefusedError(
             "--scheduler",
             f"package {missing.name} is missing",
-            remedy="install it: pip install 'triaxcal[series]'",
+            remedy="install it: " + install_command("series"),
         ) from missing
 
 

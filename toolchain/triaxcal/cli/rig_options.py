@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.extras import install_command
 from triaxcal.cli.options import UnitFolder
 from triaxcal.rig.source import SOURCES, Wanted, kind_of
 
@@ -30,7 +31,7 @@ def refuse_missing_packages() -> None:
         raise RefusedError(
             "triaxcal rig",
             "missing packages: " + ", ".join(missing),
-            remedy="install them: pip install 'triaxcal[rig]'",
+            remedy="install them: " + install_command("rig"),
         )
 
 
@@ -133,8 +134,15 @@ def simulated(setup: Setup, bus: BusChoice) -> Any:
     """Rig that does not exist, from the unit's truth.toml."""
     from triaxcal.rig.simorders import read_fault  # noqa: PLC0415
     from triaxcal.rig.simulator import RigSettings, SimulatedRig  # noqa: PLC0415
-    from triaxcal.simulation.truth import read_truth  # noqa: PLC0415
+    from triaxcal.simulation.truth import TRUTH_FILE, read_truth  # noqa: PLC0415
 
+    if not (setup.folder / TRUTH_FILE).is_file():
+        raise RefusedError(
+            "--bus virtual",
+            f"{setup.folder} has no {TRUTH_FILE}",
+            expected="a simulated unit: the rig that does not exist turns one",
+            remedy="give the interface of the real rig, as --bus can0, or --unit AT-SIM-BENCH",
+        )
     truth, _ = read_truth(setup.folder)
     settings, faults = RigSettings(seed=bus.seed), tuple(map(read_fault, bus.faults))
     return SimulatedRig(setup.unit, truth, setup.plan, setup.dbc, settings, faults)

@@ -114,7 +114,7 @@ def _refuse_model_error(unit: UnitDescription, plan: Plan, error_g: float) -> No
     limit_g = unit.model_error_max_micro_g * 1e-6
     if METHODS[unit.method].keeps_error and error_g > limit_g:
         raise RefusedError(
-            f"{unit.name}/unit.toml, [compensation] model_error_max_micro_g",
+            f"{unit.source}, [compensation] model_error_max_micro_g",
             f"N(T) of order {plan.shape.order} is {error_g * 1e6:.4g} micro-g off the fitted model",
             expected=f"at most {limit_g * 1e6:g} micro-g",
             remedy='choose method = "inverse", or allow more',

@@ -39,7 +39,7 @@ class LimitCheck:
         return f"{self.where}: {largest:.4g} mg, limit {limit:g} mg, {self.dwells} dwells"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Verdict:
     """Whether a calibration may be delivered.
 
@@ -68,6 +68,8 @@ class Verdict:
         if self.held_out_g is not None:
             lines.append(f"held-out error: {self.held_out_g * 1e3:.4g} mg rms")
         return "\n".join(["passed" if self.checked else "not checked", *lines])
+
+    __repr__ = __str__
 
 
 def judge(fitted: Fitted) -> Verdict:

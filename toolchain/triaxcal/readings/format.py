@@ -72,6 +72,8 @@ class Source:
         Indices of the columns that are also counted: number 1 is the first of them.
     row_word : str
         What `Block.rows` counts: "row", or "line" of a text.
+    separated : str
+        What separates the cells of a text, in words.
     findings : tuple of str
         What was left out, for the report.
     """
@@ -81,6 +83,7 @@ class Source:
     clocks: Mapping[str, tuple[int, str]] = MappingProxyType({})
     numbered: Sequence[int] = ()
     row_word: str = "row"
+    separated: str = ""
     findings: tuple[str, ...] = ()
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal.base.errors import RefusedError, refused_by_system
+from triaxcal.base.extras import install_command
 from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.readings.arrays import ArraySource
 from triaxcal.readings.format import FORMATS, Block, Format, Source
@@ -110,7 +111,13 @@ class RecordingFile:
                 "give numbers, or header = true if the first line is one",
             )
         hint = did_you_mean(column, names)
-        return self._refused(f"no column {wanted}{hint}", "one of " + _some(names))
+        remedy = ""
+        if len(names) == 1 and self.source.separated:
+            remedy = (
+                f"a line is one cell when {self.source.separated} separates the cells; if another "
+                f"sign does, name it: delimiter in [{self.layout.table}]"
+            )
+        return self._refused(f"no column {wanted}{hint}", "one of " + _some(names), remedy)
 
     def _refused(self, found: str, expected: str, remedy: str = "") -> RefusedError:
         return RefusedError(str(self.path), found, expected=expected, remedy=remedy)
@@ -161,7 +168,7 @@ class RecordingFile:
         return self._refused(
             f"the package {package} is missing",
             f"it, to read {self._format.label}",
-            f"install it: pip install 'triaxcal[{self._format.extra}]'",
+            "install it: " + install_command(self._format.extra),
         )
 
 

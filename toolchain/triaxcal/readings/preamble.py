@@ -162,7 +162,7 @@ def _trimmed(cells: Sequence[str]) -> list[str]:
 
 def _delimiter(line: str, decimal: str) -> str:
     """Delimiter of a line of numbers: the strongest there is, white space being the weakest."""
-    for name in ("tab", "semicolon", "comma"):
+    for name in ("tab", "pipe", "semicolon", "comma"):
         delimiter = DELIMITERS[name]
         if delimiter in line.strip() and delimiter != decimal:
             return delimiter

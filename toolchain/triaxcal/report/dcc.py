@@ -48,7 +48,7 @@ def certificate_xml(p: Passport, details: CertificateDetails) -> bytes:
     """
     if not p.checked:
         raise RefusedError(
-            f"{p.delivery.unit.name}/unit.toml, [certificate]",
+            f"{p.delivery.unit.source}, [certificate]",
             "the constants are not checked: there are as many constants as poses",
             expected="more poses than constants",
             remedy="record more poses, or remove the table",

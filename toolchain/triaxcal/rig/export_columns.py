@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.extras import install_command
 from triaxcal.model.types import FloatArray
 from triaxcal.rig.frames import ID_MASK, BoolArray, Frames, widened
 
@@ -22,7 +23,7 @@ def missing(package: str, suffix: str) -> RefusedError:
     return RefusedError(
         f"triaxcal rig export, {suffix}",
         f"missing package: {package}",
-        remedy="install it: pip install 'triaxcal[export]'",
+        remedy="install it: " + install_command("export"),
     )
 
 

@@ -250,7 +250,7 @@ def _steps(values: Values, steps: _Steps, unit: UnitDescription) -> tuple[Step, 
                     values.where(name),
                     f"found {temp:g} degC",
                     expected=f"temperatures of the unit's range, {low:g} to {high:g} degC",
-                    remedy=f"correct the plan, or range_degc in the unit.toml of {unit.name}",
+                    remedy=f"correct the plan, or range_degc in {unit.source}",
                 )
             at[temp] = at.get(temp, ()) + positions
     return tuple(Step(temp, at[temp]) for temp in sorted(at, reverse=steps.direction == "down"))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from triaxcal.base.screentext import table
 from triaxcal.uncertainty.coverage import coverage_factor, effective_dof
 from triaxcal.uncertainty.source import Source
 
@@ -35,7 +36,7 @@ class Line:
         return self.contribution / sd if sd and self.contribution is not None else None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Budget:
     """Uncertainty of one quantity.
 
@@ -57,6 +58,23 @@ class Budget:
     combined: float
     dof: float
     factor: float
+
+    def __str__(self) -> str:
+        head = f"{self.quantity}: +-{self.expanded:.3g} {self.unit} (95 %, k = {self.factor:.2f})"
+        rows = [
+            [
+                "  " + line.source.key.replace("_", " "),
+                "unknown" if line.source.sd is None else f"{line.source.sd:.3g}",
+                line.source.unit.replace("°C", "degC").replace("²", "^2"),
+                "unknown" if line.contribution is None else f"{line.contribution:.3g}",
+                "?" if line.contribution is None else f"{100 * line.share:.1f} %",
+            ]
+            for line in self.lines
+        ]
+        names = ["  source", "size", "unit", f"gives, {self.unit}", "share"]
+        return "\n".join([head, *table(names, rows)])
+
+    __repr__ = __str__
 
     @property
     def expanded(self) -> float:

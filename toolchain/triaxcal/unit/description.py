@@ -80,6 +80,8 @@ class UnitDescription:
         Whether a recording may widen [adc], which says nothing of its bits.
     pair : PairSource or None
         Readings of a pair whose cross-coupling is taken off.
+    source : str
+        Path of its unit.toml, for messages.
     toml : str
         Text of unit.toml that this was read from.
     """
@@ -107,6 +109,7 @@ class UnitDescription:
     pair: PairSource | None = None
     measured: Measured = field(default_factory=Measured)
     toml: str = field(default="", repr=False, compare=False)
+    source: str = field(default=UNIT_FILE, compare=False)
 
 
 def read_unit(folder: Path) -> UnitDescription:
@@ -139,7 +142,8 @@ def unit_of_text(name: str, text: str, source: str) -> UnitDescription:
 def _unit_of_content(name: str, content: bytes, source: str) -> UnitDescription:
     document = toml_document(source, content)
     file = recording_file() if "recording" in document else tilter_file()
-    return replace(_unit_of(name, file.check(source, document)), toml=text_of(content))
+    unit = _unit_of(name, file.check(source, document))
+    return replace(unit, toml=text_of(content), source=source)
 
 
 def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:

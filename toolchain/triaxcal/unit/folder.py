@@ -9,7 +9,7 @@ from pathlib import Path
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import DESCRIPTION, FORMAT, Key, TableKeys
 from triaxcal.base.kinds import pattern
-from triaxcal.base.tomltable import read_toml, shown
+from triaxcal.base.tomltable import did_you_mean, read_toml, shown
 
 UNIT_FILE, UNIT_FORMAT = "unit.toml", 1
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
@@ -58,14 +58,16 @@ def find_unit(folder: Path) -> Path:
     check_unit_name(folder.absolute().name, f"unit {shown(str(folder))}")
     if _is_unit(folder):
         return folder / UNIT_FILE
+    hint = ""
     for units_dir in (folder, folder.parent, folder.parent.parent):
         if names := list_units(units_dir):
             more = f" and {len(names) - 20} more" if len(names) > 20 else ""
             remedy = f"units in {units_dir}: " + ", ".join(names[:20]) + more
+            hint = did_you_mean(folder.name, names) if units_dir == folder.parent else ""
             break
     else:
         remedy = f"`triaxcal init {folder}` writes a first unit.toml"
-    found = f"no {UNIT_FILE} in it" if folder.is_dir() else "no such unit"
+    found = f"no {UNIT_FILE} in it" if folder.is_dir() else f"no such unit{hint}"
     raise RefusedError(str(folder), found, remedy=remedy)
 
 

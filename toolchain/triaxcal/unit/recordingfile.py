@@ -11,7 +11,7 @@ from triaxcal.base.keys import Values, setting
 from triaxcal.base.kinds import FLAG, TEXT, Kind, checked, listed, meaning, whole, word
 
 DELIMITERS: Mapping[str, str] = MappingProxyType(
-    {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+    {"comma": ",", "semicolon": ";", "tab": "\t", "pipe": "|", "space": " "}
 )
 
 ISO = "iso"

@@ -56,7 +56,7 @@ def _refuse_missing(unit: UnitDescription, layout: RecordingLayout, samples: Sam
     unnamed = [face for face in FACES if face not in layout.faces.values()]
     if unnamed:
         raise RefusedError(
-            f"{unit.name}/unit.toml, [recording] faces",
+            f"{unit.source}, [recording] faces",
             f"no label for {', '.join(unnamed)}",
             expected="six faces, +x, -x, +y, -y, +z and -z",
             remedy="name the sections in which these axes point up, or omit faces: the fit then "

@@ -42,7 +42,7 @@ def temperature_findings(unit: UnitDescription, temps_degc: FloatArray | None) -
         return []
     if low > _KELVIN_MIN:
         raise RefusedError(
-            f"{unit.name}/unit.toml, [recording] temperature_unit",
+            f"{unit.source}, [recording] temperature_unit",
             f"poses at {low:.4g} to {high:.4g} degC, and T0 at {t0:g} degC",
             expected="T0 among the poses' temperatures",
             remedy='temperature_unit = "K" if they are kelvin, else state [thermal] t0_degc',
@@ -79,7 +79,7 @@ def thermal_shapes(
     RefusedError
         When unit.toml asks for what the poses' temperatures do not carry.
     """
-    choice, t0, where = unit.thermal, unit.t0_degc, f"{unit.name}/unit.toml, [thermal]"
+    choice, t0, where = unit.thermal, unit.t0_degc, f"{unit.source}, [thermal]"
     nested = [f for f in THERMAL_FUNCTIONS if f.nested]
     functions = [f for f in nested if choice.model in (AUTO, f.name)]
     if not functions:
@@ -146,7 +146,7 @@ def recording_range(
         stated[0] < low - EDGE_DEGC or stated[1] > high + EDGE_DEGC
     ):
         raise RefusedError(
-            f"{unit.name}/unit.toml, [thermal] range_degc",
+            f"{unit.source}, [thermal] range_degc",
             f"{stated[0]:g} to {stated[1]:g} degC",
             expected=f"within {EDGE_DEGC:g} degC of the poses' temperatures, {low:.4g} to "
             f"{high:.4g} degC",

@@ -107,7 +107,7 @@ def _trials(
     if shapes[-1].parameters > 1:
         if unit.terms == "quadratic":
             raise RefusedError(
-                f"{unit.name}/unit.toml, [fit] terms",
+                f"{unit.source}, [fit] terms",
                 f'"quadratic" with angles at {len(temperatures)} temperatures',
                 expected="one temperature, or linear terms",
                 remedy="make a unit of one temperature, or leave it out",

@@ -54,7 +54,7 @@ def refuse_unacceptable(
     if not dwells:
         low, high = calibration.range_degc
         raise RefusedError(
-            f"{unit.name}/unit.toml, [thermal] range_degc",
+            f"{unit.source}, [thermal] range_degc",
             f"no dwell of {measurements.source} lies in {low:g} to {high:g} degC",
             expected="at least one, to check the result",
             remedy="widen the range, or omit it",
@@ -83,7 +83,7 @@ def _refuse_singular_curve(unit: UnitDescription, calibration: Calibration) -> N
     worst = int(condition.argmax())
     if condition[worst] > CONDITION_MAX:
         raise RefusedError(
-            f"{unit.name}/unit.toml, [thermal]",
+            f"{unit.source}, [thermal]",
             f"{calibration.shape.label} makes K singular or nearly so at {temps[worst]:.4g} degC "
             f"(condition number {condition[worst]:.3g})",
             expected=f"a condition number of at most {CONDITION_MAX:g} over the whole range",

@@ -109,7 +109,7 @@ def candidate_shapes(unit: UnitDescription, temps_degc: FloatArray) -> tuple[The
     RefusedError
         When it asks for a function that the temperatures do not determine.
     """
-    choice, t0, where = unit.thermal, unit.t0_degc, f"{unit.name}/unit.toml"
+    choice, t0, where = unit.thermal, unit.t0_degc, unit.source
     if choice.model == AUTO:
         return tuple(s for f in THERMAL_FUNCTIONS for s in f.candidates(temps_degc, t0))
     function = THERMAL_FUNCTIONS[choice.model]
@@ -244,7 +244,7 @@ def _working_range(
         return round(steps[0] * _STEP_DEGC, 1), round(steps[1] * _STEP_DEGC, 1)
     if unit.range_degc[0] < low - EDGE_DEGC or unit.range_degc[1] > high + EDGE_DEGC:
         raise RefusedError(
-            f"{unit.name}/unit.toml, [thermal] range_degc",
+            f"{unit.source}, [thermal] range_degc",
             f"{unit.range_degc[0]:g} to {unit.range_degc[1]:g} degC",
             expected=f"within {EDGE_DEGC:g} degC of the calibrated temperatures, "
             f"{low:.6g} to {high:.6g} degC",

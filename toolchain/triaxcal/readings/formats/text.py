@@ -21,7 +21,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.readings.format import PIECE, Block, Format, Source
 from triaxcal.readings.numbertext import number_of, remedy_of
 from triaxcal.readings.preamble import LOOKED_AT, Line, find_table, split_cells
-from triaxcal.unit.recordingfile import FileLayout
+from triaxcal.unit.recordingfile import DELIMITERS, FileLayout
 
 _LINE_MAX = 1 << 20
 """Characters of a line at most: a document on one line is no table."""
@@ -63,6 +63,7 @@ class TextSource(Source):
             )
         self.names = found.names or ("",) * found.width
         self.numbered = range(found.width)
+        (self.separated,) = (name for name, sign in DELIMITERS.items() if sign == found.delimiter)
         self.findings = found.findings
 
     def _opened(self) -> TextIO:

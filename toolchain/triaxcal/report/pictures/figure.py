@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.extras import install_command
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.fitting.tilter.acceptance import dwells_in_range
 from triaxcal.model.metrological import BIASES, CONSTANT_NAMES, force_from_voltage
@@ -32,7 +33,9 @@ def calibration_figure(fitted: Fitted) -> Figure:
         from matplotlib.figure import Figure as NewFigure  # noqa: PLC0415
     except ImportError as error:
         raise RefusedError(
-            "plot", "the package matplotlib is missing", remedy="pip install 'triaxcal[plot]'"
+            "plot",
+            "the package matplotlib is missing",
+            remedy="install it: " + install_command("plot"),
         ) from error
     figure = NewFigure(figsize=(10, 7), layout="constrained")
     axes = figure.subplots(2, 2)
