@@ -78,6 +78,7 @@ docs: $(WRITER)  ## The documentation as a site: docs/_build/html/index.html
 bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 	@$(BIN)/python bench/calib_header.py
 	@$(BIN)/python bench/series.py
+	@$(BIN)/python bench/long_log.py
 	@$(BIN)/python bench/rig_decode.py
 	@$(BIN)/python bench/rig_receive.py
 	@$(BIN)/python bench/rig_stillness.py

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import errno
 import gc
+import json
 import os
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
@@ -28,6 +30,8 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.extras import install_command
 from triaxcal.batch.order import filled
 from triaxcal.batch.plan import plan_work
+from triaxcal.batch.run import run_series
+from triaxcal.batch.toolchain import toolchain
 from triaxcal.cli.main import main
 from triaxcal.delivery.inputs import files_sha256
 from triaxcal.delivery.unit import deliver
@@ -39,6 +43,8 @@ from triaxcal.readings.format import FORMATS, Block, Format, starts_with
 from triaxcal.readings.opened import RecordingFile
 from triaxcal.readings.quiet import quiet
 from triaxcal.readings.spool import Spool
+from triaxcal.report.files import SOMETIMES
+from triaxcal.report.series.page import series_files
 from triaxcal.report.series.unit import make_unit
 from triaxcal.unit.recordingfile import ClockLayout, FileLayout
 
@@ -342,17 +348,24 @@ def test_a_reader_added_at_run_time_reaches_every_page(tmp_path: Path) -> None:
     folder = unit_of(tmp_path / "TOY-1", Case(csv, "log.toy", "toy", AXES, "t", "us"))
     content = np.column_stack([t_us, a])
     (folder / "log.toy").write_bytes(b"TOYTOYTO" + content.tobytes())
-    run = CliRunner()
+    run, told = CliRunner(), []
     with FORMATS.added(TOY):
         poses = run.invoke(main, ["poses", str(folder)])
         made = run.invoke(main, ["calib", str(folder), "--build", str(tmp_path / "build")])
+        work = plan_work([folder], tmp_path / "many")
+        series = run_series(
+            work, tmp_path / "many", make_unit, map, sometimes=SOMETIMES, report=told.append
+        )
         shown = run.invoke(main, ["calib", "--help"])
         (folder / "log.toy").write_bytes(b"TOYTOYTO" + content.tobytes()[:-3])
         broken = run.invoke(main, ["poses", str(folder)])
     assert poses.exit_code == 0, poses.output
     assert "12 poses" in poses.output
     assert made.exit_code == 0, made.output
+    assert [outcome.refusal for outcome in told] == [""]
+    assert json.loads(series_files(series)["series.json"])["passed"] == 1
     built = tmp_path / "build" / "TOY-1"
+    assert "TOY-1" in (built / "passport.json").read_text(encoding="utf-8")
     for name in ("passport.html", "calibration.json"):
         words = " ".join((built / name).read_text(encoding="utf-8").split())
         assert "ne row of the toy was upside down" in words  # the page begins with a capital
@@ -773,3 +786,26 @@ def test_an_unknown_format_names_the_table_and_what_there_is(tmp_path: Path) -> 
         f"{path}, [recording] format: found 'numpi' (did you mean \"numpy\"?); "
         f"expected one of {', '.join(FORMATS.names)}"
     )
+
+
+def test_a_reader_added_at_run_time_is_part_of_the_toolchain() -> None:
+    before = toolchain()
+    with FORMATS.added(TOY):
+        assert toolchain() != before
+    assert toolchain() == before
+
+
+@pytest.mark.parametrize(("everything", "word"), [("0", "1 skipped"), ("1", "1 failed")])
+def test_a_missing_package_fails_where_all_should_be(
+    everything: str, word: str, tmp_path: Path
+) -> None:
+    test = tmp_path / "test_absent.py"
+    test.write_text("import pytest\ndef test_it(): pytest.importorskip('no_such_package')\n")
+    tests = str(Path(__file__).parents[1])
+    path = os.pathsep.join([tests, os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "conftest", "-c", os.devnull, str(test)],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+        env=os.environ | {"TRIAXCAL_ALL_EXTRAS": everything, "PYTHONPATH": path},
+    )  # fmt: skip
+    assert word in done.stdout

@@ -25,7 +25,7 @@ WITHOUT = "not installed: .venv/bin/pip install -c constraints.txt -e '.[export]
 
 
 def installed(name):
-    return pytest.importorskip(name, reason=f"{name} {WITHOUT}")
+    return pytest.importorskip(name, reason=f"could not import {name}: {WITHOUT}")
 
 
 def _installed_for(suffix):
