@@ -7,6 +7,7 @@ fit ended: the unit's description, the readings, and the rest of the calibration
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -228,6 +229,9 @@ def _saved(source: str, document: Mapping[str, Any]) -> Saved:
         why = f"its thermal function {function!r} is unknown here: only the constants were read"
         return replace(public, without_fit=why)
     held = {key: document[key] for key in _ELSEWHERE}
+    if state["calibration"]["recording"] is not None:  # a number that is not finite is null in JSON
+        rows = held["candidates"]
+        held["candidates"] = [{**r, "condition": _or_infinite(r["condition"])} for r in rows]
     held |= plain({"thermal": public.thermal, "terms": public.terms})
     whole = {**state["calibration"], **held, "reading_unit": public.reading_unit}
     unit = unit_of_text(document["unit"], state["unit_toml"], f"{source}, unit_toml")
@@ -242,6 +246,10 @@ def _saved(source: str, document: Mapping[str, Any]) -> Saved:
     inputs, calibration = str(document["inputs_sha256"]), rebuilt(Calibration, whole, _CUSTOM)
     fitted = Fitted(unit, measurements, inputs, calibration)
     return Saved.of(fitted, source)
+
+
+def _or_infinite(condition: float | None) -> float:
+    return math.inf if condition is None else condition
 
 
 def _curves(source: str, document: Mapping[str, Any]) -> Saved:
