@@ -32,6 +32,7 @@ LONG = {
     "family/test_pair_on_a_tilter.py",
     "family/test_rate_term.py",
     "family/test_real_recordings.py",
+    "family/test_saved.py",
     "family/test_tables.py",
     "family/test_unchecked.py",
     "rig/test_cli_rig.py",
