@@ -183,6 +183,7 @@ def _verdict(made: Passport) -> str:
         _, key = limits.at(r.dwell.temp_degc, delivery.unit.t0_degc)
         by_key[key] = max(by_key.get(key, 0.0), abs(r.error_g))
     at_t0 = by_key.get("limits.at_t0_g")
+    where = "" if made.shown or not made.checked else "at the dwells, not shown everywhere: "
     return "\n".join(
         [
             _entry(
@@ -196,7 +197,7 @@ def _verdict(made: Passport) -> str:
             ),
             _entry(
                 "passed" if made.checked else "NOT CHECKED",
-                f"{_passed(at_t0, limits.at_t0_g)} at T0, "
+                f"{where}{_passed(at_t0, limits.at_t0_g)} at T0, "
                 f"{_passed(by_key.get('limits.over_range_g'), limits.over_range_g)} elsewhere",
             ),
         ]

@@ -27,7 +27,7 @@ class PairSource:
     cross_coupling
         A pair's readings on a dividing head, in the unit's folder; its cross-coupling is removed.
     axes
-        The unit's axes that A and B are.
+        A first, then B.
     """
 
     cross_coupling: str = setting(FILE, example='"pair.csv"')

@@ -74,7 +74,7 @@ def _stated(settings: Settings, temps: FloatArray, t0: float) -> tuple[ThermalSh
 ENTRY = ThermalFunction(
     name=CubicSplineShape.name,
     label=CubicSplineShape.title,
-    doc="Cubic polynomials that meet at knots with equal slope and curvature.",
+    doc="Natural cubic spline: equal slope and curvature at the knots, no curvature at the ends.",
     keys=(knots_key("cubic-spline: T0 or every calibrated temperature, by held-out error"),),
     stated=_stated,
     candidates=_candidates,
