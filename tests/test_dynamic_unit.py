@@ -143,7 +143,7 @@ def test_rows_that_are_doubled_late_or_empty_are_left_out_and_reported(tmp_path:
     lines = csv.read_text(encoding="utf-8").splitlines()
     nothing = "nan," + lines[10].split(",", 1)[1]
     mended = [*lines[:10], lines[9], nothing, *lines[10:20], lines[15], *lines[20:]]
-    csv.write_text("\n".join(mended), encoding="utf-8")
+    csv.write_text("\n".join([*mended, ""]), encoding="utf-8")
     found = read_recording(read_dynamic(folder))
     told = (
         "1 row with the time of the row before left out (1 of them identical in all columns), "

@@ -66,6 +66,7 @@ def write_unit(
     """A unit's folder with its recording."""
     folder.mkdir(parents=True, exist_ok=True)
     text = rows if isinstance(rows, str) else csv_text(rows, header)
+    text += "\n" * (not text.endswith("\n"))
     (folder / "log.csv").write_text(text, encoding="utf-8")
     toml = UNIT.format(name=folder.name, more=more, recording=recording)
     (folder / "unit.toml").write_text(toml, encoding="utf-8")

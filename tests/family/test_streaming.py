@@ -234,6 +234,15 @@ def test_a_last_line_cut_short_is_reported(tmp_path: Path) -> None:
     assert len(found) == len(ROWS) - 1
 
 
+def test_a_last_line_without_line_end_is_reported(tmp_path: Path) -> None:
+    folder = write_unit(tmp_path / "U", ROWS)
+    path = folder / "log.csv"
+    path.write_text(path.read_text(encoding="utf-8")[:-3], encoding="utf-8")
+    found = samples_of(folder)
+    assert found.findings == ("the last line has no line end: it may be cut",)
+    assert len(found) == len(ROWS)
+
+
 def test_two_columns_of_one_name_are_refused_where_they_are_asked_for(tmp_path: Path) -> None:
     text = "t,ax,ay,az,az\n" + "\n".join(
         ",".join(f"{v:.6f}" for v in [*row, row[-1]]) for row in ROWS.tolist()

@@ -108,6 +108,10 @@ class TextSource(Source):
                 block = self._fast(lines, line, numbers, texts)
                 yield block or self._careful(lines, line, numbers, texts, last=not following)
                 line += len(lines)
+                if not following and not lines[-1].endswith("\n"):
+                    # A line that lacks cells has been reported already.
+                    cut = ("the last line has no line end: it may be cut",)
+                    self.findings += cut if self.findings == self._found.findings else ()
                 lines = following
 
     def _fast(
