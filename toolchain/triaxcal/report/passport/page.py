@@ -10,7 +10,14 @@ from triaxcal.codegen.tryout import MethodResult
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Acceptance, Passport
-from triaxcal.report.pictures.curves import HEIGHT, LEFT, WIDTH, curve_panels, uncertainty_panel
+from triaxcal.report.pictures.curves import (
+    HEIGHT,
+    LEFT,
+    RIGHT,
+    WIDTH,
+    curve_panels,
+    uncertainty_panel,
+)
 from triaxcal.report.pictures.residual_panels import residual_panels
 from triaxcal.report.words.firmware import checked_words, file_rows, proven_words, tool_rows
 from triaxcal.report.words.measured import measured_words
@@ -42,7 +49,7 @@ def passport_html(p: Passport) -> bytes:
         "constants": _constants(p),
         "t0": signed(f"{p.delivery.calibration.thermal.t0_degc:g}"),
         "panels": curve_panels(p.delivery.calibration, p.uncertainty),
-        "panel": {"width": WIDTH, "height": HEIGHT, "left": LEFT},
+        "panel": {"width": WIDTH, "height": HEIGHT, "left": LEFT, "right": WIDTH - RIGHT},
         "residuals": residual_panels(p.delivery),
         "before": _largest(p.delivery.methods[0]),
         "after": _largest(p.delivery.chosen),

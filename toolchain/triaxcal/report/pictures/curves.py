@@ -16,7 +16,7 @@ from triaxcal.report.words.numbers import handy, in_unit, signed
 from triaxcal.uncertainty.evaluate import Uncertainty
 
 WIDTH, HEIGHT = 232.0, 150.0
-LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 8.0, 20.0
+LEFT, RIGHT, TOP, BOTTOM = 52.0, 16.0, 8.0, 20.0
 ORDER = (0, 1, 2, 9, 3, 4, 5, 10, 6, 7, 8, 11)
 """A row of panels an output: its three sensitivities and its bias."""
 
