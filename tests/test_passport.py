@@ -99,7 +99,7 @@ def test_page_shows_constants_hashes_and_positions(passports: dict[str, Passport
 
 def test_marks_lie_where_the_values_are() -> None:
     frame = Frame((-40.0, 70.0), (-1.0, 3.0))
-    assert (frame.x(-40.0), frame.x(70.0)) == (40.0, 224.0)
+    assert (frame.x(-40.0), frame.x(70.0)) == (52.0, 216.0)
     assert (frame.y(3.0), frame.y(-1.0)) == (8.0, 130.0)
     assert ticks(-0.93, 3.07, 4) == [0.0, 1.0, 2.0, 3.0]
     assert ticks(-40.0, 70.0, 5) == [-25.0, 0.0, 25.0, 50.0]
