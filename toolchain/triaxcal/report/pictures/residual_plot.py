@@ -56,7 +56,7 @@ def residuals_svg(delivery: Delivery) -> bytes:
             row = _row(groups[first : first + PANELS_PER_ROW], delivery, scale)
             rows.append({"title": title, **row})
     context = {
-        "title": f"{delivery.unit.name}: | |a| - g | before and after compensation, mg",
+        "title": f"{delivery.unit.name}: | |a| - g | with the constants of T0, and compensated, mg",
         "width": WIDTH,
         "height": TOP + len(rows) * ROW_HEIGHT,
         "left": LEFT,
