@@ -352,7 +352,7 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
         read_measurements(tmp_path / "measurements.csv", UNIT)
     assert str(caught.value) == (
         f"{tmp_path}/measurements.csv: cannot be read: no such file or directory; "
-        "put the dwells there, as docs/how-to/add-a-unit.md tells"
+        "put the dwells there, as docs/how-to/add-a-unit.md describes"
     )
     with pytest.raises(RefusedError, match="cannot be read: is a directory"):
         read_measurements(tmp_path, UNIT)

@@ -91,11 +91,11 @@ def test_records_are_columns_by_their_fields(tmp_path: Path) -> None:
 
 
 def test_text_among_numbers_is_refused_with_its_row(tmp_path: Path) -> None:
-    file = opened(tmp_path, {"ax": np.array([1.5, None, "n/a"], object)})
+    file = opened(tmp_path, {"ax": np.array([1.5, None, "broken"], object)})
     with pytest.raises(RefusedError) as refusal:
         list(file.blocks([0]))
     assert str(refusal.value) == (
-        f"{tmp_path}/log.toy, row 3, column ax: found 'n/a'; expected a number; "
+        f"{tmp_path}/log.toy, row 3, column ax: found 'broken'; expected a number; "
         "write the column as numbers, or name another"
     )
 
