@@ -59,13 +59,6 @@ def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str
         )
 
 
-def _report_finishing(count: int) -> None:
-    units = "1 unit" if count == 1 else f"{count} units"
-    click.echo(
-        f"interrupted: finishing {units} under way; interrupt again to stop at once", err=True
-    )
-
-
 def _run(work: Work, build: Path, jobs: int | None, scheduler: str | None) -> SeriesResult:
     console = Console(stderr=True)
     columns = (
@@ -75,7 +68,16 @@ def _run(work: Work, build: Path, jobs: int | None, scheduler: str | None) -> Se
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    made = 0
+    made, interrupted = 0, False
+
+    def report_finishing(count: int) -> None:
+        nonlocal interrupted
+        interrupted = True
+        units = "1 unit" if count == 1 else f"{count} units"
+        click.echo(
+            f"interrupted: finishing {units} under way; interrupt again to stop at once", err=True
+        )
+
     with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("units", total=work.total, completed=len(work.done))
 
@@ -91,9 +93,12 @@ def _run(work: Work, build: Path, jobs: int | None, scheduler: str | None) -> Se
         try:
             return calibrate_series(
                 work, build, jobs=jobs, scheduler=scheduler, outcome=report,
-                finishing=_report_finishing,
+                finishing=report_finishing,
             )  # fmt: skip
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, RuntimeError) as stop:
+            # A second interrupt inside of a lock comes out of `threading` as a RuntimeError.
+            if isinstance(stop, RuntimeError) and not interrupted:
+                raise
             raise RefusedError(
                 "batch",
                 f"interrupted; {len(work.done) + made} of {work.total} units are done",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import closing
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -49,22 +50,23 @@ class _Lines(Source):
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        records = islice(self._records(object_pairs_hook=_object), _NAMES_WITHIN)
-        self._paths = {name: way for _, record in records for name, way in _paths(record).items()}
+        with closing(self._records(object_pairs_hook=_object)) as records:
+            first = (record for _, record in islice(records, _NAMES_WITHIN))
+            self._paths = {name: way for record in first for name, way in _paths(record).items()}
         self.names = tuple(self._paths)
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
         """As `Source.blocks`."""
         pieces = Pieces(str(self._path), self.names, numbers, texts)
         ways = {k: self._paths[self.names[k]] for k in pieces.wanted}
-        records = self._records()
-        while part := list(islice(records, PIECE)):
-            yield pieces.block(
-                {k: column_of([_at(r, way) for _, r in part]) for k, way in ways.items()},
-                np.array([line for line, _ in part]),
-            )
+        with closing(self._records()) as records:
+            while part := list(islice(records, PIECE)):
+                yield pieces.block(
+                    {k: column_of([_at(r, way) for _, r in part]) for k, way in ways.items()},
+                    np.array([line for line, _ in part]),
+                )
 
-    def _records(self, **options: Any) -> Iterator[tuple[int, Any]]:
+    def _records(self, **options: Any) -> Generator[tuple[int, Any], None, None]:
         with self._path.open(encoding="utf-8-sig") as file:
             for line, text in enumerate(file, 1):
                 if text.strip():
