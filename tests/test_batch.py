@@ -254,9 +254,7 @@ def test_a_scheduler_that_is_not_there(address: str) -> None:
 
 def test_distributed_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(
-        RefusedError, match="distributed is missing; install it: .*pip install"
-    ):
+    with pytest.raises(RefusedError, match=r"distributed is missing; install it: .*pip install"):
         connect("tcp://127.0.0.1:9")
 
 
