@@ -48,6 +48,7 @@ LONG = {
     "test_dynamic_plan.py",
     "test_dynamic_together.py",
     "test_exact.py",
+    "test_first_hour.py",
     "test_imu_delivery.py",
     "test_uncertainty.py",
     "test_uncertainty_coverage.py",
