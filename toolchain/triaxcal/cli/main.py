@@ -12,7 +12,7 @@ import click
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
-from triaxcal.cli.options import UnitFolder, WithKinds, example, unit_and_build
+from triaxcal.cli.options import HELP, UnitFolder, WithKinds, example, unit_and_build
 
 SECTIONS = {
     "Calibrate": ("calib", "dynamic", "batch"),
@@ -56,6 +56,7 @@ def main() -> None:
 
 
 @main.command(
+    context_settings=HELP,
     cls=WithKinds,
     epilog=example("triaxcal calib AT-SIM", "triaxcal calib units/AT-SIM --build out"),
 )
@@ -72,10 +73,11 @@ def calib(unit: Path, build: Path) -> None:
 
 
 @main.command(
+    context_settings=HELP,
     epilog=example(
         "triaxcal simulate AT-SIM --seed 7",
         "triaxcal simulate AT-SIM --series 40 --into build/units",
-    )
+    ),
 )
 @click.argument("unit", type=UnitFolder())
 @click.option("--seed", type=int, help="Replaces the seed of truth.toml or imu_truth.toml.")

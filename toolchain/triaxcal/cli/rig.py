@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.cli.options import example
+from triaxcal.cli.options import HELP, example
 from triaxcal.cli.rig_options import (
     PLAIN,
     SECONDS,
@@ -27,7 +27,10 @@ if TYPE_CHECKING:
     from triaxcal.rig.engine import Setup
 
 
-@click.group(epilog=example("triaxcal rig run --bus can0 --unit AT-7", "triaxcal rig run --help"))
+@click.group(
+    context_settings=HELP,
+    epilog=example("triaxcal rig run --bus can0 --unit AT-7", "triaxcal rig run --help"),
+)
 def rig() -> None:
     """Take readings from the tilter rig over CAN."""
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import UnitFolder, build_option, example, say
+from triaxcal.cli.options import HELP, UnitFolder, build_option, example, say
 
 
-@click.group(epilog=example("triaxcal target test AT-SIM"))
+@click.group(context_settings=HELP, epilog=example("triaxcal target test AT-SIM"))
 def target() -> None:
     """Test and measure the generated C on other processors.
 
