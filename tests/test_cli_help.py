@@ -62,12 +62,17 @@ def test_every_help_has_an_example_that_is_accepted(name: str) -> None:
         assert program == "triaxcal"
         assert line.strip().startswith(name)
         command: click.Command = main
+        context = click.Context(main, **main.context_settings)
         while isinstance(command, click.Group) and arguments != ["--help"]:
-            _, found, arguments = command.resolve_command(click.Context(command), arguments)
+            _, found, arguments = command.resolve_command(context, arguments)
             assert found is not None
             command = found
+            if isinstance(command, click.Group):
+                context = click.Context(command, context, **command.context_settings)
         if arguments != ["--help"]:
-            command.make_context(line, arguments)  # refuses what the command does not take
+            # Refuses what the command does not take. With its parent: click keeps the help option
+            # that it made first, and the parent decides whether that has -h.
+            command.make_context(line, arguments, parent=context)
 
 
 @pytest.mark.parametrize("columns", [80, 120])
