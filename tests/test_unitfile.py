@@ -15,6 +15,7 @@ from triaxcal.unit.adc import Adc
 from triaxcal.unit.description import UnitDescription, read_unit
 from triaxcal.unit.folder import check_unit_name, find_unit, list_units
 from triaxcal.unit.limits import Limits
+from triaxcal.unit.priors import Priors
 from triaxcal.unit.thermal import ThermalChoice
 from triaxcal.unit.thermometer import TemperatureSensor
 
@@ -83,6 +84,18 @@ def test_defaults(tmp_path: Path) -> None:
         model_error_max_micro_g=1.0,
         limits=Limits(3e-4, 10e-4),
     )
+
+
+def test_priors_and_terms_are_read(tmp_path: Path) -> None:
+    unit = read_unit(
+        make_unit(
+            tmp_path,
+            with_lines("[priors] scale_factor = 0.008", '[firmware] terms = "own-squares"'),
+        )
+    )
+    assert unit.priors == Priors(scale_factor=0.008)
+    assert (unit.priors.cross_term_rad, unit.priors.own_square_g_per_g2) == (0.010, 0.005)
+    assert unit.firmware_terms == "own-squares"
 
 
 def test_format_1_stays_readable() -> None:
@@ -164,6 +177,15 @@ REFUSED_VALUES = [
     (
         "[compensation] model_error_max_micro_g = 0",
         "found 0; expected a number from 0.001 to 1e+06",
+    ),
+    ("[priors] cross_term_rad = 0", "found 0; expected a number from 1e-07 to 1"),
+    ("[priors] own_square_g_per_g2 = -0.005", "found -0.005; expected a number from 1e-09 to 1"),
+    (
+        '[firmware] terms = "own-square"',
+        (
+            "found 'own-square' (did you mean \"own-squares\"?); "
+            'expected one of "auto", "linear", "own-squares", "quadratic"'
+        ),
     ),
     ("[limits] at_t0_g = -3e-4", "found -0.0003; expected a number from 1e-09 to 1"),
     ("[limits] over_range_g = 2", "found 2; expected a number from 1e-09 to 1"),

@@ -25,6 +25,7 @@ from triaxcal.unit.folder import (
 from triaxcal.unit.limits import LIMITS, RECORDED_LIMITS, Limits
 from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.pair import QUADRATIC, PairSource, pair_source
+from triaxcal.unit.priors import AUTO, FIRMWARE, PRIORS, FirmwareChoice, Priors
 from triaxcal.unit.recording import RECORDING, RecordingLayout, recording_layout
 from triaxcal.unit.site import SITE, STANDARD_GRAVITY_M_PER_S2, Site
 from triaxcal.unit.thermal import Temperatures, ThermalChoice, thermal_choice, thermal_table
@@ -33,7 +34,9 @@ from triaxcal.unit.uncertainty import UNCERTAINTY, StatedUncertainty
 
 
 def _common() -> tuple[TableKeys, ...]:
-    return FIT, SENSOR, compensation_table(), UNCERTAINTY, CERTIFICATE, MEASURED, QUADRATIC
+    compensation = compensation_table()
+    more = UNCERTAINTY, CERTIFICATE, MEASURED, QUADRATIC
+    return FIT, PRIORS, SENSOR, compensation, FIRMWARE, *more
 
 
 def tilter_file() -> FileKeys:
@@ -80,6 +83,9 @@ class UnitDescription:
         Whether a recording may widen [adc], which says nothing of its bits.
     pair : PairSource or None
         Readings of a pair whose cross-coupling is taken off.
+    priors : Priors
+    firmware_terms : str
+        One of `unit.priors.FIRMWARE_TERMS`.
     source : str
         Path of its unit.toml, for messages.
     toml : str
@@ -107,6 +113,8 @@ class UnitDescription:
     loss: str = "linear"
     adc_open: bool = False
     pair: PairSource | None = None
+    priors: Priors = field(default_factory=Priors)
+    firmware_terms: str = AUTO
     measured: Measured = field(default_factory=Measured)
     toml: str = field(default="", repr=False, compare=False)
     source: str = field(default=UNIT_FILE, compare=False)
@@ -174,5 +182,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         loss=fit.loss,
         adc_open=recording is not None and not adc,
         pair=pair_source(tables["quadratic"]),
+        priors=tables["priors"].record(Priors),
+        firmware_terms=tables["firmware"].record(FirmwareChoice).terms,
         measured=tables["measured"].record(Measured),
     )

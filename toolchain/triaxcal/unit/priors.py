@@ -1,0 +1,61 @@
+"""[priors] and [firmware] of unit.toml: what is known of every sensor of a type beforehand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from triaxcal.base.keys import TableKeys, setting
+from triaxcal.base.kinds import number, word
+
+AUTO, LINEAR, OWN_SQUARES, QUADRATIC_TERMS = "auto", "linear", "own-squares", "quadratic"
+FIRMWARE_TERMS = (AUTO, LINEAR, OWN_SQUARES, QUADRATIC_TERMS)
+
+
+@dataclass(frozen=True)
+class Priors:
+    """[priors]: what is known of the constants before any reading.
+
+    Each is the standard deviation of a normal distribution about zero: of every sensor of this
+    type, how far its constants stray from the ideal.
+
+    Attributes
+    ----------
+    cross_term_rad
+        Standard deviation of each cross term of K, of its scale factor: misalignment.
+    scale_factor
+        Of each scale factor against the mean of the three, relative: 0.02 is 2 %.
+    own_square_g_per_g2
+        Of the square of an axis' own acceleration in its output, K2.
+    product_g_per_g2
+        Of each other product of two accelerations in an output.
+    bias_g
+        Of each bias against the reading of 0 g.
+    mean_scale
+        Of the mean of the scale factors against the nominal one, where it is known, relative.
+    """
+
+    cross_term_rad: float = setting(number(1e-7, 1.0), 0.010, "rad")
+    scale_factor: float = setting(number(1e-7, 1.0), 0.02)
+    own_square_g_per_g2: float = setting(number(1e-9, 1.0), 0.005, "g/g^2")
+    product_g_per_g2: float = setting(number(1e-9, 1.0), 3e-4, "g/g^2")
+    bias_g: float = setting(number(1e-6, 100.0), 0.1, "g")
+    mean_scale: float = setting(number(1e-6, 10.0), 0.1)
+
+
+@dataclass(frozen=True)
+class FirmwareChoice:
+    """[firmware]: which routine the firmware runs.
+
+    Attributes
+    ----------
+    terms
+        Terms beyond the twelve constants in the C. auto: those whose effect over the working range
+        matters against the uncertainty. linear: none. own-squares: the square of each axis' own
+        acceleration. quadratic: all products. State it so that all units of a series run one
+        routine.
+    """
+
+    terms: str = setting(word(FIRMWARE_TERMS), AUTO)
+
+
+PRIORS, FIRMWARE = TableKeys.of(Priors), TableKeys.of(FirmwareChoice)
