@@ -79,13 +79,19 @@ def _read(kind: Any, data: Any, custom: Custom) -> Any:
     elif kind in custom:
         value = custom[kind][1](data)
     elif isinstance(kind, type) and dataclasses.is_dataclass(kind):
-        names = [f.name for f in dataclasses.fields(kind)]
+        # An older file lacks what was added since: the field's default is what it meant.
+        names = [f.name for f in dataclasses.fields(kind) if f.name in data or _required(f)]
         value = kind(**{n: _read(_hints(kind)[n], data[n], custom) for n in names})
     elif kind is float:
         value = math.nan if data is None else float(data)
     elif kind in (int, str, bool) and not isinstance(data, kind):
         raise TypeError(f"{data!r} is no {kind.__name__}")
     return value
+
+
+def _required(field: dataclasses.Field[Any]) -> bool:
+    missing = dataclasses.MISSING
+    return field.default is missing and field.default_factory is missing
 
 
 def _with_nan(value: Any) -> Any:

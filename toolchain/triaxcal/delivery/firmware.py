@@ -10,6 +10,7 @@ from triaxcal.codegen.outputs.output import Job
 from triaxcal.codegen.outputs.registry import output_files
 from triaxcal.codegen.tryout import model_error_g
 from triaxcal.delivery.fitted import Fitted
+from triaxcal.fitting.converter import input_words
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.model.methods.compensation import Compensation, compensate
@@ -91,12 +92,13 @@ def _files(fitted: Fitted, compensation: Compensation, plan: Plan) -> dict[str, 
 
 
 def _reading_note(unit: UnitDescription, calibration: Calibration) -> tuple[str, ...]:
-    """What a raw code is where the readings are a recording's, and no volts."""
+    """What a raw code is where the readings are a recording's: its column, and no volts."""
     reading = calibration.reading_unit
+    columns = input_words(calibration.inputs, "raw_code")
     if reading == "V":
-        return ()
+        return tuple(columns)
     code = f"{unit.adc.volts_per_code:.9g} {reading}"
-    return (f"raw code = reading / {code}; V below stands for {reading}",)
+    return (*columns, f"raw code = reading / {code}; V below stands for {reading}")
 
 
 def _constants_at_t0(calibration: Calibration) -> list[str]:

@@ -21,6 +21,7 @@ from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.device import Device
 from triaxcal.dynamic.imumodel import imu_model, left_out
 from triaxcal.dynamic.unit import DynamicUnit, calibrate_described
+from triaxcal.fitting.converter import plain_name
 from triaxcal.fixedpoint.gyro import TriadDescription
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.curves import ThermalModel
@@ -136,10 +137,25 @@ def _provenance(
             f"both triads from {done.unit.recording.name}, {low:g} to {high:g} degC",
             f"accelerometer code: {accel.bits} bits for {accel.full_scale_v:.9g} g full scale",
             f"gyro code: {gyro.bits} bits for {gyro_deg_per_s:.9g} deg/s full scale",
+            *turned_columns(done.unit),
             "V below stands for g in the accelerometer, for rad/s in the gyro",
             *(f"not corrected: {title}" for title in omitted),
         ),
     )
+
+
+def turned_columns(unit: DynamicDescription) -> list[str]:
+    """Columns of both triads, where a sign is turned: the constants belong to the turned codes."""
+    lines = []
+    for quantity, name in ((q, q.name) for q in unit.quantities if q.name in ("force", "rate")):
+        turned = (quantity.convert(np.ones((1, 3)))[0] < 0.0).tolist()
+        columns = [
+            f"{'-' * minus}{plain_name(str(column))}"
+            for column, minus in zip(quantity.columns, turned, strict=True)
+        ]
+        if any(turned):
+            lines.append(f"raw x, y, z of the {name}: columns {', '.join(columns)}; - is -code")
+    return lines
 
 
 def _model_errors(

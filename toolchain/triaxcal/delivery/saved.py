@@ -137,6 +137,8 @@ def _beyond_the_tilter(calibration: Calibration) -> dict[str, Any]:
             "range_k_per_s": list(rate.range_k_per_s),
         }
     recording = calibration.recording
+    if calibration.inputs:
+        found["inputs"] = list(calibration.inputs)
     if calibration.notes:
         found["findings"] = list(calibration.notes)
     if recording is not None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.fitting.converter import as_converted, signs_of
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.pair.cross_coupling import stated_pair
 from triaxcal.fitting.recorded.calibrate import calibrate_poses
@@ -35,6 +36,7 @@ def calibrate_recording(
 ) -> tuple[UnitDescription, MeasurementSet, Calibration]:
     """Unit with its raw codes settled, the poses as dwells, and the calibration.
 
+    Readings and constants are those of the columns as the converter gives them (`converter`).
     `given` are columns of a program, in place of the recording's file.
 
     Raises
@@ -55,7 +57,7 @@ def calibrate_recording(
             reading_unit=layout.acceleration_unit,
             notes=(*samples.findings, *found.notes, *unseen),
         )
-        return unit, measurements, calibration
+        return unit, *as_converted(layout, measurements, calibration)
     if layout.angles is not None:
         measurements, calibration = calibrate_table(unit, layout, layout.angles, samples, known)
     else:
@@ -64,7 +66,8 @@ def calibrate_recording(
     assert recording is not None
     of_pair = () if pair is None else pair.findings
     recording = replace(recording, findings=(*recording.findings, *of_pair))
-    return unit, measurements, replace(calibration, recording=recording, pair=pair)
+    calibration = replace(calibration, recording=recording, pair=pair)
+    return unit, *as_converted(layout, measurements, calibration)
 
 
 def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Samples) -> Adc:
@@ -72,7 +75,7 @@ def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Sample
     adc = unit.adc
     lsb = adc.volts_per_code
     # Half a code: readings in other units than counts are not rounded to codes.
-    extremes = samples.extremes(READING)
+    extremes = samples.extremes(READING) * signs_of(layout.acceleration)
     low, high = float(extremes.min()) / lsb + 0.5, float(extremes.max()) / lsb - 0.5
     if adc.code_min <= low and high <= adc.code_max:
         return adc

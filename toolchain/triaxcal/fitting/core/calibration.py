@@ -130,6 +130,10 @@ class Calibration:
         Part of `terms` that a pair on a dividing head has shown.
     notes : tuple of str
         What the user should know about the readings, where they are no `recording`'s.
+    inputs : tuple of str
+        Columns of x, y, z as unit.toml names them, as "-ACC2", where the readings are a recording.
+        The constants are those of the columns as the converter gives them: a minus is in K and U0.
+        Empty in a file of triaxcal 0.1.0: its readings have the signs.
     """
 
     serial: str
@@ -148,6 +152,7 @@ class Calibration:
     reading_unit: str = "V"
     pair: PairTerms | None = None
     notes: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
 
     @property
     def findings(self) -> tuple[str, ...]:

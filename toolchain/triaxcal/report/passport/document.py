@@ -30,6 +30,7 @@ def passport_json(p: Passport) -> bytes:
         "inputs_sha256": d.inputs_sha256,
         "coverage_probability": LEVEL,
         "result": _result(p),
+        **({"inputs": list(d.calibration.inputs)} if d.calibration.inputs else {}),
         "acceptance": [
             {
                 "where": a.where,

@@ -7,6 +7,7 @@ from typing import Any
 from triaxcal import __version__
 from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import MethodResult
+from triaxcal.fitting.converter import input_words
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Acceptance, Passport
@@ -77,6 +78,7 @@ def _identity(p: Passport) -> dict[str, Any]:
             ("Serial number", d.unit.serial),
             ("Working range", signed(f"{low:g} to {high:g} °C")),
             ("Measured", signed(measured_words(d).replace("degC", "°C"))),
+            *[("Input of the C", words) for words in input_words(d.calibration.inputs, "raw_code")],
             *_left_out(d.calibration),
             ("Local gravity", f"{d.unit.gravity_g * 9.80665:.6g} m/s²"),
             ("Thermal model", f"{signed(d.calibration.shape.label.replace('degC', '°C'))}"),
