@@ -389,9 +389,13 @@ def test_an_interrupt_is_told_and_the_next_run_goes_on(
 
 @pytest.mark.parametrize("times", [1, 2])
 def test_ctrl_c_while_workers_start_is_one_line(bench: Path, tmp_path: Path, times: int) -> None:
-    """A terminal interrupts all of its processes, those as well that do not ignore it yet."""
+    """A terminal interrupts all of its processes, those as well that do not ignore it yet.
+
+    What a script starts in the background ignores SIGINT, and so would the tests' own children.
+    """
+    heeding = ["env", "--default-signal=INT", sys.executable, "-m", "triaxcal"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "triaxcal", "batch", "units/AT-CHERNIAK", "--build", str(tmp_path)],
+        [*heeding, "batch", "units/AT-CHERNIAK", "--build", str(tmp_path)],
         cwd=bench, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         start_new_session=True,
     )  # fmt: skip
