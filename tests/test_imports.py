@@ -18,6 +18,7 @@ MAY_IMPORT = {
     "readings": {"base", "model", "unit"},
     "poses": {"base", "model", "unit", "readings"},
     "fitting": {"base", "model", "unit", "readings", "poses"},
+    "diagnosis": {"base", "model", "unit", "readings", "fitting"},
     "dynamic": {"base", "model", "unit", "readings", "poses"},
     "fixedpoint": {"base", "model", "unit"},
     "codegen": {"base", "model", "unit", "readings", "fixedpoint"},
@@ -27,7 +28,8 @@ MAY_IMPORT = {
     "rig": {"base", "model", "unit", "readings", "simulation"},
     "keytable": {"base", "unit", "dynamic", "simulation", "design", "rig"},
     "delivery": {
-        "base", "model", "unit", "readings", "poses", "fitting", "dynamic", "fixedpoint", "codegen",
+        "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
+        "fixedpoint", "codegen",
     },
     "targets": {
         "base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery",
@@ -38,8 +40,8 @@ MAY_IMPORT = {
     },
     "batch": {"base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery"},
     "report": {
-        "base", "model", "unit", "readings", "poses", "fitting", "dynamic", "fixedpoint", "codegen",
-        "uncertainty", "delivery", "batch",
+        "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
+        "fixedpoint", "codegen", "uncertainty", "delivery", "batch",
     },
 }  # fmt: skip
 """What each room may import: what lies below it. None but the API imports report, which reads all,

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from triaxcal.api.calibration import Calibration, Diagnosis, fit, load
     from triaxcal.api.delivery import Delivered, deliver
+    from triaxcal.api.diagnosis import diagnose
     from triaxcal.api.files import key_schema, write_first_file
     from triaxcal.api.firmware import CompiledFirmware, Firmware, firmware
     from triaxcal.api.imu import (
@@ -57,8 +58,8 @@ __all__ = [
     "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "Firmware", "Imu",
     "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck", "MeasurementPlan",
     "RefusedError", "SeriesResult", "Study", "Unit", "UsageError", "Verdict", "Verification",
-    "__version__", "calibrate_series", "compare_history", "cross_coupling", "deliver", "find_poses",
-    "firmware", "firmware_imu", "fit", "fit_imu", "key_schema", "load", "load_imu",
+    "__version__", "calibrate_series", "compare_history", "cross_coupling", "deliver", "diagnose",
+    "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "key_schema", "load", "load_imu",
     "plan_measurements", "plan_motion", "read_imu", "read_unit", "simulate", "simulate_series",
     "study_drift", "verify_unit", "write_first_file",
 ]  # fmt: skip
@@ -66,6 +67,7 @@ __all__ = [
 _MODULES = {
     "triaxcal.api.calibration": ("Calibration", "Diagnosis", "fit", "load"),
     "triaxcal.api.delivery": ("Delivered", "deliver"),
+    "triaxcal.api.diagnosis": ("diagnose",),
     "triaxcal.api.files": ("key_schema", "write_first_file"),
     "triaxcal.api.firmware": ("CompiledFirmware", "Firmware", "firmware"),
     "triaxcal.api.imu": (

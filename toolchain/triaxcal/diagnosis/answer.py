@@ -1,0 +1,201 @@
+"""`diagnose`: which cause explains contradictory readings, and what the data cannot tell apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from triaxcal.base.screentext import table
+from triaxcal.diagnosis.core.evidence import Judged
+from triaxcal.diagnosis.core.readings import Readings, readings_of
+from triaxcal.diagnosis.nextdwell import Request, next_dwell
+from triaxcal.diagnosis.ranking import Ranked, rank
+from triaxcal.diagnosis.remaining import Remaining, remaining
+from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.unit.description import UnitDescription
+
+MARGIN = 3.0
+"""Log evidence within which causes are one answer: odds of 20 to 1."""
+_EQUIVALENT = 0.5
+"""Difference of log likelihood below which readings cannot tell two causes at all."""
+_FAR_BEHIND = 12.0
+"""Log evidence behind the best, beyond which no dwell is asked for to tell a second cause."""
+_SHOWN = 6
+"""Amplitudes that are shown of a cause; more are those of a curve."""
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """How large a mistake is.
+
+    Attributes
+    ----------
+    name, unit : str
+    value, sd : float
+        In `unit`.
+    """
+
+    name: str
+    unit: str
+    value: float
+    sd: float
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.value:+.3g} +- {self.sd:.2g} {self.unit}"
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A cause at its most probable place.
+
+    Attributes
+    ----------
+    cause, label : str
+        Name in the registry, and for people.
+    place : str
+        "TP3 at 20 degC (row 9)"; "" where there is only one.
+    rows : tuple of int
+        Lines of the file that it is about.
+    log_evidence : float
+        Natural logarithm of its odds against a sound unit, prior odds included.
+    change : str
+        What undoing it changes.
+    amplitudes : tuple of Amplitude
+    remaining : Remaining
+        Held-out errors with the mistake undone.
+    apart : str
+        The datum that would tell it from causes that look the same.
+    """
+
+    cause: str
+    label: str
+    place: str
+    rows: tuple[int, ...]
+    log_evidence: float
+    change: str
+    amplitudes: tuple[Amplitude, ...]
+    remaining: Remaining
+    apart: str
+    judged: Judged = field(repr=False, compare=False)
+
+    @property
+    def name(self) -> str:
+        """Label and place."""
+        return f"{self.label}, {self.place}" if self.place else self.label
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis:
+    """Causes of one unit's readings, ranked.
+
+    Attributes
+    ----------
+    suspects : tuple of Suspect
+        The best place of each cause that was judged with care, and others as good.
+    answer : tuple of Suspect
+        Those that the readings do not tell from the best; empty where a sound unit is more probable
+        than any cause.
+    sound : Remaining
+        Held-out errors of the readings as they are.
+    request : Request or None
+        The further dwell that would separate the two best.
+    """
+
+    suspects: tuple[Suspect, ...]
+    answer: tuple[Suspect, ...]
+    sound: Remaining
+    request: Request | None
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a cause is more probable than a sound unit."""
+        return bool(self.answer)
+
+    @property
+    def sentence(self) -> str:
+        """The answer in one line: the best cause, what it would change, and what else it may be."""
+        if not self.answer:
+            return "no cause is more probable than a sound unit"
+        best = self.answer[0]
+        text = f"most probably {best.name}: {best.change}, {best.remaining}"
+        others = [s.name for s in self.answer[1:]]
+        if others:
+            text += f"; the readings cannot tell it from {' or '.join(others)}"
+            text += f" (what would: {best.apart})"
+        return text
+
+    def __str__(self) -> str:
+        rows = [(s.log_evidence, s.remaining, f"{s.name}: {s.change}") for s in self.suspects]
+        rows.append((0.0, self.sound, "none: the readings as they are, of a sound unit"))
+        rows.sort(key=lambda r: -r[0])
+        head = ("ln odds", "held out", "in checks", "cause, and what undoing it means")
+        cells = [(f"{odds:.1f}", left.held_out, left.checks, text) for odds, left, text in rows]
+        lines = [*table(head, cells, left=(3,)), "", self.sentence]
+        if self.answer:
+            lines += [f"  {a}" for a in self.answer[0].amplitudes[:_SHOWN]]
+        if self.request is not None:
+            lines.append(self.request.between(self.suspects[0].name, self.suspects[1].name))
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+
+def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
+    """Rank the causes that could explain the readings of a unit on a tilter.
+
+    Every cause is a small model with its own parameters; they compete by their evidence, in which
+    each pays for its parameters and for the number of its places.
+    """
+    readings = readings_of(unit, measurements)
+    sound, ranked = rank(readings)
+    base = sound.fit.log_evidence
+    suspects = [_suspect(r, j, readings, base) for r in ranked for j in r.places]
+    suspects.sort(key=lambda s: -s.log_evidence)
+    best = suspects[0]
+    answer = [
+        s
+        for s in suspects
+        if s.log_evidence > best.log_evidence - MARGIN or _equivalent(s.judged, best.judged)
+    ]
+    if best.log_evidence <= 0.0:
+        answer = []
+    second = suspects[1] if len(suspects) > 1 else None
+    request = None
+    if answer and second is not None and (second.log_evidence > best.log_evidence - _FAR_BEHIND):
+        request = next_dwell(readings, best.judged, second.judged)
+    return Diagnosis(_shown(suspects), tuple(answer), remaining(readings), request)
+
+
+def _equivalent(one: Judged, other: Judged) -> bool:
+    return abs(one.log_likelihood - other.log_likelihood) < _EQUIVALENT
+
+
+def _shown(suspects: list[Suspect]) -> tuple[Suspect, ...]:
+    """The best place of each cause, and further places that are nearly as good."""
+    best: dict[str, float] = {}
+    shown = []
+    for s in suspects:
+        first = best.setdefault(s.cause, s.log_evidence)
+        if s.log_evidence > first - MARGIN:
+            shown.append(s)
+    return tuple(shown)
+
+
+def _suspect(ranked: Ranked, judged: Judged, readings: Readings, base: float) -> Suspect:
+    hypothesis = judged.hypothesis
+    amplitudes = tuple(
+        Amplitude(p.name, p.unit, float(v) * p.per_unit, float(sd) * p.per_unit)
+        for p, v, sd in zip(hypothesis.parameters, judged.amplitudes, judged.sd, strict=True)
+    )
+    mended = hypothesis.undo(readings, judged.amplitudes)
+    return Suspect(
+        ranked.cause.name,
+        ranked.cause.label,
+        hypothesis.place,
+        tuple(int(r) for r in hypothesis.rows),
+        judged.log_evidence - base,
+        hypothesis.change,
+        amplitudes,
+        remaining(mended),
+        ranked.cause.apart,
+        judged,
+    )

@@ -1,0 +1,1 @@
+"""Causes of contradictory readings, one file each."""

@@ -1,0 +1,49 @@
+"""Outputs of inverted sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo
+from triaxcal.diagnosis.core.readings import Readings
+from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+
+
+def _hypotheses(known: Known) -> Iterator[Hypothesis]:
+    sets = [*combinations(range(3), 1), *combinations(range(3), 2), (0, 1, 2)]
+    sets = sets if known.readings.polarity else sets[:-1]
+    for outputs in sets:
+        names = " and ".join(AXES[i] for i in outputs)
+        plural = "s" if len(outputs) > 1 else ""
+        yield Hypothesis(
+            f"output{plural} {names}",
+            _inverted(outputs),
+            change=f"with output{plural} {names} inverted",
+            places=float(len(sets)),
+            # A stated polarity is believed, and two inverted outputs are rarer than one.
+            log_prior=-(3.0 if known.readings.polarity else 0.0) - (len(outputs) - 1.0),
+        )
+
+
+def _inverted(outputs: tuple[int, ...]) -> Undo:
+    signs = np.where(np.isin(np.arange(3), outputs), -1.0, 1.0)
+
+    def undo(readings: Readings, _amplitudes: FloatArray) -> Readings:
+        return readings.but(outputs=readings.outputs * signs)
+
+    return undo
+
+
+ENTRY = Cause(
+    name="polarity",
+    label="polarity of an output",
+    doc="An output falls where the force along its axis rises, and the description says otherwise.",
+    hypotheses=_hypotheses,
+    apart="the data sheet's polarity, or the sign of each output with a known face upward",
+    discrete=True,
+    rank=32,
+)

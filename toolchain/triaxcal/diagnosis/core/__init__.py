@@ -1,0 +1,1 @@
+"""What every cause is judged with: readings in g, the model of a sound unit, the evidence."""

@@ -1,0 +1,150 @@
+"""What a cause is: the places where it can have struck, and what it did to the readings there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from triaxcal.diagnosis.core.readings import Readings, rows_in_words
+from triaxcal.diagnosis.core.sound import BendFeatures, residuals
+from triaxcal.model.types import BoolArray, FloatArray, IntArray
+
+Undo = Callable[[Readings, FloatArray], Readings]
+"""Readings and amplitudes (in g or rad) -> the readings without the mistake."""
+SIZES_G = (0.5e-3, 5e-3, 50e-3, 500e-3)
+"""Prior standard deviations of an amplitude; each as probable as the others."""
+_SMALL = 1e-5
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An amplitude as a reader sees it.
+
+    Attributes
+    ----------
+    name, unit : str
+    per_unit : float
+        `unit` per g or rad of the amplitude.
+    """
+
+    name: str
+    unit: str = "mg"
+    per_unit: float = 1e3
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A cause at one place.
+
+    Attributes
+    ----------
+    place : str
+        "TP3", "rows 13-18": where, in words; "" where there is only one.
+    undo : Undo
+        Applied to further dwells as well it says what they would read: it must go by rows, blocks,
+        positions and temperatures, and by no fixed arrays.
+    parameters : tuple of Parameter
+        Amplitudes that the readings determine.
+    rows : array of int
+        Lines of the file.
+    change : str
+        What undoing it changes: "+45 for -45 degC in rows 13-18".
+    places : float
+        How many places there are: each is as probable as the others.
+    log_prior : float
+        Logarithm of what makes this place less probable than others.
+    sizes : tuple of float
+        Prior standard deviations of the amplitudes.
+    noise : tuple of float
+        Factors on the stated noise that are tried instead of the usual ones.
+    unused : array of bool, shape (n, 3), or None
+        Outputs that the cause itself explains, with `log_density` (ln g^-1).
+    """
+
+    place: str
+    undo: Undo
+    parameters: tuple[Parameter, ...] = ()
+    rows: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    change: str = ""
+    places: float = 1.0
+    log_prior: float = 0.0
+    sizes: tuple[float, ...] = SIZES_G
+    noise: tuple[float, ...] = ()
+    unused: BoolArray | None = None
+    log_density: float = 0.0
+
+    @property
+    def where(self) -> str:
+        """Rows, where it is about some of them."""
+        return rows_in_words(self.rows) if len(self.rows) else ""
+
+    def columns(self, readings: Readings, theta: FloatArray, about: FloatArray) -> FloatArray:
+        """Effect of each amplitude on the rows, about some amplitudes, shape (n, k)."""
+        base = residuals(self.undo(readings, about), theta)
+        effects = []
+        for k in range(len(self.parameters)):
+            step = np.zeros(len(self.parameters))
+            step[k] = _SMALL
+            effects.append((base - residuals(self.undo(readings, about + step), theta)) / _SMALL)
+        return np.stack(effects, axis=1)
+
+
+@dataclass(frozen=True)
+class Known:
+    """What a cause may look at when it lists its places.
+
+    Attributes
+    ----------
+    readings : Readings
+    theta : array
+        Constants of the first fit.
+    residual : array, shape (dwells, 3)
+        Of the first fit, in its standard deviations; of a check dwell in column 0.
+    standing_out : tuple of int
+        Rows of the model that stand out one after the other, when those before are left out.
+    sensitivity_v_per_g : array, shape (3,), or None
+        Nominal ones, where the description states them.
+    tolerance : float
+        Of the nominal sensitivity, relative.
+    """
+
+    readings: Readings
+    theta: FloatArray
+    standing_out: tuple[tuple[int, int], ...] = ()
+    sensitivity_v_per_g: FloatArray | None = None
+    tolerance: float = 0.1
+
+    @cached_property
+    def bends(self) -> BendFeatures:
+        """Functions of temperature that bend faster than the thermal functions."""
+        return BendFeatures(self.readings.temps_degc)
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One kind of mistake.
+
+    Attributes
+    ----------
+    name, label, doc : str
+        For files, for people, for the documentation.
+    hypotheses : Callable
+        Known -> the places where it can have struck.
+    apart : str
+        The datum that would tell it from what looks the same.
+    discrete : bool
+        Whether undoing it changes labels or signs, and nothing by an amount.
+    rank : int
+        Place in lists.
+    """
+
+    name: str
+    label: str
+    doc: str
+    hypotheses: Callable[[Known], Iterable[Hypothesis]]
+    apart: str
+    discrete: bool = False
+    rank: int = 100
