@@ -51,17 +51,18 @@ if TYPE_CHECKING:
     from triaxcal.base.errors import RefusedError, UsageError
     from triaxcal.delivery.judgement import LimitCheck, Verdict
     from triaxcal.uncertainty.budget import Budget
+    from triaxcal.uncertainty.check import FieldCheck
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "Firmware", "Imu",
-    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck", "MeasurementPlan",
-    "RefusedError", "SeriesResult", "Study", "Unit", "UsageError", "Verdict", "Verification",
-    "__version__", "calibrate_series", "compare_history", "cross_coupling", "deliver", "diagnose",
-    "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "key_schema", "load", "load_imu",
-    "plan_measurements", "plan_motion", "read_imu", "read_unit", "simulate", "simulate_series",
-    "study_drift", "verify_unit", "write_first_file",
+    "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "FieldCheck", "Firmware",
+    "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck",
+    "MeasurementPlan", "RefusedError", "SeriesResult", "Study", "Unit", "UsageError", "Verdict",
+    "Verification", "__version__", "calibrate_series", "compare_history", "cross_coupling",
+    "deliver", "diagnose", "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "key_schema",
+    "load", "load_imu", "plan_measurements", "plan_motion", "read_imu", "read_unit", "simulate",
+    "simulate_series", "study_drift", "verify_unit", "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
@@ -84,6 +85,7 @@ _MODULES = {
     "triaxcal.base.errors": ("RefusedError", "UsageError"),
     "triaxcal.delivery.judgement": ("LimitCheck", "Verdict"),
     "triaxcal.uncertainty.budget": ("Budget",),
+    "triaxcal.uncertainty.check": ("FieldCheck",),
 }  # fmt: skip
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from triaxcal.api.arguments import refuse_other_length, temperatures
+from triaxcal.api.field import InTheField
 from triaxcal.api.unit import Unit
 from triaxcal.base.arrays import finite
 from triaxcal.base.errors import RefusedError
@@ -52,7 +53,7 @@ class Diagnosis:
     __repr__ = __str__
 
 
-class Calibration:
+class Calibration(InTheField):
     """The twelve constants of one unit over temperature, a = K(T)^-1 (U - U0(T)).
 
     Made by `fit` or `load`. U are readings in volts, or in the unit of the recording

@@ -80,6 +80,30 @@ def unit_and_build(command: Callable[..., Any]) -> Callable[..., Any]:
     return _UNIT(_BUILD(command))
 
 
+DELIVERED = click.option(
+    "--build",
+    type=click.Path(path_type=Path),
+    default=Path("build"),
+    show_default=True,
+    help="Folder with the delivered units.",
+)
+
+
+def field_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """--layout and --gravity of a recording from the field."""
+    layout = click.option(
+        "--layout",
+        type=click.Path(path_type=Path),
+        help="TOML file with the [recording] of the file, if it is not that of the unit.",
+    )
+    gravity = click.option(
+        "--gravity",
+        type=float,
+        help="Local gravity where it was recorded, m/s^2; default: that of the unit.",
+    )
+    return layout(gravity(command))
+
+
 class WithKinds(click.Command):
     """A command whose help lists what unit.toml can choose from."""
 

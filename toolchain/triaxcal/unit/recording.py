@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.keys import TableKeys, Values, setting
+from triaxcal.base.keys import FileKeys, TableKeys, Values, setting
 from triaxcal.base.kinds import Kind, number, word
+from triaxcal.base.tomltable import read_toml
 from triaxcal.unit.presets import PRESETS
 from triaxcal.unit.recordingfile import (
     COLUMN,
@@ -211,6 +213,24 @@ class RecordingLayout(WrittenFile, _RecordedFile):
 
 
 RECORDING = TableKeys.of(RecordingLayout)
+
+
+def read_layout(path: Path) -> RecordingLayout:
+    """Layout of a recording from the table [recording] of a TOML file, as a unit.toml is one.
+
+    Raises
+    ------
+    RefusedError
+        When the file has no such table, or it breaks a rule.
+    """
+    table = read_toml(path).get("recording")
+    if table is None:
+        raise RefusedError(f"{path}", "no table [recording]", expected="the layout of a recording")
+    keys = RECORDING.but(file={"default": "recording.csv"})
+    file = FileKeys(path.name, "The layout of a recording", (keys,))
+    layout = recording_layout(file.check(str(path), {"recording": table})["recording"])
+    assert layout is not None
+    return layout
 
 
 def recording_layout(values: Values) -> RecordingLayout | None:

@@ -1,0 +1,43 @@
+"""triaxcal check: a delivered calibration against a recording that was not used for it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from triaxcal.cli.options import DELIVERED, UnitFolder, command, example, field_options, say
+
+
+@command(
+    epilog=example(
+        "triaxcal check MPU-1 --on field.csv",
+        "triaxcal check MPU-1 --on field.csv --gravity 9.8321",
+        "triaxcal check AT-0042 --on checks.csv --layout logger.toml",
+    )
+)
+@click.argument("unit", type=UnitFolder())
+@DELIVERED
+@click.option(
+    "--on",
+    "recorded",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Recording that was not used for the calibration.",
+)
+@field_options
+def check(
+    unit: Path, build: Path, recorded: Path, layout: Path | None, gravity: float | None
+) -> None:
+    """Check a delivered calibration with a new recording.
+
+    The constants are those in build/UNIT/calibration.json. At each still pose of the recording |a|
+    - g is compared with the uncertainty that is expected there and with the limits of the unit. The
+    exit code is 1 when the check fails.
+    """
+    from triaxcal.cli.progress import delivered  # noqa: PLC0415
+
+    found = delivered(unit, build).check(recorded, layout=layout, gravity_m_per_s2=gravity)
+    say(found.summary)
+    sys.exit(not found.result.passed)

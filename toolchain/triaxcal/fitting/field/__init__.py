@@ -1,0 +1,1 @@
+"""What recordings from the field say of a delivered calibration."""

@@ -1,0 +1,194 @@
+"""Poses of a recording that was made with a delivered calibration: for a check, or an update."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.model.types import FloatArray
+from triaxcal.poses.poses import PoseSet, find_poses
+from triaxcal.readings.identity import refuse_other_serial
+from triaxcal.readings.measurements import measurements_of, read_measurements
+from triaxcal.readings.samples import read_samples
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.recording import ACCELERATION_UNITS, RecordingLayout
+
+_VOLTS = {"V": 1.0, "mV": 1e-3}
+
+
+@dataclass(frozen=True)
+class FieldPoses:
+    """Poses of one recording, as readings of a calibration.
+
+    Attributes
+    ----------
+    source : str
+    names : tuple of str
+        Of the poses, with their lines, for messages.
+    readings : array, shape (n, 3)
+        As the converter gives them, in the calibration's unit.
+    sd : array, shape (n, 3)
+        Standard error of `readings`; NaN where it is unknown.
+    temps_degc : array, shape (n,)
+    findings : tuple of str
+    poses : PoseSet or None
+        What was found in a recording, its readings as `readings`.
+    """
+
+    source: str
+    names: tuple[str, ...]
+    readings: FloatArray
+    sd: FloatArray
+    temps_degc: FloatArray
+    findings: tuple[str, ...]
+    poses: PoseSet | None = None
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def select(self, kept: list[int]) -> FieldPoses:
+        """Only poses of these indices."""
+        poses = self.poses
+        if poses is not None:
+            poses = replace(poses, poses=tuple(poses.poses[k] for k in kept))
+        return FieldPoses(
+            self.source,
+            tuple(self.names[k] for k in kept),
+            self.readings[kept],
+            self.sd[kept],
+            self.temps_degc[kept],
+            self.findings,
+            poses,
+        )
+
+
+def field_poses(
+    unit: UnitDescription,
+    calibration: Calibration,
+    recorded: Path | Mapping[str, Any],
+    layout: RecordingLayout | None = None,
+) -> FieldPoses:
+    """Poses of a file, or of columns by name.
+
+    Parameters
+    ----------
+    unit : UnitDescription
+        Of the calibration: its [recording] says what the columns are; without one the file is a
+        measurements.csv.
+    recorded : Path, or columns
+    layout : RecordingLayout or None
+        Of the file, in place of the unit's.
+
+    Raises
+    ------
+    RefusedError
+        When the file cannot be read, names another serial number, has no still pose, or is in
+        another unit than the calibration.
+    """
+    layout = layout or unit.recording
+    if layout is None:
+        return _of_dwells(unit, recorded)
+    # Only |a| is judged: the file needs no angles.
+    no_angles = dict.fromkeys(("pitch", "roll", "yaw", "zenith", "tool_face", "azimuth"))
+    layout = replace(layout, **no_angles, angle_unit=None)  # type: ignore[arg-type]
+    if isinstance(recorded, Path):
+        layout = replace(layout, file=recorded.name)
+        refuse_other_serial(recorded, layout.written, unit.serial)
+        samples = read_samples(recorded.parent, layout, unit.temperature_sensor)
+    else:
+        samples = read_samples(Path(), layout, unit.temperature_sensor, recorded)
+    signs = np.array([-1.0 if name.startswith("-") else 1.0 for name in calibration.inputs])
+    scale = _scale(unit, calibration, layout) * (signs if len(signs) else np.ones(3))
+    return _of_poses(unit, find_poses(samples, layout), scale)
+
+
+def _of_poses(unit: UnitDescription, found: PoseSet, scale: FloatArray) -> FieldPoses:
+    poses = tuple(replace(pose, reading=pose.reading * scale) for pose in found.poses)
+    sds = [np.full(3, np.nan) if p.sd_mean is None else p.sd_mean * np.abs(scale) for p in poses]
+    sd = np.array(sds)
+    findings = list(found.findings)
+    temps = found.temps_degc
+    if temps is None:
+        temps = np.full(len(poses), unit.t0_degc)
+        findings.append(f"no temperature is recorded: taken for {unit.t0_degc:g} degC")
+    return FieldPoses(
+        found.source,
+        tuple(f"pose {pose.number}, line {pose.line}" for pose in poses),
+        np.array([pose.reading for pose in poses]),
+        np.where(np.isfinite(sd), sd, np.nan),
+        temps,
+        tuple(findings),
+        replace(found, poses=poses),
+    )
+
+
+def _of_dwells(unit: UnitDescription, recorded: Path | Mapping[str, Any]) -> FieldPoses:
+    """Dwells of a measurements.csv; of each only |a| is used, whatever its position."""
+    measured = (
+        read_measurements(recorded, unit)
+        if isinstance(recorded, Path)
+        else measurements_of(recorded, unit)
+    )
+    dwells = measured.dwells
+    variances = [d.variance_of_mean_v2 for d in dwells]
+    sd = np.array([np.full(3, np.nan) if v is None else np.sqrt(v) for v in variances])
+    return FieldPoses(
+        measured.source,
+        tuple(f"{d.position}, row {d.row}" for d in dwells),
+        np.array([d.voltage_v for d in dwells]),
+        sd,
+        np.array([d.temp_degc for d in dwells]),
+        (),
+    )
+
+
+def _scale(unit: UnitDescription, calibration: Calibration, layout: RecordingLayout) -> float:
+    """What a reading of the file is in the calibration's unit."""
+    own, theirs = calibration.reading_unit, layout.acceleration_unit
+    if own == theirs:
+        return 1.0
+    if theirs == "count":
+        return unit.adc.volts_per_code
+    if own in _VOLTS and theirs in _VOLTS:
+        return _VOLTS[theirs] / _VOLTS[own]
+    one_g, of_file = ACCELERATION_UNITS[own], ACCELERATION_UNITS[theirs]
+    if one_g is None or of_file is None:
+        raise RefusedError(
+            f"{unit.name}, acceleration_unit",
+            f"the recording is in {theirs}, the calibration in {own}",
+            expected=f"readings in {own}, or in codes of the converter",
+            remedy="give the layout of the recording, with its unit",
+        )
+    return one_g / of_file
+
+
+def inside_range(found: FieldPoses, range_degc: tuple[float, float]) -> FieldPoses:
+    """Poses within a working range; those outside are reported.
+
+    Raises
+    ------
+    RefusedError
+        When none is inside.
+    """
+    low, high = range_degc
+    inside = (found.temps_degc >= low) & (found.temps_degc <= high)
+    if inside.all():
+        return found
+    coldest, warmest = float(found.temps_degc.min()), float(found.temps_degc.max())
+    if not inside.any():
+        raise RefusedError(
+            found.source,
+            f"all {len(found)} poses are at {coldest:.4g} to {warmest:.4g} degC",
+            expected=f"{low:g} to {high:g} degC, the range of the calibration",
+            remedy="record within the range, or calibrate over a wider one",
+        )
+    left = int((~inside).sum())
+    told = f"{left} of {len(found)} poses are outside of {low:g} to {high:g} degC and not used"
+    kept = found.select(np.flatnonzero(inside).tolist())
+    return replace(kept, findings=(*kept.findings, told))

@@ -1,0 +1,236 @@
+"""What a delivered calibration leads one to expect of |a| - g at new poses.
+
+The error of |a| at pose i is w_i . vec(D), with D the error of the force (`.propagation`), w_i of
+the pose's direction (`.orientation`), and what is new in the pose: the noise of its mean, the
+scatter of a pose about the model, one code. So
+
+    cov(r) = R + sum over the sources s of F_s F_s^T,    row i of F_s = w_i . V_s(T_i)^(1/2)
+
+R being diagonal. The symmetric root of the covariance V_s(T) of D makes a source's errors at two
+temperatures as correlated as they can be; at one temperature it is exact. The inverse of cov(r) is
+taken by the formula of Woodbury, linear in the number of poses.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.outliers import fisher_tail
+from triaxcal.fitting.field.poses import FieldPoses
+from triaxcal.model.metrological import force_from_voltage, unpack_constants
+from triaxcal.model.terms import PRODUCT_AXES
+from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
+from triaxcal.uncertainty.orientation import weights
+from triaxcal.uncertainty.source import Source
+from triaxcal.unit.description import UnitDescription
+
+_OF_THE_POSE = frozenset({"raw_code", "temperature_code", "model"})
+"""Sources that are new in each pose; they are part of R here."""
+_STEP_DEGC = 0.1
+"""Covariances are evaluated at temperatures rounded to this."""
+_DOF_MAX = 10**6
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Errors of |a| at poses, and what is expected of them.
+
+    Attributes
+    ----------
+    error_g : array, shape (n,)
+        |a| - g by the fitted model.
+    force_g : array, shape (n, 3)
+    slopes, outputs_g : arrays, shape (n, 3)
+        Each output without its bias over its sensitivity, and the derivative of |a| by it.
+    own_sd_g : array, shape (n,)
+        Root of R: what is new in each pose.
+    factor_g : array, shape (n, m)
+        F of all sources beside each other.
+    dof : int
+        Effective degrees of freedom of the variances.
+    """
+
+    error_g: FloatArray
+    force_g: FloatArray
+    slopes: FloatArray
+    outputs_g: FloatArray
+    own_sd_g: FloatArray
+    factor_g: FloatArray
+    dof: int
+
+    @cached_property
+    def sd_g(self) -> FloatArray:
+        """Standard uncertainty of each error, shape (n,)."""
+        result: FloatArray = np.sqrt(self.own_sd_g**2 + (self.factor_g**2).sum(axis=1))
+        return result
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """cov(r)^-1 times (n,) or (n, k)."""
+        columns = right.reshape(len(right), -1) / self.own_sd_g[:, None]
+        scaled = self.factor_g / self.own_sd_g[:, None]
+        inner = np.eye(scaled.shape[1]) + scaled.T @ scaled
+        columns = columns - scaled @ np.linalg.solve(inner, scaled.T @ columns)
+        result: FloatArray = (columns / self.own_sd_g[:, None]).reshape(right.shape)
+        return result
+
+    @cached_property
+    def chi_square(self) -> float:
+        """r^T cov(r)^-1 r."""
+        return float(self.error_g @ self.solve(self.error_g))
+
+    def without(self, index: int) -> Expected:
+        """The same without one pose."""
+        kept = np.arange(len(self.error_g)) != index
+        return Expected(
+            self.error_g[kept],
+            self.force_g[kept],
+            self.slopes[kept],
+            self.outputs_g[kept],
+            self.own_sd_g[kept],
+            self.factor_g[kept],
+            self.dof,
+        )
+
+    @cached_property
+    def left_out(self) -> FloatArray:
+        """Each error against what the others predict, in standard deviations, shape (n,).
+
+        With P the inverse of cov(r): (P r)_i / sqrt(P_ii).
+        """
+        inverse = self.solve(np.eye(len(self.error_g)))
+        result: FloatArray = (inverse @ self.error_g) / np.sqrt(np.diag(inverse))
+        return result
+
+    def explained(self, columns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Chi-square that is left, values and sd of causes with these effects (n, k) on |a|."""
+        weighted = self.solve(columns)
+        information = columns.T @ weighted
+        covariance = np.linalg.pinv(information, rcond=1e-9, hermitian=True)
+        values = covariance @ (weighted.T @ self.error_g)
+        left = self.chi_square - float(values @ information @ values)
+        return max(left, 0.0), values, np.sqrt(np.diag(covariance))
+
+
+def chance_of(chi_square: float, count: int, dof: int) -> float:
+    """Chance of a chi-square of `count` values as large; 1 where it is below what is expected."""
+    if count < 1 or chi_square <= count:
+        return 1.0
+    return fisher_tail(count, dof, chi_square / count)
+
+
+def expected(
+    unit: UnitDescription,
+    measurements: MeasurementSet,
+    calibration: Calibration,
+    poses: FieldPoses,
+    gravity_g: float,
+) -> Expected:
+    """Errors of |a| at poses within the range, and their covariance.
+
+    Raises
+    ------
+    RefusedError
+        When the calibration does not know its uncertainty.
+    """
+    recording = calibration.recording
+    if recording is not None and not recording.checked:
+        raise RefusedError(
+            f"calibration of {calibration.serial}",
+            "its uncertainty is unknown: it has as many constants as poses",
+            expected="a calibration with more poses than constants",
+            remedy="calibrate the unit with more poses",
+        )
+    force, slopes = force_and_slopes(calibration, poses.readings, poses.temps_degc)
+    length = np.linalg.norm(force, axis=1)
+    K, U0 = unpack_constants(calibration.thermal.constants_at(poses.temps_degc))
+    sensitivity = np.linalg.norm(K, axis=2) * np.sign(np.diagonal(K, axis1=1, axis2=2))
+    temps = np.round(poses.temps_degc / _STEP_DEGC) * _STEP_DEGC
+    temps = temps.clip(*calibration.range_degc)
+    grid = np.unique([*temps.tolist(), unit.t0_degc])
+    known = uncertainty(unit, measurements, calibration, None, grid)
+    common = [s for s in known.sources if s.force is not None and s.key not in _OF_THE_POSE]
+    index = np.searchsorted(grid, temps)
+    factors = [_factor(s, index, force / length[:, None]) for s in common]
+    own, own_dof = _own_variance(unit, calibration, known, poses, slopes)
+    each = [float((f**2).sum()) for f in factors] + [float(own.sum())]
+    dofs = [s.dof for s in common] + [own_dof]
+    loss = math.fsum(v * v / d for v, d in zip(each, dofs, strict=True))
+    dof = math.fsum(each) ** 2 / loss if loss else math.inf
+    return Expected(
+        error_g=length - gravity_g,
+        force_g=force,
+        slopes=slopes * sensitivity,
+        outputs_g=(poses.readings - U0) / sensitivity,
+        own_sd_g=np.sqrt(own),
+        factor_g=np.concatenate([*factors, np.zeros((len(own), 1))], axis=1),
+        dof=max(1, int(min(dof, _DOF_MAX))),
+    )
+
+
+def _factor(source: Source, index: IntArray, direction: FloatArray) -> FloatArray:
+    """F of a source: rows of the poses by the roots of its covariances, (n, 12 or 30)."""
+    assert source.force is not None
+    values, vectors = np.linalg.eigh(source.force)
+    roots = (vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    w = weights(direction, source.force.shape[-1] // 3)[:, 3]
+    result: FloatArray = np.einsum("na,nab->nb", w, roots[index])
+    return result
+
+
+def _own_variance(
+    unit: UnitDescription,
+    calibration: Calibration,
+    known: Uncertainty,
+    poses: FieldPoses,
+    slopes: FloatArray,
+) -> tuple[FloatArray, float]:
+    """R (n,), g^2: noise of the mean and one code, or the scatter of the calibration's own poses.
+
+    The larger of both: what poses scattered by beyond their noise, they will scatter by again.
+    """
+    code = np.full(3, unit.adc.volts_per_code**2 / 12.0)
+    recording, scatter = calibration.recording, known.scatter
+    typical = np.zeros(3) if scatter is None else scatter.variance_v2.mean(axis=0)
+    noise = np.where(np.isnan(poses.sd), typical, poses.sd**2)
+    variance = (slopes**2 * (noise + code)).sum(axis=1)
+    least, dof = 0.0, math.inf
+    if recording is not None:
+        held_out = recording.held_out_g or 0.0
+        least, dof = max(recording.rms_free_g, held_out) ** 2, float(recording.dof)
+    elif scatter is not None:
+        dof = scatter.noise_dof
+    return np.maximum(variance, least), dof if (variance < least).any() else math.inf
+
+
+def force_and_slopes(
+    calibration: Calibration, readings: FloatArray, temps_degc: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Force (n, 3) in g, and derivative of its length by the reading (n, 3)."""
+    constants = calibration.thermal.constants_at(temps_degc)
+    linear = force_from_voltage(constants, readings)
+    force = calibration.terms.force_g(linear)
+    N = np.linalg.inv(unpack_constants(constants)[0])
+    slopes: FloatArray = np.einsum("ni,nij->nj", length_slopes(calibration, linear, force), N)
+    return force, slopes
+
+
+def length_slopes(calibration: Calibration, linear: FloatArray, force: FloatArray) -> FloatArray:
+    """Derivative of |a| by the linear result N (U - U0), shape (n, 3)."""
+    unit: FloatArray = force / np.linalg.norm(force, axis=1, keepdims=True)
+    Q = calibration.terms.quadratic_per_g
+    if Q is None:
+        return unit
+    slopes = np.zeros((len(linear), 6, 3))
+    for k, (i, j) in enumerate(PRODUCT_AXES):
+        slopes[:, k, i] += linear[:, j]
+        slopes[:, k, j] += linear[:, i]
+    more: FloatArray = np.einsum("ni,ik,nkj->nj", unit, Q, slopes)
+    return unit + more
