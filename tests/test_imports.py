@@ -30,6 +30,8 @@ MAY_IMPORT = {
     "delivery": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
         "fixedpoint", "codegen",
+        "base", "model", "unit", "readings", "poses", "fitting", "dynamic", "fixedpoint", "codegen",
+        "uncertainty",
     },
     "targets": {
         "base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
 from triaxcal.codegen.compiler import Compilation, reference_under_way
 
@@ -77,7 +78,10 @@ def _deliver_unit(unit: Path, build: Path, reference: Compilation) -> Delivered:
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415
 
-    delivery = made_of(unit, reference)
+    try:
+        delivery = made_of(unit, reference)
+    except RefusedError as refusal:
+        raise _beside_earlier(refusal, build / unit.absolute().name) from refusal
     warnings: tuple[str, ...] = ()
     if (unit / "history").is_dir():
         from triaxcal.report.history import contradiction_of  # noqa: PLC0415
@@ -90,6 +94,15 @@ def _deliver_unit(unit: Path, build: Path, reference: Compilation) -> Delivered:
     calibration = Calibration(Unit.of(delivery.unit, unit), Saved.of(delivery))
     text = summary(made, files, str(target))
     return Delivered(target, tuple(files), calibration, text, warnings)
+
+
+def _beside_earlier(refusal: RefusedError, folder: Path) -> RefusedError:
+    """The refusal; where an earlier run left files, that they are still those."""
+    if not folder.is_dir():
+        return refusal
+    earlier = f"{folder} keeps the files of an earlier run"
+    remedy = f"{refusal.remedy}; {earlier}" if refusal.remedy else earlier
+    return type(refusal)(refusal.place, refusal.found, expected=refusal.expected, remedy=remedy)
 
 
 def _deliver_imu(unit: Path, build: Path, progress: Progress | None) -> Delivered:

@@ -1,42 +1,66 @@
-"""Whether a fitted model keeps its unit's limits: the verdict before any C is made."""
+"""Whether a calibration keeps its unit's limits, and in which words that is said.
+
+Three things are held against each limit: the residual at the fitted dwells, the error at what was
+held out, and the residual with the uncertainty of |a|. The first two refuse; the third decides
+whether the limit is shown to hold everywhere.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import Fitted, refuse_beyond_limits
-from triaxcal.fitting.tilter.acceptance import dwells_in_range
-from triaxcal.model.metrological import force_from_voltage
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.tilter.acceptance import dwell_errors_g, dwells_in_range
+from triaxcal.model.positions import CHECK_POSITIONS
+from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.thermal import near_t0
+
+AT_T0, OVER_RANGE = "at T0", "over the range"
+RESIDUAL, HELD_OUT, UNCERTAINTY = "residual", "held out", "with uncertainty"
 
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """One limit, and the dwells it was held against.
+    """One limit, and what was held against it.
 
     Attributes
     ----------
     where : str
         "at T0" or "over the range".
     limit_g, largest_g : float
-        Limit, and the largest | |a| - g | of the fitted model.
+        Limit, and the largest | |a| - g |.
     dwells : int
         How many; with none the limit was not tested, and `largest_g` is NaN.
+    what : str
+        "residual" of the fitted model at the dwells of the fit; "held out", at check dwells and
+        temperatures held out; "with uncertainty", the residual and the uncertainty (95 %) of |a|.
     """
 
     where: str
     limit_g: float
     largest_g: float
     dwells: int
+    what: str = RESIDUAL
+
+    @property
+    def held(self) -> bool:
+        """Whether the limit holds; what was not tested does not."""
+        return self.largest_g <= self.limit_g
 
     def __str__(self) -> str:
+        what = f"{self.what} {self.where}"
         if not self.dwells:
-            return f"{self.where}: not tested"
+            return f"{what}: not tested"
+        if self.largest_g == np.inf:
+            return f"{what}: unknown, limit {self.limit_g * 1e3:g} mg"
         largest, limit = self.largest_g * 1e3, self.limit_g * 1e3
-        return f"{self.where}: {largest:.4g} mg, limit {limit:g} mg, {self.dwells} dwells"
+        words = f"{what}: {largest:.4g} mg, limit {limit:g} mg"
+        return words if self.what == UNCERTAINTY else f"{words}, {self.dwells} dwells"
 
 
 @dataclass(frozen=True, repr=False)
@@ -46,13 +70,18 @@ class Verdict:
     Attributes
     ----------
     passed : bool
+        Whether it may: no limit is missed by what was tested.
     refusal : RefusedError or None
         Why it did not pass: place, found, expected, remedy.
     tested : tuple of LimitCheck
+        Residuals, then held-out errors, then residuals with their uncertainty; each at T0 and over
+        the range.
     held_out_g : float or None
         Rms error of the chosen functions on readings that their fit did not use.
     checked : bool
         Whether the readings could contradict the constants at all.
+    words : str
+        The verdict in words.
     """
 
     passed: bool
@@ -60,6 +89,7 @@ class Verdict:
     tested: tuple[LimitCheck, ...]
     held_out_g: float | None
     checked: bool
+    words: str
 
     def __str__(self) -> str:
         if self.refusal is not None:
@@ -67,43 +97,111 @@ class Verdict:
         lines = [str(t) for t in self.tested]
         if self.held_out_g is not None:
             lines.append(f"held-out error: {self.held_out_g * 1e3:.4g} mg rms")
-        return "\n".join(["passed" if self.checked else "not checked", *lines])
+        return "\n".join([self.words, *lines])
 
     __repr__ = __str__
 
 
 def judge(fitted: Fitted) -> Verdict:
     """Verdict on a fitted model."""
+    from triaxcal.uncertainty.acceptance import length_uncertainty_g  # noqa: PLC0415
+
     refusal = None
     try:
         refuse_beyond_limits(fitted)
     except RefusedError as error:
         refusal = error
     calibration = fitted.calibration
+    checked = calibration.recording is None or calibration.recording.checked
+    tested = (*residual_checks(fitted), *held_out_checks(fitted))
+    if checked and refusal is None:
+        found = length_uncertainty_g(fitted.unit, fitted.measurements, calibration)
+        residuals = _both(fitted.unit, UNCERTAINTY, _errors(fitted, checks=True))
+        tested += tuple(
+            replace(r, largest_g=r.largest_g + u) for r, u in zip(residuals, found, strict=True)
+        )
     chosen = next((c for c in calibration.candidates if c.chosen), None)
+    shown = all(t.held for t in tested if t.what == UNCERTAINTY)
     return Verdict(
         refusal is None,
         refusal,
-        _tested(fitted),
+        tested,
         None if chosen is None else chosen.held_out_g,
-        calibration.recording is None or calibration.recording.checked,
+        checked,
+        verdict_words(calibration, checked=checked, shown=shown),
     )
 
 
-def _tested(fitted: Fitted) -> tuple[LimitCheck, ...]:
+def verdict_words(calibration: Calibration, *, checked: bool, shown: bool) -> str:
+    """The verdict on what has not been refused: the same words on the terminal and everywhere.
+
+    `checked` is whether the readings could contradict the constants, `shown` whether the limits
+    hold with the uncertainty inside them.
+    """
+    if not checked:
+        return "not checked"
+    untested = not_tested(calibration)
+    if untested:
+        return f"passed at the dwells; {untested}"
+    return "passed" if shown else "passed at the dwells, not shown everywhere"
+
+
+def not_tested(calibration: Calibration) -> str:
+    """What no reading outside the fit has tested, in words; empty where something has."""
+    test = calibration.held_out
+    if test is None or test.between:
+        return ""
+    if len(calibration.points) == 1:
+        return "nothing was held out"
+    return "between them not tested"
+
+
+def residual_checks(fitted: Fitted) -> tuple[LimitCheck, ...]:
+    """Both limits against the dwells of the fit."""
+    return _both(fitted.unit, RESIDUAL, _errors(fitted, checks=False))
+
+
+def held_out_checks(fitted: Fitted) -> tuple[LimitCheck, ...]:
+    """Both limits against check dwells and the temperatures held out; none for a recording.
+
+    The latter show the curves between the calibrated temperatures: over the range, even at T0.
+    """
+    test = fitted.calibration.held_out
+    if test is None:
+        return ()
+    others = [test.share * abs(d.error_g) for d in test.dwells]
+    return _both(fitted.unit, HELD_OUT, _errors(fitted, fitted_too=False), others)
+
+
+def _errors(
+    fitted: Fitted, *, checks: bool = True, fitted_too: bool = True
+) -> list[tuple[float, float]]:
+    """Temperature and | |a| - g | of the dwells in the range, (degC, g)."""
     unit, calibration = fitted.unit, fitted.calibration
-    dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
-    temps = np.array([d.temp_degc for d in dwells])
-    voltages = np.array([d.voltage_v for d in dwells]).reshape(-1, 3)
-    linear = force_from_voltage(calibration.thermal.constants_at(temps), voltages)
-    force = calibration.terms.force_g(linear, np.array([d.rate_k_per_s for d in dwells]))
-    errors = np.abs(np.linalg.norm(force, axis=1) - unit.gravity_g)
-    at_t0 = np.array([near_t0(t, unit.t0_degc) for t in temps], dtype=bool)
-    return tuple(
-        LimitCheck(where, limit_g, float(errors[own].max(initial=-np.inf)) if own.any() else np.nan,
-               int(own.sum()))
+    dwells = [
+        d
+        for d in dwells_in_range(unit, calibration.range_degc, fitted.measurements)
+        if (checks if d.position in CHECK_POSITIONS else fitted_too)
+    ]
+    errors = dwell_errors_g(unit, calibration, dwells).tolist()
+    return list(zip([d.temp_degc for d in dwells], errors, strict=True))
+
+
+def _both(
+    unit: UnitDescription,
+    what: str,
+    found: Iterable[tuple[float, float]],
+    over_range: Iterable[float] = (),
+) -> tuple[LimitCheck, LimitCheck]:
+    """Errors at temperatures, (degC, g), held against the limit that holds there."""
+    errors: dict[bool, list[float]] = {True: [], False: [*over_range]}
+    for temp, error in found:
+        errors[near_t0(temp, unit.t0_degc)].append(error)
+    at_t0, others = (
+        LimitCheck(where, limit_g, max(own, default=np.nan), len(own), what)
         for where, limit_g, own in (
-            ("at T0", unit.limits.at_t0_g, at_t0),
-            ("over the range", unit.limits.over_range_g, ~at_t0),
+            (AT_T0, unit.limits.at_t0_g, errors[True]),
+            (OVER_RANGE, unit.limits.over_range_g, errors[False]),
         )
-    )  # fmt: skip
+    )
+    return at_t0, others

@@ -183,7 +183,12 @@ def _verdict(made: Passport) -> str:
         _, key = limits.at(r.dwell.temp_degc, delivery.unit.t0_degc)
         by_key[key] = max(by_key.get(key, 0.0), abs(r.error_g))
     at_t0 = by_key.get("limits.at_t0_g")
-    where = "" if made.shown or not made.checked else "at the dwells, not shown everywhere: "
+    label, _, rest = made.words.partition(" ")
+    label = label if made.checked else "NOT CHECKED"
+    text = f"{_passed(at_t0, limits.at_t0_g)} at T0, "
+    text += f"{_passed(by_key.get('limits.over_range_g'), limits.over_range_g)} elsewhere"
+    if made.checked and rest:
+        text = f"{rest}: {text}"
     return "\n".join(
         [
             _entry(
@@ -195,16 +200,22 @@ def _verdict(made: Passport) -> str:
                 "cross-check",
                 f"{vectors} vectors bit for bit: Python = reference = generated C",
             ),
-            _entry(
-                "passed" if made.checked else "NOT CHECKED",
-                f"{where}{_passed(at_t0, limits.at_t0_g)} at T0, "
-                f"{_passed(by_key.get('limits.over_range_g'), limits.over_range_g)} elsewhere",
-            ),
+            _entry(label, text, *_held_out_limits(made)),
         ]
     )
 
 
-def _passed(largest_g: float | None, limit_g: float) -> str:
+def _held_out_limits(made: Passport) -> list[str]:
+    """Errors at what was held out, beside their limits."""
+    if not made.held_out:
+        return []
+    at_t0, others = (
+        _passed(h.largest_g if h.dwells else None, h.limit_g, "nothing") for h in made.held_out
+    )
+    return [f"held out: {at_t0} at T0, {others} elsewhere"]
+
+
+def _passed(largest_g: float | None, limit_g: float, none: str = "no dwell to check") -> str:
     if largest_g is None:
-        return "no dwell to check"
+        return none
     return f"{largest_g * 1e3:.4f} mg (limit {limit_g * 1e3:g})"

@@ -26,6 +26,8 @@ from triaxcal.uncertainty.source import Source
 from triaxcal.uncertainty.terms_sources import pair_source
 from triaxcal.unit.description import UnitDescription
 
+LENGTH = 3
+"""Index of |a| among the components of the force."""
 TEMPERATURES = 23
 """Of the working range, evenly, besides T0 and the calibrated ones."""
 _SUSPICIOUS = 3.0

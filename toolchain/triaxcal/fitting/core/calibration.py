@@ -93,6 +93,47 @@ class CheckResult:
 
 
 @dataclass(frozen=True)
+class HeldOutDwell:
+    """A dwell at a temperature held out, and |a| - g there by curves fitted without it, in g."""
+
+    row: int
+    position: str
+    temp_degc: float
+    error_g: float
+
+
+@dataclass(frozen=True)
+class HeldOutTest:
+    """What a tilter's readings outside the fit say of the chosen curves.
+
+    Attributes
+    ----------
+    dwells : tuple of HeldOutDwell
+        Six for each inner temperature, held out in turn; none with fewer than four temperatures.
+    rms_g : float or None
+        Rms error of a component of the force at them.
+    function : str
+        The function that was fitted without them.
+    share : float
+        The error of the delivered curves as a share of these errors: 1, or less where they pass
+        all temperatures and those held out could only test a function of one parameter less.
+    between : bool
+        Whether anything tests the curves between the calibrated temperatures.
+    """
+
+    dwells: tuple[HeldOutDwell, ...]
+    rms_g: float | None
+    function: str
+    share: float
+    between: bool
+
+    @property
+    def worst(self) -> HeldOutDwell | None:
+        """The dwell with the largest error."""
+        return max(self.dwells, key=lambda d: abs(d.error_g), default=None)
+
+
+@dataclass(frozen=True)
 class Calibration:
     """The twelve constants of one unit over temperature, with their covariance.
 
@@ -134,6 +175,8 @@ class Calibration:
         Columns of x, y, z as unit.toml names them, as "-ACC2", where the readings are a recording.
         The constants are those of the columns as the converter gives them: a minus is in K and U0.
         Empty in a file of triaxcal 0.1.0: its readings have the signs.
+    held_out : HeldOutTest or None
+        None for a recording, whose `recording` has it.
     """
 
     serial: str
@@ -153,6 +196,7 @@ class Calibration:
     pair: PairTerms | None = None
     notes: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
+    held_out: HeldOutTest | None = None
 
     @property
     def findings(self) -> tuple[str, ...]:

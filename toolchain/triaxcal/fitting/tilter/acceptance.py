@@ -1,11 +1,21 @@
-"""P1 (13): | |a| - g | of the fitted model at the unit's own dwells, and who is to blame.
+"""Whether a fitted model keeps the unit's limits: on readings of the fit, and on those outside it.
 
-This is checked before anything is generated: a wrong reading is reported as such, and not as a
-curve that no integer can hold.
+Every dwell is held against the limit that holds at its temperature, P1 (13): | |a| - g |. Check
+dwells have not been fitted. Temperatures held out in turn show the curves between the calibrated
+temperatures, which the limit over the range is for; at T0 as elsewhere, because the delivered
+curves are fitted there. So
+
+    | |a| - g |  at each dwell             <= limits.at_t0_g within 2 degC of T0, else over_range_g
+    r | |a| - g | at each dwell held out   <= limits.over_range_g
+    r times the rms error of a component   <= limits.over_range_g
+
+with r of `fitting.tilter.heldout`: 1, or less where only a smaller function could be held out.
+All is checked before anything is generated, and `unacceptable` alone says what is refused.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,53 +52,119 @@ class _Disagreement:
 def refuse_unacceptable(
     unit: UnitDescription, calibration: Calibration, measurements: MeasurementSet
 ) -> None:
-    """Check every dwell of the working range against the unit's limits.
+    """Refuse a calibration that misses a limit.
 
     Raises
     ------
     RefusedError
-        When no dwell lies in the range, or one is beyond its limit: names the two positions that
-        contradict the others, or else the thermal function.
+        What `unacceptable` finds.
+    """
+    refusal = unacceptable(unit, calibration, measurements)
+    if refusal is not None:
+        raise refusal
+
+
+def unacceptable(
+    unit: UnitDescription, calibration: Calibration, measurements: MeasurementSet
+) -> RefusedError | None:
+    """Why a calibration may not be delivered; None where it keeps the limits.
+
+    Positions that contradict each other at one temperature come first: no curve is to blame for
+    them. Then what was held out, then the dwells of the fit.
     """
     dwells = dwells_in_range(unit, calibration.range_degc, measurements)
     if not dwells:
         low, high = calibration.range_degc
-        raise RefusedError(
+        return RefusedError(
             f"{unit.source}, [thermal] range_degc",
             f"no dwell of {measurements.source} lies in {low:g} to {high:g} degC",
             expected="at least one, to check the result",
             remedy="widen the range, or omit it",
         )
-    _refuse_singular_curve(unit, calibration)
-    temps = np.array([d.temp_degc for d in dwells])
-    voltages = np.array([d.voltage_v for d in dwells])
+    singular = _singular_curve(unit, calibration)
+    if singular is not None:
+        return singular
+    errors = dwell_errors_g(unit, calibration, dwells)
+    limits = np.array([unit.limits.at(d.temp_degc, unit.t0_degc)[0] for d in dwells])
+    worst = int((errors / limits).argmax())
+    if errors[worst] > limits[worst]:
+        blame = _largest_disagreement(unit, calibration, measurements)
+        if blame.error_g > _SUSPICIOUS * limits[worst]:
+            return _contradiction(
+                unit, measurements.source, blame, dwells[worst], float(errors[worst])
+            )
+    held_out = _held_out(unit, calibration, measurements.source)
+    if held_out is not None:
+        return held_out
+    if errors[worst] > limits[worst]:
+        return _too_simple(
+            unit, calibration, measurements.source, dwells[worst], float(errors[worst])
+        )
+    return None
+
+
+def dwell_errors_g(
+    unit: UnitDescription, calibration: Calibration, dwells: Sequence[Dwell]
+) -> FloatArray:
+    """| |a| - g | of the fitted model at dwells, shape (n,), in g."""
+    temps = np.array([d.temp_degc for d in dwells], dtype=np.float64)
+    voltages = np.array([d.voltage_v for d in dwells], dtype=np.float64).reshape(-1, 3)
     linear = force_from_voltage(calibration.thermal.constants_at(temps), voltages)
     force = calibration.terms.force_g(linear, np.array([d.rate_k_per_s for d in dwells]))
-    errors = np.abs(np.linalg.norm(force, axis=1) - unit.gravity_g)
-    limits = np.array([unit.limits.at(t, unit.t0_degc)[0] for t in temps])
-    worst = int((errors / limits).argmax())
-    if errors[worst] <= limits[worst]:
-        return
-    blame = _largest_disagreement(unit, calibration, measurements)
-    if blame.error_g > _SUSPICIOUS * limits[worst]:
-        raise _contradiction(unit, measurements.source, blame, dwells[worst], float(errors[worst]))
-    raise _too_simple(unit, calibration, measurements.source, dwells[worst], float(errors[worst]))
+    result: FloatArray = np.abs(np.linalg.norm(force, axis=1) - unit.gravity_g)
+    return result
 
 
-def _refuse_singular_curve(unit: UnitDescription, calibration: Calibration) -> None:
+def _held_out(unit: UnitDescription, calibration: Calibration, source: str) -> RefusedError | None:
+    """A temperature held out whose dwells the curves without it miss."""
+    test, limit = calibration.held_out, unit.limits.over_range_g
+    if test is None or test.worst is None or test.rms_g is None:
+        return None
+    worst, rms = test.worst, test.share * test.rms_g
+    error = test.share * abs(worst.error_g)
+    if max(error, rms) <= limit:
+        return None
+    found = (
+        f"| |a| - g | = {abs(worst.error_g) * 1e3:.4g} mg in {worst.position} at "
+        f"{worst.temp_degc:.4g} degC held out, by {test.function} fitted without it"
+    )
+    if error <= limit:
+        found = (
+            f"with each inner temperature held out in turn, {test.function} misses the components "
+            f"of the force by {test.rms_g * 1e3:.4g} mg rms"
+        )
+    if test.share < 1.0:
+        found += (
+            f"; the delivered {calibration.shape.label} is estimated to have "
+            f"{test.share:.2g} of that"
+        )
+    return RefusedError(
+        f"{source}, row {worst.row}",
+        f"{found}, {max(error, rms) / limit:.3g} times the limit",
+        expected=f"at most {limit * 1e3:g} mg (limits.over_range_g)",
+        remedy=(
+            "the temperatures contradict each other, or the thermal function does not follow the "
+            "unit: check sign, unit and order of the temperatures, choose another function in "
+            "[thermal], or measure at more temperatures"
+        ),
+    )
+
+
+def _singular_curve(unit: UnitDescription, calibration: Calibration) -> RefusedError | None:
     temps = np.linspace(*calibration.range_degc, 257)
     K, _ = unpack_constants(calibration.thermal.constants_at(temps))
     scaled = K / np.linalg.norm(K, axis=2, keepdims=True)
     condition = np.linalg.cond(scaled)
     worst = int(condition.argmax())
-    if condition[worst] > CONDITION_MAX:
-        raise RefusedError(
-            f"{unit.source}, [thermal]",
-            f"{calibration.shape.label} makes K singular or nearly so at {temps[worst]:.4g} degC "
-            f"(condition number {condition[worst]:.3g})",
-            expected=f"a condition number of at most {CONDITION_MAX:g} over the whole range",
-            remedy="choose another thermal function, or measure at a temperature near it",
-        )
+    if condition[worst] <= CONDITION_MAX:
+        return None
+    return RefusedError(
+        f"{unit.source}, [thermal]",
+        f"{calibration.shape.label} makes K singular or nearly so at {temps[worst]:.4g} degC "
+        f"(condition number {condition[worst]:.3g})",
+        expected=f"a condition number of at most {CONDITION_MAX:g} over the whole range",
+        remedy="choose another thermal function, or measure at a temperature near it",
+    )
 
 
 def dwells_in_range(

@@ -32,8 +32,9 @@ from triaxcal.fitting.tilter.estimators import (
     pooled_variance,
     refuse_ill_conditioned,
 )
+from triaxcal.fitting.tilter.heldout import check_errors, held_out_test
 from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
-from triaxcal.fitting.tilter.selection import PREFERENCE, check_errors, select
+from triaxcal.fitting.tilter.selection import PREFERENCE, select
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS
@@ -78,7 +79,12 @@ def calibrate(
     chosen = data.only(estimators.index(selection.estimator))
     found = _calibration(unit, measurements, chosen, selection, range_degc, terms=terms)
     of_pair = () if pair is None else pair.findings
-    return replace(found, pair=pair, notes=(*contradiction(unit, groups), *of_pair))
+    return replace(
+        found,
+        pair=pair,
+        notes=(*contradiction(unit, groups), *of_pair),
+        held_out=held_out_test(chosen, selection.shape, groups, checks),
+    )
 
 
 def _select(
@@ -96,7 +102,6 @@ def _select(
         shapes,
         checks,
         asked_for=asked_for,
-        limit_g=unit.limits.over_range_g,
         terms=terms,
     )
 

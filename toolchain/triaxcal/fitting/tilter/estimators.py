@@ -92,6 +92,17 @@ def pooled_variance(voltage_v: FloatArray) -> FloatArray:
     return variance
 
 
+def position_residuals_g(design: FloatArray, voltage_v: FloatArray) -> FloatArray:
+    """Residuals (G, 6, 3) of each temperature's own constants, by the output's scale factor, in g.
+
+    Six positions leave two degrees of freedom to each output and temperature.
+    """
+    constants = np.linalg.pinv(design) @ voltage_v
+    scale = np.abs(constants[:, range(3), range(3)])[:, None]
+    result: FloatArray = (voltage_v - design @ constants) / scale
+    return result
+
+
 def refuse_ill_conditioned(where: str, temp_degc: float, constants: FloatArray) -> None:
     """Refuse a K that cannot be inverted, and say which outputs look alike.
 

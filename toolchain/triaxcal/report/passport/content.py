@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from triaxcal.codegen.tryout import Residual
+from triaxcal.delivery.judgement import LimitCheck, held_out_checks, verdict_words
 from triaxcal.delivery.unit import Delivery
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.device_sources import Device
-from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
+from triaxcal.uncertainty.evaluate import LENGTH, Uncertainty, uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
 from triaxcal.unit.thermal import near_t0
-
-LENGTH = 3
 
 
 @dataclass(frozen=True)
@@ -127,6 +126,16 @@ class Passport:
         """Whether both limits hold with the uncertainty inside them, and nothing is unknown."""
         checked = all(a.shown for a in self.acceptance) and not self.unchecked
         return checked and not self.length_budget.unknown
+
+    @property
+    def words(self) -> str:
+        """The verdict in words."""
+        return verdict_words(self.delivery.calibration, checked=self.checked, shown=self.shown)
+
+    @property
+    def held_out(self) -> tuple[LimitCheck, ...]:
+        """Both limits against what was held out; none for a recording."""
+        return held_out_checks(self.delivery)
 
     @property
     def checked(self) -> bool:

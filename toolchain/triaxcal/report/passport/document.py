@@ -29,8 +29,8 @@ def passport_json(p: Passport) -> bytes:
         "serial": d.unit.serial,
         "inputs_sha256": d.inputs_sha256,
         "coverage_probability": LEVEL,
-        "result": _result(p),
         **({"inputs": list(d.calibration.inputs)} if d.calibration.inputs else {}),
+        "result": p.words,
         "acceptance": [
             {
                 "where": a.where,
@@ -42,6 +42,15 @@ def passport_json(p: Passport) -> bytes:
                 "worst_source": a.cause,
             }
             for a in p.acceptance
+        ],
+        "held_out": [
+            {
+                "where": h.where,
+                "limit_g": h.limit_g,
+                "largest_g": h.largest_g if h.dwells else None,
+                "dwells": h.dwells,
+            }
+            for h in p.held_out
         ],
         "limits_without_dwells": list(p.unchecked),
         "constants_at_t0": [
@@ -70,12 +79,6 @@ def passport_json(p: Passport) -> bytes:
         "tools": dict(p.tools),
     }
     return json_bytes(document)
-
-
-def _result(p: Passport) -> str:
-    if not p.checked:
-        return "not checked"
-    return "passed" if p.shown else "passed at the dwells, not shown everywhere"
 
 
 def _budget(b: Budget) -> dict[str, Any]:

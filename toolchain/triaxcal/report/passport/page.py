@@ -44,6 +44,14 @@ def passport_html(p: Passport) -> bytes:
         "identity": _identity(p),
         "shown": p.shown,
         "checked": p.checked,
+        "limits_of_words": p.words.removeprefix("passed at the dwells").strip(",; "),
+        "held_out": [
+            f"Held out, {h.where}: | |a| − g | up to {g_in_words(h.largest_g)} of "
+            f"{g_in_words(h.limit_g)}, {h.dwells} dwells"
+            for h in p.held_out
+            if h.dwells
+        ]
+        or ["Nothing was held out"],
         "acceptance": [_acceptance(a, checked=p.checked) for a in p.acceptance],
         "unchecked": p.unchecked,
         "warnings": (*p.uncertainty.warnings, *_findings(p)),

@@ -1,0 +1,182 @@
+"""The verdict of a tilter's unit: what is held out decides, and what nothing tests is said."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import triaxcal
+from fit_cases import TABLE_TEMPS, TABLES, cubic_truth, readings, unit, with_checks
+from triaxcal.delivery.fitted import Fitted
+from triaxcal.delivery.judgement import Verdict, judge
+from triaxcal.fitting.tilter.calibrate import calibrate
+from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.unit.thermal import ThermalChoice
+
+FIVE = (-40.0, -10.0, 20.0, 45.0, 70.0)
+NINE = (-40.0, -25.0, -10.0, 5.0, 20.0, 32.5, 45.0, 57.5, 70.0)
+ROOT = Path(__file__).parent.parent
+
+
+def curved(powers):
+    """Constants of T0 and biases that change by (mg at 60 degC from T0) * x^n, x = dT / 60."""
+
+    def truth(temp):
+        x = (np.asarray(temp, dtype=float) - 20.0)[..., None] / 60.0
+        bias = np.array([0.55e-3, -0.4e-3, 0.45e-3])
+        change = sum(mg * x ** (n + 1) for n, mg in enumerate(powers)) * bias
+        return TABLES[1] + np.concatenate([np.zeros((*x.shape[:-1], 9)), change], axis=-1)
+
+    return truth
+
+
+def with_temperature(data, old, new):
+    dwells = [replace(d, temp_degc=d.temp_degc - old + new) if abs(d.temp_degc - old) < 1 else d
+              for d in data.dwells]  # fmt: skip
+    return MeasurementSet(data.source, tuple(dwells))
+
+
+def verdict(data, **keys) -> Verdict:
+    own = unit(**keys)
+    return judge(Fitted(own, data, "", calibrate(own, data)))
+
+
+@pytest.mark.parametrize(("temps", "lost"), [(FIVE, 45.0), (NINE, 45.0), (NINE, -25.0)])
+def test_a_lost_sign_is_refused(temps, lost):
+    """A quadratic that fits to microvolts with the sign is missed by milligrams without it."""
+    data = readings(curved((8.0, 4.0)), temps, sd_v=1e-7, count=100, spread_degc=0.05)
+    assert verdict(data).words == "passed"
+    found = verdict(with_temperature(data, lost, -lost))
+    assert not found.passed
+    assert found.refusal.expected == "at most 1 mg (limits.over_range_g)"
+    assert "held out, by" in found.refusal.found
+
+
+def test_exchanged_temperatures_are_refused():
+    data = readings(curved((8.0, 4.0)), FIVE, sd_v=1e-7, count=100)
+    away = with_temperature(data, -10.0, 200.0)
+    exchanged = with_temperature(with_temperature(away, 45.0, -10.0), 200.0, 45.0)
+    assert not verdict(exchanged).passed
+
+
+@pytest.mark.parametrize(
+    "powers", [(8.0, 4.0, 1.0), (-15.0, 8.0, -2.5), (1.0, 20.0, 2.0), (15.0, 8.0, 3.0, 0.5)]
+)
+@pytest.mark.parametrize("temps", [(-40.0, 0.0, 20.0, 70.0), FIVE])
+def test_a_sound_unit_with_few_temperatures_and_much_curvature_passes(temps, powers):
+    """Held out, one of few temperatures makes a worse curve than the delivered one: said how much.
+
+    With 4 temperatures the cubic x^3 of 3 mg leaves 3 * 60 * 20 * 50 / 60^3 = 0.83 mg at +20 degC
+    by a quadratic through the other three, and the 0.5 mg of x^4 add to it.
+    """
+    truth = curved(powers)
+    data = readings(truth, temps, sd_v=1e-7, count=100, spread_degc=0.05)
+    own = unit()
+    calibration = calibrate(own, data)
+    assert judge(Fitted(own, data, "", calibration)).passed
+    between = np.linspace(-40.0, 70.0, 56)
+    missed = (calibration.thermal.constants_at(between) - truth(between))[:, 9:] / 0.55
+    assert np.abs(missed).max() < 1e-3
+
+
+def test_a_curve_through_all_temperatures_is_taken_where_the_simpler_one_misses_them():
+    data = readings(curved((8.0, 4.0, 2.0)), (-40.0, 0.0, 20.0, 70.0), sd_v=1e-7, count=100)
+    calibration = calibrate(unit(), data)
+    (chosen,) = [c for c in calibration.candidates if c.chosen]
+    assert chosen.label == "polynomial of order 3"
+    assert calibration.held_out.function == "polynomial of order 2"
+    assert 0.0 < calibration.held_out.share < 0.5
+    assert "it passes all 4 temperatures; piecewise-linear, knots -40, 20, 70 degC does not" in (
+        calibration.selection_reason
+    )
+    quiet = readings(curved((8.0, 4.0)), (-40.0, 0.0, 20.0, 70.0), sd_v=1e-7, count=100)
+    (chosen,) = [c for c in calibrate(unit(), quiet).candidates if c.chosen]
+    assert chosen.label == "polynomial of order 2"
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_printed_reason_is_true(seed):
+    """The numbers in the sentence are those of the table, and the comparison holds for them."""
+    random = np.random.default_rng(seed)
+    jumpy = {t: random.normal(size=3) * 3e-4 for t in NINE}
+
+    def truth(temp):
+        steps = np.array([jumpy[min(NINE, key=lambda n: abs(n - t))] for t in np.ravel(temp)])
+        change = np.concatenate([np.zeros((len(steps), 9)), steps], axis=1)
+        return cubic_truth()(temp) + change.reshape(*np.shape(temp), 12)
+
+    calibration = calibrate(unit(), readings(truth, NINE, sd_v=1e-6, count=100, seed=seed))
+    (chosen,) = [c for c in calibration.candidates if c.chosen]
+    reason = calibration.selection_reason
+    own = re.search(r"held-out error ([\d.]+) micro-g", reason)
+    quoted = own
+    if "it passes all" in reason:
+        quoted = re.search(r"held out in turn ([\d.]+) micro-g", reason)
+    assert float(quoted[1]) == pytest.approx(chosen.held_out_g * 1e6, rel=1e-3)
+    other = re.search(r"\(([\d.]+) %\) of the best, ([\d.]+) micro-g", reason)
+    best = min(c.held_out_g for c in calibration.candidates) * 1e6
+    if other is None:
+        assert "the smallest of" in reason
+        assert float(own[1]) <= best * 1.001
+    else:
+        assert float(own[1]) <= float(other[2]) * (1.0 + float(other[1]) / 100.0) * 1.001
+
+
+def test_what_nothing_tests_is_said():
+    three = readings(cubic_truth(), TABLE_TEMPS, sd_v=1e-7, count=100)
+    assert verdict(three).words == "passed at the dwells; between them not tested"
+    at_t0 = with_checks(three, cubic_truth(), (20.0,), sd_v=1e-7, count=100)
+    assert verdict(at_t0).words == "passed at the dwells; between them not tested"
+    one = readings(cubic_truth(), (20.0,), sd_v=1e-7, count=100)
+    assert verdict(one).words == "passed at the dwells; nothing was held out"
+    found = verdict(three)
+    assert found.passed
+    assert [str(t) for t in found.tested[2:4]] == [
+        "held out at T0: not tested",
+        "held out over the range: not tested",
+    ]
+
+
+def test_checks_between_three_temperatures_test_them():
+    data = readings(curved((8.0, 4.0)), TABLE_TEMPS, sd_v=1e-7, count=100)
+    data = with_checks(data, curved((8.0, 4.0)), (-10.0, 45.0), sd_v=1e-7, count=100)
+    found = verdict(data, thermal=ThermalChoice("polynomial", {"order": 2}))
+    assert found.words == "passed"
+    assert found.tested[3].dwells == 12
+
+
+def test_every_limit_is_shown_beside_what_it_is_held_against():
+    data = readings(curved((8.0, 4.0)), FIVE, sd_v=1e-7, count=100)
+    tested = verdict(data).tested
+    assert [(t.what, t.where, t.limit_g) for t in tested] == [
+        (what, where, limit)
+        for what in ("residual", "held out", "with uncertainty")
+        for where, limit in (("at T0", 3e-4), ("over the range", 1e-3))
+    ]
+    assert [t.dwells for t in tested] == [6, 24, 0, 18, 6, 24]
+
+
+def test_a_refusal_leaves_the_earlier_files_and_says_so(tmp_path: Path):
+    folder = tmp_path / "units" / "AT-CHERNIAK"
+    folder.mkdir(parents=True)
+    for name in ("unit.toml", "measurements.csv"):
+        (folder / name).write_bytes((ROOT / "units" / "AT-CHERNIAK" / name).read_bytes())
+    toml = folder / "unit.toml"
+    triaxcal.deliver(folder, tmp_path / "build")
+    header = tmp_path / "build" / "AT-CHERNIAK" / "triax_calib.h"
+    before = header.read_bytes()
+    text = toml.read_text(encoding="utf-8")
+    toml.write_text(text.replace("t0_degc = 20", "t0_degc = 45"), encoding="utf-8")
+    with pytest.raises(triaxcal.RefusedError) as caught:
+        triaxcal.deliver(folder, tmp_path / "build")
+    assert f"{tmp_path / 'build' / 'AT-CHERNIAK'} keeps the files of an earlier run" in str(
+        caught.value
+    )
+    assert header.read_bytes() == before
+    with pytest.raises(triaxcal.RefusedError) as caught:
+        triaxcal.deliver(folder, tmp_path / "elsewhere")
+    assert "earlier" not in str(caught.value)
