@@ -29,9 +29,7 @@ MAY_IMPORT = {
     "keytable": {"base", "unit", "dynamic", "simulation", "design", "rig"},
     "delivery": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
-        "fixedpoint", "codegen",
-        "base", "model", "unit", "readings", "poses", "fitting", "dynamic", "fixedpoint", "codegen",
-        "uncertainty",
+        "fixedpoint", "codegen", "uncertainty",
     },
     "targets": {
         "base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery",
