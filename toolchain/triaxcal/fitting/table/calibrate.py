@@ -15,18 +15,13 @@ from triaxcal.fitting.recorded.checks import CONDITION_MAX, refuse_wrong_unit
 from triaxcal.fitting.recorded.made import recorded_calibration
 from triaxcal.fitting.recorded.temperatures import (
     temperature_findings,
-    thermal_shapes,
 )
-from triaxcal.fitting.recorded.trials import beats
 from triaxcal.fitting.table.candidates import (
     LEFT_OUT_MAX,
     TablePoses,
     TableRow,
-    TableTrial,
     judge_table,
-    one_temperature_trials,
     thermal_design,
-    thermal_trials,
     turns,
 )
 from triaxcal.fitting.table.checks import (
@@ -37,8 +32,10 @@ from triaxcal.fitting.table.checks import (
     refuse_few_poses,
     refuse_open,
 )
+from triaxcal.fitting.table.choice import choose_table
 from triaxcal.fitting.table.harmonics import table_findings
 from triaxcal.fitting.table.oriented import TRACELESS, table_error_g
+from triaxcal.fitting.table.trials import trials_of
 from triaxcal.model.orientation import angle_slopes, angles_from_force, gravity_direction
 from triaxcal.model.terms import NO_TERMS, Terms, products
 from triaxcal.model.types import FloatArray
@@ -77,12 +74,12 @@ def calibrate_table(
     force, sign = known_force(poses.source, layout, readings, table, unit.gravity_g)
     known = TablePoses(readings, force, temps, known_quadratic)
     left_out = turns(known, temperatures)
-    trials = [t for t in _trials(unit, temps, temperatures) if t.parameters <= 3 * len(temps)]
-    rows = [judge_table(trial, known, left_out) for trial in trials]
+    tried = trials_of(unit, temps, temperatures)
+    rows = [judge_table(trial, known, left_out) for trial in tried]
     able = [r for r in rows if r.held_out_g is not None]
-    if not able:
+    if not able or (unit.terms == "auto" and all(r.trial.quadratic for r in able)):
         raise _open(unit, poses, rows)
-    best, why = _choose(able, temperatures)
+    best, why = choose_table(able, temperatures)
     found = sign * (best.own_g + force)
     near = min(temperatures, key=lambda group: abs(temps[group].mean() - unit.t0_degc))
     findings = [
@@ -98,26 +95,6 @@ def calibrate_table(
     return dwells, _calibration(
         unit, layout, poses, known, rows=rows, best=best, why=why, findings=findings
     )
-
-
-def _trials(
-    unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]
-) -> list[TableTrial]:
-    shapes = thermal_shapes(unit, temps, temperatures)
-    if shapes[-1].parameters > 1:
-        if unit.terms == "quadratic":
-            raise RefusedError(
-                f"{unit.source}, [fit] terms",
-                f'"quadratic" with angles at {len(temperatures)} temperatures',
-                expected="one temperature, or linear terms",
-                remedy="make a unit of one temperature, or leave it out",
-            )
-        return [trial for shape in shapes for trial in thermal_trials(shape)]
-    return [
-        trial
-        for trial in one_temperature_trials(shapes[0])
-        if unit.terms == "auto" or (unit.terms == "quadratic") == trial.quadratic
-    ]
 
 
 def _open(unit: UnitDescription, poses: PoseSet, rows: Sequence[TableRow]) -> RefusedError:
@@ -138,18 +115,6 @@ def _open(unit: UnitDescription, poses: PoseSet, rows: Sequence[TableRow]) -> Re
         remedy='add poses over both angles, or remove terms = "quadratic"'
         if unit.terms == "quadratic"
         else "add poses over both angles",
-    )
-
-
-def _choose(rows: Sequence[TableRow], temperatures: list[list[int]]) -> tuple[TableRow, str]:
-    unbeaten = [r for r in rows if not any(beats(o.errors_g, r.errors_g) for o in rows)]
-    best = min(unbeaten, key=lambda r: r.trial.parameters)
-    inner = len(temperatures) - 2 if len(temperatures) >= 4 else 0
-    also = f" and {inner} temperatures" if inner else ""
-    return best, (
-        f"{best.trial.label}, {best.trial.way}: held-out error "
-        f"{(best.held_out_g or 0.0) * 1e3:.3g} mg a component, each pose{also} held out in turn; "
-        f"the simplest of {len(rows)} candidates; no other is significantly better"
     )
 
 
@@ -199,9 +164,15 @@ def _calibration(
     findings: Sequence[str],
 ) -> Calibration:
     shape, temps = best.fit.shape, known.temps_degc
-    covariance, terms = _covariance(best, known)
+    full = best.fit.full
     errors = np.linalg.norm(best.own_g + known.force, axis=1) - unit.gravity_g
-    dof = 3 * len(temps) - best.trial.parameters
+    if full is None:
+        covariance, terms = _covariance(best, known)
+        dof = 3 * len(temps) - best.trial.parameters
+    else:
+        covariance = full.covariance
+        terms = TermsCovariance(full.quadratic_covariance, full.cross)
+        dof = max(1, 3 * len(temps) - round(float(full.effective.sum())))
     lengths = _left_out_lengths(best, known, unit.gravity_g)
     recording = RecordingFit(
         poses=poses,

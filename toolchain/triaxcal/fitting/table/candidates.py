@@ -1,8 +1,9 @@
 """Candidates of poses with known angles, P0: each fitted, each judged by poses held out.
 
 At one temperature they are the forms of `oriented`; over temperature the forward form (28) with
-polynomials, which is linear in all unknowns: U = sum_p f_p(T) (d0_p + D_p g). Left out in turn is
-every pose, and every inner temperature where there are four and more.
+polynomials, which is linear in all unknowns: U = sum_p f_p(T) (d0_p + D_p g). Beside each of these
+stand all terms with their priors (`full`). Held out in turn is every pose, and every inner
+temperature where there are four and more: what they show decides, not a condition number.
 """
 
 from __future__ import annotations
@@ -14,16 +15,11 @@ import numpy as np
 
 from triaxcal.fitting.core.calibration import Candidate
 from triaxcal.fitting.recorded.checks import CONDITION_MAX
-from triaxcal.fitting.recorded.frame import rotation_to, turned_constants
-from triaxcal.fitting.recorded.magnitude import fit_scalar
-from triaxcal.fitting.recorded.scalar import NINE, scalar_data
-from triaxcal.fitting.recorded.temperatures import gain_functions
-from triaxcal.fitting.recorded.trials import detail
+from triaxcal.fitting.table.allterms import AllTerms, TablePriors
+from triaxcal.fitting.table.full import FullFit, fit_full
 from triaxcal.fitting.table.oriented import (
+    TRACELESS,
     OrientedFit,
-    SerialGrid,
-    inverse_linear,
-    inverse_quadratic,
     scaled_condition,
 )
 from triaxcal.model.metrological import force_from_voltage, pack_constants
@@ -33,6 +29,8 @@ from triaxcal.model.types import BoolArray, FloatArray
 
 LEFT_OUT_MAX = 10.0 * CONDITION_MAX
 """Of what a turn leaves: it is only to judge, not to ship."""
+OPEN = 1e6
+"""Condition number of quadratic terms that the poses leave open; below, held-out poses judge."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +73,15 @@ class TableFit:
     quadratic : array, shape (3, 6), or None
         Q of a = l + Q p(l).
     condition : float
+    full : FullFit or None
+        With priors: all that it gives.
     """
 
     shape: ThermalShape
     constants: FloatArray
     quadratic: FloatArray | None
     condition: float
+    full: FullFit | None = None
 
     def force_g(self, poses: TablePoses) -> FloatArray:
         """Specific force, shape (n, 3), of the poses' readings."""
@@ -94,7 +95,10 @@ class TableFit:
 
 @dataclass(frozen=True)
 class TableTrial:
-    """A candidate: label, way and solver; `gains` functions of temperature for K, all for U0."""
+    """A candidate: label, way and solver; `gains` functions of temperature for K, all for U0.
+
+    With `priors` all terms are fitted, whatever the solver.
+    """
 
     label: str
     way: str
@@ -103,16 +107,20 @@ class TableTrial:
     unknowns: int
     gains: int = 1
     quadratic: bool = False
+    priors: TablePriors | None = None
 
     @property
     def parameters(self) -> int:
-        """Free parameters over all temperatures."""
+        """Free parameters over all temperatures, those that only a prior determines left out."""
         if self.solver is not None:
             return self.unknowns
-        return 9 * self.gains + 3 * self.shape.parameters
+        of_q = 3 * len(TRACELESS) if self.priors is not None else 0
+        return 9 * self.gains + 3 * self.shape.parameters + of_q
 
-    def fit(self, poses: TablePoses) -> TableFit:
-        """Fit to the poses."""
+    def fit(self, poses: TablePoses, left_out: Sequence[BoolArray] = ()) -> TableFit:
+        """Fit to the poses; with priors also what each of `left_out` is to the others."""
+        if self.priors is not None:
+            return _all_terms(self, self.priors, poses, left_out)
         if self.solver is None:
             return _forward_over_temperature(self.shape, self.gains, poses)
         found = self.solver(poses.readings, poses.target)
@@ -165,25 +173,6 @@ class TableRow:
         )
 
 
-def one_temperature_trials(shape: ThermalShape) -> list[TableTrial]:
-    """The forms of P0; simpler ones first."""
-    return [
-        TableTrial("linear (12)", "inverse form", shape, inverse_linear, 12),
-        TableTrial("linear (28)", "forward form", shape, _forward, 12),
-        TableTrial("nine constants and the turn to the table", "|a| = g", shape, _scalar, 12),
-        TableTrial("quadratic (13)", "inverse form", shape, inverse_quadratic, 27, quadratic=True),
-        TableTrial("quadratic (29)", "forward form", shape, _forward_quadratic, 27, quadratic=True),
-    ]
-
-
-def thermal_trials(shape: ThermalShape) -> list[TableTrial]:
-    """The forward form with a thermal function, and K with fewer functions."""
-    return [
-        TableTrial(f"linear (28); {detail(shape, n)}", "forward form", shape, None, 0, n)
-        for n in gain_functions(shape)
-    ]
-
-
 def turns(poses: TablePoses, temperatures: Sequence[Sequence[int]]) -> list[BoolArray]:
     """Masks of what is held out: each pose, then each inner temperature of four and more."""
     count = len(poses.readings)
@@ -198,45 +187,27 @@ def turns(poses: TablePoses, temperatures: Sequence[Sequence[int]]) -> list[Bool
 
 def judge_table(trial: TableTrial, poses: TablePoses, left_out: Sequence[BoolArray]) -> TableRow:
     """Fit a trial to all poses, and to what each turn leaves."""
-    fit = trial.fit(poses)
+    fit = trial.fit(poses, left_out)
     own = fit.force_g(poses) - poses.force
-    if fit.condition > CONDITION_MAX or 3 * (len(own) - 1) < trial.parameters:
-        return TableRow(trial, fit, own, None)
+    if fit.full is not None:
+        found = fit.full.errors_g
+        held_out = None if found is None else float(np.sqrt(np.mean(found**2)))
+        return TableRow(trial, fit, own, held_out, found)
+    own_max, turn_max = (OPEN, OPEN) if trial.quadratic else (CONDITION_MAX, LEFT_OUT_MAX)
+    if fit.condition > own_max or 3 * (len(own) - 1) < trial.parameters:
+        return TableRow(trial, fit, own, None, open_at=fit.condition)
     errors = []
     for mask in left_out:
         try:
             part = trial.fit(poses.select(~mask))
         except np.linalg.LinAlgError:  # singular to the last digit
             return TableRow(trial, fit, own, None, open_at=np.inf)
-        if part.condition > LEFT_OUT_MAX:
-            return TableRow(trial, fit, own, None)
+        if part.condition > turn_max:
+            return TableRow(trial, fit, own, None, open_at=part.condition)
         out = poses.select(mask)
         errors.append(part.force_g(out) - out.force)
     every = np.concatenate(errors)
     return TableRow(trial, fit, own, float(np.sqrt(np.mean(every**2))), every)
-
-
-def _forward(readings: FloatArray, force: FloatArray) -> OrientedFit:
-    return SerialGrid.of(force).fit(readings)
-
-
-def _forward_quadratic(readings: FloatArray, force: FloatArray) -> OrientedFit:
-    return SerialGrid.of(force, quadratic=True).fit(readings)
-
-
-def _scalar(readings: FloatArray, force: FloatArray) -> OrientedFit:
-    """|a| = g alone, then turned to the table: what the angles' errors cannot spoil."""
-    gravity_g = float(np.linalg.norm(force, axis=1).mean())
-    ones = np.ones(len(readings))
-    fit = fit_scalar(NINE, scalar_data(readings, ones[:, None], ones, gravity_g), 1)
-    found = _oriented(fit.constants()[:, 0], fit.condition)
-    rotation = rotation_to(found.force_g(readings), force)
-    turned = turned_constants(fit.constants(), rotation)[:, 0]
-    return _oriented(turned, fit.condition)
-
-
-def _oriented(constants: FloatArray, condition: float) -> OrientedFit:
-    return OrientedFit(constants[:9].reshape(3, 3), constants[9:], None, condition)
 
 
 def thermal_design(shape: ThermalShape, gains: int, poses: TablePoses) -> FloatArray:
@@ -254,6 +225,18 @@ def _forward_over_temperature(shape: ThermalShape, gains: int, poses: TablePoses
     constants[9:] = solution[:, 3 * gains :]
     known = _with_known(None, poses.known)
     return TableFit(shape, constants, known, scaled_condition(design))
+
+
+def _all_terms(
+    trial: TableTrial, priors: TablePriors, poses: TablePoses, left_out: Sequence[BoolArray]
+) -> TableFit:
+    """All terms, from the constants of the forward form."""
+    start = _forward_over_temperature(trial.shape, trial.gains, poses)
+    basis = trial.shape.basis(poses.temps_degc)
+    problem = AllTerms(poses.readings, poses.force, basis, trial.gains, poses.known)
+    found = fit_full(problem, start.constants, priors, left_out)
+    quadratic = found.quadratic + poses.known
+    return TableFit(trial.shape, found.constants, quadratic, found.condition, found)
 
 
 def _with_known(quadratic: FloatArray | None, known: FloatArray) -> FloatArray | None:

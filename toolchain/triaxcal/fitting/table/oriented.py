@@ -78,6 +78,9 @@ def inverse_linear(readings: FloatArray, force: FloatArray) -> OrientedFit:
 def inverse_quadratic(readings: FloatArray, force: FloatArray) -> OrientedFit:
     """P0 (13), (22) in products of the linear result: all nine unknowns an axis at once.
 
+    The condition number is that of the known forces: noise in a product that no position has would
+    pass for the product.
+
     g = c0 + C l + Q p(l) is solved with l of (12); then C l + c0 is the next l, until it stays: the
     linear part of the answer is then l itself. Each round gains the size of Q.
     """
@@ -90,7 +93,7 @@ def inverse_quadratic(readings: FloatArray, force: FloatArray) -> OrientedFit:
         K = (K @ np.linalg.inv(solution[1:4].T)).astype(np.float64)
         U0 = U0 - K @ solution[0]
         Q = solution[4:].T @ TRACELESS
-    return OrientedFit(K, U0, Q, scaled_condition(design))
+    return OrientedFit(K, U0, Q, SerialGrid.of(force, quadratic=True).condition)
 
 
 @dataclass(frozen=True)
