@@ -33,6 +33,7 @@ LONG = {
     "family/test_rate_term.py",
     "family/test_real_recordings.py",
     "family/test_saved.py",
+    "family/test_table_terms.py",
     "family/test_tables.py",
     "family/test_unchecked.py",
     "rig/test_cli_rig.py",

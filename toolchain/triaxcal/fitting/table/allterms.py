@@ -63,7 +63,7 @@ class AllTerms:
     @property
     def linear(self) -> int:
         """Unknowns of K and U0."""
-        return 9 * self.gains + 3 * self.basis.shape[1]
+        return 9 * self.gains + 3 * int(self.basis.shape[1])
 
     def constants(self, theta: FloatArray) -> FloatArray:
         """Constants (12, P) of the unknowns."""

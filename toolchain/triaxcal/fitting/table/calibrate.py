@@ -26,7 +26,6 @@ from triaxcal.fitting.table.candidates import (
 )
 from triaxcal.fitting.table.checks import (
     known_force,
-    outlier_findings,
     pose_temperatures,
     refuse_degrees,
     refuse_few_poses,
@@ -36,8 +35,10 @@ from triaxcal.fitting.table.choice import choose_table
 from triaxcal.fitting.table.harmonics import table_findings
 from triaxcal.fitting.table.oriented import TRACELESS, table_error_g
 from triaxcal.fitting.table.trials import trials_of
+from triaxcal.fitting.table.wrongrows import wrong_row_findings, wrong_rows
 from triaxcal.model.orientation import angle_slopes, angles_from_force, gravity_direction
-from triaxcal.model.terms import NO_TERMS, Terms, products
+from triaxcal.model.positions import AXES
+from triaxcal.model.terms import NO_TERMS, PRODUCT_NAMES, Terms, products
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet, find_poses
 from triaxcal.readings.measurements import MeasurementSet
@@ -71,21 +72,26 @@ def calibrate_table(
     refuse_degrees(poses.source, angles, readings, table, unit.gravity_g)
     refuse_open(poses, gravity_direction(angles.kind, table))
     temps, temperatures = pose_temperatures(unit, poses)
-    force, sign = known_force(poses.source, layout, readings, table, unit.gravity_g)
+    force, sign = known_force(poses, layout, table, unit.gravity_g)
     known = TablePoses(readings, force, temps, known_quadratic)
     left_out = turns(known, temperatures)
     tried = trials_of(unit, temps, temperatures)
     rows = [judge_table(trial, known, left_out) for trial in tried]
     able = [r for r in rows if r.held_out_g is not None]
-    if not able or (unit.terms == "auto" and all(r.trial.quadratic for r in able)):
+    # Where no linear candidate can be scored, quadratic terms only hide what is open.
+    if not able or (
+        any(not r.trial.quadratic for r in rows) and all(r.trial.quadratic for r in able)
+    ):
         raise _open(unit, poses, rows)
     best, why = choose_table(able, temperatures)
+    wrong = wrong_rows(best.trial, known, best)
     found = sign * (best.own_g + force)
     near = min(temperatures, key=lambda group: abs(temps[group].mean() - unit.t0_degc))
     findings = [
         *poses.findings,
-        *outlier_findings(unit, angles, poses, table=table, sign=sign, best=best),
+        *wrong_row_findings(unit, angles, poses, table=table, sign=sign, rows=wrong),
         *([BEYOND_1_G] if best.trial.parameters > 12 and best.fit.quadratic is not None else []),
+        *_shares(best),
         *temperature_findings(unit, poses.temps_degc),
         *table_findings(angles, table[near], readings[near], found[near], unit.gravity_g),
         _angle_residuals(angles, table, found),
@@ -116,6 +122,25 @@ def _open(unit: UnitDescription, poses: PoseSet, rows: Sequence[TableRow]) -> Re
         if unit.terms == "quadratic"
         else "add poses over both angles",
     )
+
+
+def _shares(best: TableRow) -> list[str]:
+    """The quadratic terms, and how much of each the readings determine and how much its prior."""
+    full = best.fit.full
+    if full is None:
+        return []
+    sd = np.sqrt(np.diag(full.quadratic_covariance)).reshape(3, 6)
+    rows = [
+        f"{AXES[i]}: "
+        + ", ".join(
+            f"{name} {full.quadratic[i, k] * 1e6:.3g} +- {sd[i, k] * 1e6:.2g} "
+            f"({max(full.by_data[i, k], 0.0) * 100.0:.0f} %)"
+            for k, name in enumerate(PRODUCT_NAMES)
+        )
+        for i in range(3)
+    ]
+    head = "quadratic terms, 1e-6 g/g^2 +- sd (share of the readings in it, the rest is [priors])"
+    return [f"{head}; {'; '.join(rows)}"]
 
 
 def _angle_residuals(angles: Angles, table: FloatArray, force: FloatArray) -> str:

@@ -7,17 +7,15 @@ import math
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fitting.core.outliers import worst_outlier
 from triaxcal.fitting.recorded.checks import CONDITION_MAX, turned_columns
 from triaxcal.fitting.recorded.temperatures import temperature_groups
-from triaxcal.fitting.table.candidates import TableRow
 from triaxcal.fitting.table.oriented import design_condition, inverse_linear
-from triaxcal.model.orientation import angles_from_force, gravity_direction
+from triaxcal.model.orientation import gravity_direction
 from triaxcal.model.positions import AXES
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.poses.poses import PoseSet
 from triaxcal.unit.description import UnitDescription
-from triaxcal.unit.recording import ANGLE_NAMES, Angles, RecordingLayout
+from triaxcal.unit.recording import Angles, RecordingLayout
 
 
 def refuse_few_poses(poses: PoseSet) -> None:
@@ -82,23 +80,53 @@ def refuse_degrees(
     )
 
 
+def _axes(readings: FloatArray, force: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Along which axis of the table each output lies, and its sign, each (3,)."""
+    K = inverse_linear(readings, force).K
+    scaled = K / np.linalg.norm(K, axis=1, keepdims=True)
+    along = np.abs(scaled).argmax(axis=1)
+    return along, np.sign(scaled[np.arange(3), along])
+
+
+def _in_order(along: IntArray, signs: FloatArray) -> bool:
+    return bool((along == np.arange(3)).all()) and abs(signs.sum()) == 3.0
+
+
+def _refuse_wrong_rows(poses: PoseSet, readings: FloatArray, force: FloatArray) -> None:
+    """Refuse rows that turn the axes of all: on a narrow grid a few gross ones do."""
+    own = _linear_residual(readings, force)
+    kept = list(range(len(force)))
+    for _ in range(len(force) // 5):
+        rest = [[i for i in kept if i != k] for k in kept]
+        left = [_linear_residual(readings[part], force[part]) for part in rest]
+        best = int(np.argmin(left))
+        kept = rest[best]
+        if left[best] < own / 10.0 and _in_order(*_axes(readings[kept], force[kept])):
+            wrong = [poses.poses[k] for k in range(len(force)) if k not in kept]
+            numbers = " and ".join(f"pose {pose.number}" for pose in wrong)
+            raise RefusedError(
+                f"{poses.source}, line {wrong[0].line}",
+                f"{numbers} contradict{'s' * (len(wrong) == 1)} the others: all fit the angles "
+                f"within {own * 1e3:.3g} mg rms, the others within {left[best] * 1e3:.3g} mg",
+                expected="angles and readings of one position in each row",
+                remedy="check angles and readings, and correct or remove the row",
+            )
+
+
 def known_force(
-    source: str,
+    poses: PoseSet,
     layout: RecordingLayout,
-    readings: FloatArray,
     table: FloatArray,
     gravity_g: float,
 ) -> tuple[FloatArray, float]:
     """Known forces, (n, 3), with the sign of the readings; refuses exchanged or turned axes."""
-    angles = layout.angles
+    angles, readings = layout.angles, poses.readings
     assert angles is not None
     force = gravity_g * gravity_direction(angles.kind, table)
-    K = inverse_linear(readings, force).K
-    scaled = K / np.linalg.norm(K, axis=1, keepdims=True)
-    along = np.abs(scaled).argmax(axis=1)
-    signs = np.sign(scaled[np.arange(3), along])
-    if (along == np.arange(3)).all() and abs(signs.sum()) == 3.0:
+    along, signs = _axes(readings, force)
+    if _in_order(along, signs):
         return force * signs[0], float(signs[0])
+    _refuse_wrong_rows(poses, readings, force)
     found = ", ".join(
         f"{AXES[i]} along {'+' if signs[i] > 0 else '-'}{AXES[along[i]]}" for i in range(3)
     )
@@ -111,54 +139,10 @@ def known_force(
         where = [int(np.flatnonzero(along == k)[0]) for k in range(3)]
         columns = turned_columns(layout, where, [turned[i, along[i]] < 0.0 for i in where])
     raise RefusedError(
-        source,
+        poses.source,
         f"the sensing axes lie {found} of the table",
         expected="x along x, y along y, z along z, of one sign",
         remedy=f"{handed}the angles may be of other axes; if they are right, {columns}"
         if columns
         else "check the angles and the columns of [recording] acceleration",
-    )
-
-
-def outlier_findings(
-    unit: UnitDescription,
-    angles: Angles,
-    poses: PoseSet,
-    *,
-    table: FloatArray,
-    sign: float,
-    best: TableRow,
-) -> list[str]:
-    """Names a pose whose angles the other poses contradict; refuses it beyond the limit."""
-    count = len(best.own_g)
-    if best.errors_g is None:
-        return []
-    left_out = best.errors_g[:count]
-    found = worst_outlier(best.own_g, left_out, best.trial.parameters)
-    if found is None:
-        return []
-    k = found.indices[0]
-    away = float(np.linalg.norm(left_out[k]))
-    known = unit.gravity_g * gravity_direction(angles.kind, table[k : k + 1])
-    seen = angles_from_force(angles.kind, known + sign * left_out[k : k + 1])[0]
-    words = [name.replace("_", " ") for name in ANGLE_NAMES[angles.kind][:2]]
-    stated = ", ".join(f"{w} {v:.5g}" for w, v in zip(words, np.degrees(table[k, :2]), strict=True))
-    fitted = ", ".join(f"{w} {v:.5g}" for w, v in zip(words, np.degrees(seen), strict=True))
-    pose = poses.poses[k]
-    rivals = "".join(f" or pose {poses.poses[i].number}" for i in found.indices[1:4])
-    text = (
-        f"pose {pose.number}{rivals} contradicts the others: the file has {stated} deg, the "
-        f"fit of the others gives {fitted} deg; the difference is {away * 1e3:.3g} mg, the "
-        f"residuals of the others are {found.others * 1e3:.2g} mg rms"
-    )
-    remedy = "check its angles and readings, and correct or remove the row"
-    temp = unit.t0_degc if pose.temp_degc is None else pose.temp_degc
-    limit, key = unit.limits.at(temp, unit.t0_degc)
-    if away <= limit:
-        return [f"{text}; {remedy}"]
-    raise RefusedError(
-        f"{poses.source}, line {pose.line}",
-        text,
-        expected=f"at most {limit * 1e3:g} mg ({key})",
-        remedy=remedy,
     )
