@@ -202,6 +202,6 @@ def _refuse_beyond_limits(delivery: Delivery) -> None:
                     f"method {delivery.chosen.method.label} is within "
                     f"{delivery.model_error_g * 1e3:.3g} mg of the model, its LSB is "
                     f"{1e3 / 2**unit.output_q:.3g} mg: choose another "
-                    "compensation.method, a higher output_q or more adc.bits"
+                    "compensation.method or a higher output_q"
                 ),
             )

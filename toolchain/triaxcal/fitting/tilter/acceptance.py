@@ -24,6 +24,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.grouping import TemperatureGroup, group_dwells
 from triaxcal.fitting.tilter.estimators import CONDITION_MAX
+from triaxcal.fitting.tilter.resolution import limit_below_a_code
 from triaxcal.model.metrological import (
     force_from_voltage,
     unpack_constants,
@@ -81,9 +82,11 @@ def unacceptable(
             expected="at least one, to check the result",
             remedy="widen the range, or omit it",
         )
-    singular = _singular_curve(unit, calibration)
-    if singular is not None:
-        return singular
+    first = _singular_curve(unit, calibration) or limit_below_a_code(
+        unit, calibration, measurements
+    )
+    if first is not None:
+        return first
     errors = dwell_errors_g(unit, calibration, dwells)
     limits = np.array([unit.limits.at(d.temp_degc, unit.t0_degc)[0] for d in dwells])
     worst = int((errors / limits).argmax())

@@ -34,6 +34,7 @@ from triaxcal.fitting.tilter.estimators import (
 )
 from triaxcal.fitting.tilter.heldout import check_errors, held_out_test
 from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
+from triaxcal.fitting.tilter.resolution import code_notes
 from triaxcal.fitting.tilter.selection import PREFERENCE, select
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import NO_TERMS, Terms
@@ -82,7 +83,11 @@ def calibrate(
     return replace(
         found,
         pair=pair,
-        notes=(*contradiction(unit, groups), *of_pair),
+        notes=(
+            *contradiction(unit, groups),
+            *code_notes(unit, found, measurements),
+            *of_pair,
+        ),
         held_out=held_out_test(chosen, selection.shape, groups, checks),
     )
 
