@@ -1,6 +1,7 @@
 """The errors that a user can cause, each reported in one line.
 
 RefusedError            the data or the result was refused: exit code 1
+  ContradictionError    readings contradict each other: a diagnosis can name the cause
   UsageError            what was asked for does not exist or fit together: exit code 2
 
 Every message has the place (file, row, key), what was found, what was expected, what to do.
@@ -61,6 +62,10 @@ def refused_by_system(
 def reason_of(error: OSError) -> str:
     """Why the operating system refused."""
     return (error.strerror or str(error)).lower()
+
+
+class ContradictionError(RefusedError):
+    """Readings contradict each other or their description, and the cause has to be found."""
 
 
 class UsageError(RefusedError):

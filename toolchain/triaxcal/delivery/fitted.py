@@ -14,8 +14,10 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.base.plaindata import plain
 from triaxcal.base.tomltable import content_of, text_of
+from triaxcal.delivery.causes import with_cause
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.recorded import PairTerms
 from triaxcal.fitting.pair.cross_coupling import stated_pair
 from triaxcal.fitting.tilter.acceptance import refuse_unacceptable
 from triaxcal.fitting.tilter.calibrate import calibrate
@@ -68,10 +70,20 @@ def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
         unit, measurements, calibration = calibrate_recording(unit, unit.recording, folder)
     else:
         measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
-        calibration = calibrate(unit, measurements, stated_pair(unit, folder))
+        calibration = _of_tilter(unit, measurements, stated_pair(unit, folder))
     if inputs_sha256(folder, unit) != inputs:
         raise _changed(folder)
     return Fitted(unit, measurements, inputs, calibration)
+
+
+def _of_tilter(
+    unit: UnitDescription, measurements: MeasurementSet, pair: PairTerms | None
+) -> Calibration:
+    """Calibration; a refusal names the cause that explains the readings best."""
+    try:
+        return calibrate(unit, measurements, pair)
+    except RefusedError as refusal:
+        raise with_cause(refusal, unit, measurements) from None
 
 
 def _changed(path: Path) -> RefusedError:
@@ -106,7 +118,7 @@ def fit_columns(unit: UnitDescription, readings: Any) -> Fitted:
     else:
         measurements = measurements_of(columns, unit)
         digest.update(json_bytes(plain(measurements)))
-        calibration = calibrate(unit, measurements, None)
+        calibration = _of_tilter(unit, measurements, None)
     return Fitted(unit, measurements, digest.hexdigest(), calibration)
 
 
@@ -133,7 +145,11 @@ def refuse_beyond_limits(fitted: Fitted) -> None:
         Names the readings at fault, or the thermal function, and what to do.
     """
     if fitted.calibration.recording is None:
-        refuse_unacceptable(fitted.unit, fitted.calibration, fitted.measurements)
+        try:
+            refuse_unacceptable(fitted.unit, fitted.calibration, fitted.measurements)
+        except RefusedError as refusal:
+            parts = fitted.unit, fitted.measurements
+            raise with_cause(refusal, *parts, contradiction=True) from None
         return
     from triaxcal.fitting.route import refuse_poses_beyond_limits  # noqa: PLC0415
 

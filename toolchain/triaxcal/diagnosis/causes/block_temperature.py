@@ -8,6 +8,7 @@ import numpy as np
 
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo
 from triaxcal.diagnosis.core.readings import Readings, rows_in_words
+from triaxcal.model.thermal.shape import GROUP_GAP_DEGC
 from triaxcal.model.types import FloatArray
 
 _FORMS: dict[str, Callable[[FloatArray], FloatArray]] = {
@@ -20,6 +21,8 @@ _FORMS: dict[str, Callable[[FloatArray], FloatArray]] = {
 _WORKING_DEGC = -80.0, 160.0
 """Where accelerometers are calibrated: what a form makes of a temperature must be inside."""
 _LEAST_DEGC = 3.0
+_NOT_AT_T0, _OUTSIDE = -6.0, -20.0
+"""Log probability of readings without the reference temperature, and outside of these."""
 
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
@@ -65,7 +68,7 @@ def _at_t0(readings: Readings, own: np.ndarray, new: FloatArray, tests: set[int]
 def _strange(means: FloatArray, t0_degc: float) -> float:
     away = float(np.abs(means - t0_degc).min())
     outside = (means < _WORKING_DEGC[0]) | (means > _WORKING_DEGC[1])
-    return (-40.0 if away > 2.5 else 0.0) - 40.0 * float(outside.any())
+    return (_NOT_AT_T0 if away > GROUP_GAP_DEGC else 0.0) + _OUTSIDE * float(outside.any())
 
 
 def _mended(form: str, blocks: np.ndarray) -> Undo:

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo
+from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo, falling
 from triaxcal.diagnosis.core.readings import FORCES, POSITIONS, Readings
 from triaxcal.model.types import BoolArray, FloatArray
 
@@ -23,6 +23,14 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
             yield Hypothesis(
                 f"{names} at every temperature",
                 _relabelled(a, b, None),
+                rows=readings.rows[two],
+                change=f"with {names} exchanged throughout",
+                places=2.0 * len(pairs),
+            )
+        if not readings.polarity and (FORCES[a] == -FORCES[b]).all():
+            yield Hypothesis(
+                f"{names} at every temperature, all sensitivities being negative",
+                falling(_relabelled(a, b, None)),
                 rows=readings.rows[two],
                 change=f"with {names} exchanged throughout",
                 places=2.0 * len(pairs),

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo
+from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo, falling
 from triaxcal.diagnosis.core.readings import FORCES, POSITIONS, Readings
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import BoolArray, FloatArray
@@ -23,6 +23,14 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
                 _turned(axis, None),
                 change=f"with the unit half a turn about {AXES[axis]}, which exchanges {pairs}",
                 places=6.0,
+            )
+        if not readings.polarity:
+            yield Hypothesis(
+                f"about {AXES[axis]}, all sensitivities being negative",
+                falling(_turned(axis, None)),
+                change=f"with the unit half a turn about {AXES[axis]}, which exchanges {pairs}",
+                places=6.0,
+                log_prior=-2.0,
             )
         for block in blocks:
             degc = readings.block_degc(block)

@@ -19,8 +19,10 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     for outputs in sets:
         names = " and ".join(AXES[i] for i in outputs)
         plural = "s" if len(outputs) > 1 else ""
+        signs = np.sign(known.readings.volts_per_g) * _signs(outputs)
+        key = f"polarity = [{', '.join(f'{s:.0f}' for s in signs)}]"
         yield Hypothesis(
-            f"output{plural} {names}",
+            f"output{plural} {names} ({key} under [sensor])",
             _inverted(outputs),
             change=f"with output{plural} {names} inverted",
             places=float(len(sets)),
@@ -29,8 +31,12 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
         )
 
 
+def _signs(outputs: tuple[int, ...]) -> FloatArray:
+    return np.where(np.isin(np.arange(3), outputs), -1.0, 1.0)
+
+
 def _inverted(outputs: tuple[int, ...]) -> Undo:
-    signs = np.where(np.isin(np.arange(3), outputs), -1.0, 1.0)
+    signs = _signs(outputs)
 
     def undo(readings: Readings, _amplitudes: FloatArray) -> Readings:
         return readings.but(outputs=readings.outputs * signs)

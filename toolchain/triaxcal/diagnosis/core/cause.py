@@ -92,6 +92,15 @@ class Hypothesis:
         return np.stack(effects, axis=1)
 
 
+def falling(undo: Undo) -> Undo:
+    """The same on a sensor all of whose outputs fall where the force rises."""
+
+    def undone(readings: Readings, amplitudes: FloatArray) -> Readings:
+        return undo(readings.but(outputs=-readings.outputs), amplitudes)
+
+    return undone
+
+
 @dataclass(frozen=True)
 class Known:
     """What a cause may look at when it lists its places.

@@ -26,7 +26,7 @@ from itertools import combinations
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import ContradictionError, RefusedError
 from triaxcal.fitting.core.grouping import TemperatureGroup
 from triaxcal.fitting.tilter.estimators import DEAD_OUTPUT
 from triaxcal.model.positions import AXES, TEST_POSITIONS
@@ -86,7 +86,7 @@ def refuse_exchanged_positions(
 
     Raises
     ------
-    RefusedError
+    ContradictionError
         Naming positions, rows and temperatures; where signs of K alone give it away at every
         temperature, also the key that declares such a unit.
     """
@@ -98,13 +98,13 @@ def refuse_exchanged_positions(
     first = next(pairs for pairs in found if pairs)
     spoiled = [g for g, pairs in zip(groups, found, strict=True) if pairs == first]
     if all(pairs == first for pairs in found) and all(p in _AXIS_PAIRS for p in first):
-        _refuse_signs(source, groups, first, signs, polarity)
+        _refuse_signs(source, groups, polarity)
     row_of = [(spoiled[0].dwells[a].row, spoiled[0].dwells[b].row) for a, b in first]
     rows = "; ".join(f"rows {min(r)} and {max(r)}" for r in row_of)
     remedy = f"exchange {'the positions of these rows' if len(first) == 1 else 'them back'}"
     if len(first) > 1:
         remedy += ", or put the columns of Ux, Uy, Uz in order"
-    raise RefusedError(
+    raise ContradictionError(
         f"{source}, {rows}",
         f"{_exchanged(first)} look exchanged at {_temps([g.temp_degc for g in spoiled])} degC: "
         f"Kxx, Kyy, Kzz are {_diagonal(spoiled[0], ())} V/g as recorded, "
@@ -117,28 +117,41 @@ def refuse_exchanged_positions(
 def _refuse_signs(
     source: str,
     groups: tuple[TemperatureGroup, ...],
-    pairs: list[Exchange],
-    signs: FloatArray,
     polarity: tuple[int, int, int] | None,
 ) -> None:
-    turned = {_AXIS_PAIRS[pair] for pair in pairs}
-    names = " and ".join(f"K{AXES[i]}{AXES[i]}" for i in sorted(turned))
-    actual = [int(-s if i in turned else s) for i, s in enumerate(signs)]
-    expected = "signs of Kxx, Kyy, Kzz all alike"
+    """Signs that differ at every temperature: positions, a turn of the unit, or its polarity.
+
+    A half turn inverts two outputs, an exchange of opposite positions one. Where no polarity is
+    stated one output that differs from two may be either: the sensitivities may all be negative.
+    """
+    shown = np.sign(_own(groups[0], ()))
+    relative = shown * (polarity or (1, 1, 1))
+    odd = int(np.argmax(relative != np.sign(relative.sum())))
+    wrong = [i for i in range(3) if relative[i] < 0] if polarity else [odd]
+    pair = next(p for p, axis in _AXIS_PAIRS.items() if axis == odd)
+    others = [p for p, axis in _AXIS_PAIRS.items() if axis != odd]
+    turn = f"half a turn of the unit about {AXES[odd]} ({_exchanged(others)} exchanged throughout)"
+    swap = f"{_exchanged([pair])} exchanged throughout"
+    expected, exchanged = "signs of Kxx, Kyy, Kzz all alike", [pair]
+    ways = f"{swap} or {turn}"
     if polarity is not None:
         expected = f"those of [sensor] polarity = {list(polarity)}"
+        exchanged = [p for p, axis in _AXIS_PAIRS.items() if axis in wrong]
+        ways = {1: swap, 2: turn, 3: "all positions turned over"}[len(wrong)]
+    names = " and ".join(f"K{AXES[i]}{AXES[i]}" for i in wrong)
     rows = "; ".join(
         f"rows {min(r)} and {max(r)} ({g.temp_degc:.6g} degC)"
         for g in groups
-        for r in [(g.dwells[a].row, g.dwells[b].row) for a, b in pairs]
+        for r in [(g.dwells[a].row, g.dwells[b].row) for a, b in exchanged]
     )
-    raise RefusedError(
+    raise ContradictionError(
         f"{source}, {rows}",
-        f"{names} has the wrong sign at every temperature: Kxx, Kyy, Kzz are "
-        f"{_diagonal(groups[0], ())} V/g; either {_exchanged(pairs)} are exchanged throughout, "
-        "or the unit has this polarity",
+        f"{names} {'has' if len(wrong) == 1 else 'have'} the wrong sign at every temperature: "
+        f"Kxx, Kyy, Kzz are {_diagonal(groups[0], ())} V/g; the readings cannot tell {ways} from "
+        "polarity",
         expected=expected,
-        remedy=f"correct the positions, or set polarity = {actual} under [sensor] in unit.toml",
+        remedy="see how the unit was seated and correct the positions; only if it has this "
+        f"polarity, set polarity = {[int(s) for s in shown]} under [sensor] in unit.toml",
     )
 
 
@@ -179,12 +192,16 @@ def _exchanges(follow: FloatArray) -> list[Exchange]:
     return pairs
 
 
-def _diagonal(group: TemperatureGroup, undo: tuple[Exchange, ...] | list[Exchange]) -> str:
+def _own(group: TemperatureGroup, undo: tuple[Exchange, ...] | list[Exchange]) -> FloatArray:
+    """Kxx, Kyy, Kzz of (10), shape (3,), V/g."""
     voltage = np.array([d.voltage_v for d in group.dwells])
     for a, b in undo:
         voltage[[a, b]] = voltage[[b, a]]
-    diagonal = np.sum(voltage * _FORCES, axis=0) / 2.0
-    return "(" + ", ".join(f"{k:+.4g}" for k in diagonal) + ")"
+    return np.asarray(np.sum(voltage * _FORCES, axis=0) / 2.0)
+
+
+def _diagonal(group: TemperatureGroup, undo: tuple[Exchange, ...] | list[Exchange]) -> str:
+    return "(" + ", ".join(f"{k:+.4g}" for k in _own(group, undo)) + ")"
 
 
 def _exchanged(pairs: list[Exchange]) -> str:
