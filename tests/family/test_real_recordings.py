@@ -15,6 +15,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.drift import Drift, study
 from triaxcal.fitting.route import calibrate_recording
 from triaxcal.model.types import FloatArray
+from triaxcal.poses.poses import find_poses
 from triaxcal.readings.samples import read_samples
 from triaxcal.unit.description import read_unit
 
@@ -84,13 +85,24 @@ def test_mikoffs_units(tmp_path: Path, unit: int) -> None:
     assert found.held_out_g < 0.5e-3
 
 
-def test_mikoffs_unit_2_is_better_with_quadratic_terms(tmp_path: Path) -> None:
-    source = recording("mikoff_mpu9150") / "imu1.log"
-    calibration = calibrated(folder_of(tmp_path, source, "mikoff-mpu9150"))
-    assert calibration.recording is not None
-    assert calibration.terms.quadratic_per_g is not None
-    linear = next(c for c in calibration.candidates if c.label == "linear, nine constants")
-    assert (calibration.recording.held_out_g or 1.0) < 0.6 * (linear.held_out_g or 0.0)
+def test_tomisuarez2s_ten_poses_are_found_and_give_his_biases(tmp_path: Path) -> None:
+    """A hand-held log with default keys; one threshold for all of it found four of ten poses."""
+    source = recording("tomisuarez2_mpu6050") / "example_data_calibration.csv"
+    folder = folder_of(tmp_path, source, "mikoff-mpu9150")
+    with (folder / "unit.toml").open("a") as toml:
+        toml.write('acceleration_unit = "count"\nskip_rows = 5\n')
+    unit = read_unit(folder)
+    assert unit.recording is not None
+    samples = read_samples(folder, unit.recording, unit.temperature_sensor)
+    poses = find_poses(samples, unit.recording)
+    assert len(poses.poses) == 10
+
+    def residual(theta: FloatArray) -> FloatArray:
+        K = np.array([theta[[0, 3, 4]], theta[[3, 1, 5]], theta[[4, 5, 2]]])
+        return np.asarray(np.linalg.norm((poses.readings - theta[6:]) @ K / 16384.0, axis=1) - 1.0)
+
+    bias = least_squares(residual, np.array([1.0, 1, 1, 0, 0, 0, 0, 0, 0]), x_scale="jac").x[6:]
+    assert np.abs(bias - [712.0, -359.0, -1840.0]).max() < 10.0
 
 
 def test_mikoffs_samples_of_poses_left_out_are_no_worse(tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def test_counts_in_a_mat_file_with_a_large_bias(tmp_path: Path) -> None:
     rows = log(directions(20))
     rows[:, 1:] = np.rint(33000.0 + 415.0 * rows[:, 1:])
     recording = "acceleration = [2, 3, 4]\nacceleration_unit = 'count'\ntime = 1"
-    folder = write_unit(tmp_path / "U", rows, recording)
+    folder = write_unit(tmp_path / "U", rows, recording, more='[fit]\nterms = "linear"\n')
     (folder / "log.csv").unlink()
     savemat(folder / "log.mat", {"IMU": rows})
     toml = (folder / "unit.toml").read_text().replace("log.csv", "log.mat")
@@ -137,11 +137,12 @@ def test_a_recording_ends_in_the_same_c(tmp_path: Path) -> None:
 def test_a_short_pose_is_refused_with_its_length(tmp_path: Path) -> None:
     hold = [3.0] * 12
     hold[3] = 1.7
-    calibration = calibrated(write_unit(tmp_path / "U", log(directions(12), hold)))
+    rows = log(directions(12), hold)
+    calibration = calibrated(write_unit(tmp_path / "U", rows, COLUMNS + "\nstill_s = 2"))
     assert calibration.recording is not None
     (refused,) = calibration.recording.poses.refused
     assert refused.number == 4
-    # The window that shows stillness hides a quarter of a second at either end.
+    # The window that shows motion hides a tenth of a second and more at either end.
     assert refused.reason in {f"1.{d} s at rest, needs 2.0" for d in range(1, 8)}
 
 
@@ -155,14 +156,21 @@ def test_a_clipped_axis_is_named(tmp_path: Path) -> None:
     assert reasons == dict.fromkeys((1, 7), told + "measure with a wider range")
 
 
-def test_a_pose_that_drifts_is_refused(tmp_path: Path) -> None:
+def test_a_pose_that_drifts_has_its_drift_in_its_uncertainty(tmp_path: Path) -> None:
     rows = log(directions(14))
     part = slice(4 * 200, 4 * 200 + 150)  # the fifth pose: 3 s held, 1 s turning before each
     rows[part, 1] += np.linspace(0.0, 0.12, 150)
     calibration = calibrated(write_unit(tmp_path / "U", rows))
     assert calibration.recording is not None
-    assert [r.number for r in calibration.recording.poses.refused] == [5]
-    assert "axis x drifts by 0.0" in calibration.recording.poses.refused[0].reason
+    poses = calibration.recording.poses
+    drift, sd = (np.array([getattr(p, name) for p in poses.poses]) for name in ("drift", "sd_mean"))
+    assert drift[4, 0] == pytest.approx(0.05, abs=0.01)  # half of what it drifts, less its ends
+    # Eight equal parts on a slope: their sd is 0.29 of what it rises, a root of 8 less in the mean.
+    assert sd[4, 0] == pytest.approx(0.1 * 0.10, rel=0.3)
+    assert np.delete(sd[:, 0], 4).max() < 0.004
+    assert poses.weights is not None
+    assert poses.weights[4] < 0.2
+    assert np.median(poses.weights) > 0.4
 
 
 def test_gaps_and_missing_rows_are_told(tmp_path: Path) -> None:
@@ -312,7 +320,7 @@ REFUSED = {
     "all-moving": (
         log(directions(12), 0.4),
         {},
-        "m/s^2: it is not held still; expected poses of at least 2 s",
+        "no pose found: it moves all the time; even at its quietest the mean reading changes by ",
     ),
     "adc-too-narrow": (
         log(directions(12)),

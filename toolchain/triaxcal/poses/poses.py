@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.steady import Steady
-from triaxcal.poses.stillness import Stillness, duration_s, find_stillness
+from triaxcal.poses.means import mean_of
+from triaxcal.poses.refusals import no_poses
+from triaxcal.poses.steady import Steady, reading_of_1_g
+from triaxcal.poses.steps import Steps
+from triaxcal.poses.stillness import SHORTEST_S, Stillness, duration_s, find_stillness
 from triaxcal.readings.samples import ANGLES, READING, TEMP, Samples
 from triaxcal.readings.table import ROW, TIME
 from triaxcal.unit.recording import POSES, SECTIONS, RecordingLayout
-from triaxcal.unit.recordingfile import TIME_UNITS
 
-BATCHES = 8
-_STEPS_S = (5e-4, 0.5)
-"""Plausible times between samples: they distinguish seconds from milliseconds."""
 _SAME_RAD = 1e-6
 """Angles of one pose are written alike in all its rows."""
+SD_FLOOR_G = 1e-4
+"""Standard deviation of a pose that no length of it removes."""
 ALIKE_DEG = 5.0
 """Poses nearer than this to each other are one orientation."""
 
@@ -40,13 +40,20 @@ class Pose:
     reading : array, shape (3,)
         In the unit of the layout.
     sd_mean : array, shape (3,), or None
-        Standard error of `reading`, from batch means; None where rows are poses.
+        Standard deviation of `reading`: noise, sway and drift, and the steps of the readings; None
+        where rows are poses.
     count : int
         Samples.
     temp_degc : float or None
     label : str
         Of its section; "" without.
     angles_rad : array, shape (2 or 3,), or None
+    covariance : array, shape (3, 3), or None
+        Of `reading`; `sd_mean` is the root of its diagonal.
+    scatter : array, shape (3,), or None
+        Standard deviation of the samples.
+    drift : array, shape (3,), or None
+        Mean of the second half less that of the first.
     """
 
     number: int
@@ -59,6 +66,9 @@ class Pose:
     temp_degc: float | None
     label: str
     angles_rad: FloatArray | None
+    covariance: FloatArray | None = None
+    scatter: FloatArray | None = None
+    drift: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -84,6 +94,8 @@ class PoseSet:
     stillness : Stillness or None
         None where rows are poses, or sections say where they are.
     findings : tuple of str
+    reading_of_1_g : float
+        About; in the unit of the layout.
     """
 
     source: str
@@ -91,6 +103,7 @@ class PoseSet:
     refused: tuple[RefusedPose, ...]
     stillness: Stillness | None
     findings: tuple[str, ...]
+    reading_of_1_g: float = 1.0
 
     @property
     def readings(self) -> FloatArray:
@@ -102,6 +115,34 @@ class PoseSet:
         """Shape (poses,); None when the recording has no temperature."""
         temps = [p.temp_degc for p in self.poses if p.temp_degc is not None]
         return np.array(temps) if len(temps) == len(self.poses) and temps else None
+
+    @property
+    def length_sd(self) -> FloatArray | None:
+        """Standard deviation along the reading of each pose, (poses,); None where rows are poses.
+
+        Along the reading less the middle of all: their zero may lie anywhere.
+        """
+        found = [p.covariance for p in self.poses if p.covariance is not None]
+        if len(found) != len(self.poses):
+            return None
+        readings = self.readings
+        spread = readings - (readings.max(axis=0) + readings.min(axis=0)) / 2.0
+        lengths = np.linalg.norm(spread, axis=1)
+        along = spread if lengths.min() > 0.1 * self.reading_of_1_g else readings
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        result: FloatArray = np.sqrt(np.einsum("pi,pij,pj->p", along, np.array(found), along))
+        return result
+
+    @property
+    def weights(self) -> FloatArray | None:
+        """Weight of each pose by its own uncertainty, 1 for the best; None where rows are poses."""
+        sd = self.length_sd
+        if sd is None:
+            return None
+        floor = SD_FLOOR_G * self.reading_of_1_g
+        variance = sd**2 + floor**2
+        result: FloatArray = variance.min() / variance
+        return result
 
 
 def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
@@ -116,15 +157,22 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
         return PoseSet(samples.source, _row_poses(samples), (), None, samples.findings)
     if layout.rows == SECTIONS or layout.faces:
         return _section_poses(samples, layout)
-    stillness = find_stillness(samples, layout.still_s)
-    steady = Steady(samples, layout)
+    one_g, steps = reading_of_1_g(samples, layout), Steps.of(samples)
+    shortest_s = min(layout.still_s, SHORTEST_S)
+    stillness = find_stillness(samples, shortest_s, one_g, steps.motion)
+    steady = Steady(samples, layout, one_g)
+    candidates = [_pose(samples, run, n, one_g) for n, run in enumerate(stillness.runs, start=1)]
     poses, refused = _sorted_out(
-        (_pose(samples, run, number), steady.reason(run))
-        for number, run in enumerate(stillness.runs, start=1)
+        (pose, steady.reason(run, _scatter(pose)))
+        for pose, run in zip(candidates, stillness.runs, strict=True)
     )
     if not poses:
-        raise _no_poses(samples, layout, refused)
-    return PoseSet(samples.source, poses, refused, stillness, samples.findings)
+        raise no_poses(
+            samples, layout, stillness, [(r.duration_s, r.reason) for r in refused], one_g
+        )
+    return _with_steps(
+        PoseSet(samples.source, poses, refused, stillness, samples.findings, one_g), steps, layout
+    )
 
 
 def _sorted_out(
@@ -169,15 +217,16 @@ def _sections(samples: Samples, layout: RecordingLayout) -> Iterator[tuple[Pose,
 
     Without a label it is what lies between poses; with `faces` only their labels count.
     """
-    steady = Steady(samples, layout)
+    one_g = reading_of_1_g(samples, layout)
+    steady = Steady(samples, layout, one_g)
     number = 0
     for run in samples.runs():
         label = samples.label(run[0])
         if not label.strip() or (layout.faces and label not in layout.faces):
             continue
         number += 1
-        pose = _pose(samples, run, number)
-        reason = steady.moves(samples.deviation(READING, *run))
+        pose = _pose(samples, run, number, one_g)
+        reason = steady.moves(_scatter(pose))
         if ANGLES in samples:
             angles = samples.part(ANGLES, *run)
             pose = replace(pose, angles_rad=angles[0])
@@ -198,60 +247,45 @@ def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
             f"no section is a pose{first}{labels}",
             expected="sections held still" + ", labelled as in [recording] faces" * bool(labels),
         )
-    return PoseSet(samples.source, poses, refused, None, samples.findings)
+    one_g = reading_of_1_g(samples, layout)
+    found = PoseSet(samples.source, poses, refused, None, samples.findings, one_g)
+    return _with_steps(found, Steps.of(samples), layout)
 
 
-def _pose(samples: Samples, run: tuple[int, int], number: int) -> Pose:
+def _with_steps(found: PoseSet, steps: Steps, layout: RecordingLayout) -> PoseSet:
+    """Poses whose uncertainty has the steps of the readings; a finding where these limit it."""
+    left = steps.sd_of_mean(np.array([_scatter(p) for p in found.poses]))
+    poses = tuple(
+        replace(p, covariance=p.covariance + np.diag(sd**2), sd_mean=np.hypot(p.sd_mean, sd))
+        for p, sd in zip(found.poses, left, strict=True)
+        if p.covariance is not None and p.sd_mean is not None
+    )
+    told = steps.finding(left, np.array([p.sd_mean for p in poses]), layout, found.reading_of_1_g)
+    return replace(found, poses=poses, findings=(*found.findings, *told))
+
+
+def _scatter(pose: Pose) -> FloatArray:
+    return np.zeros(3) if pose.scatter is None else pose.scatter
+
+
+def _pose(samples: Samples, run: tuple[int, int], number: int, one_g: float) -> Pose:
     start, stop = run
-    batches = min(BATCHES, stop - start)
-    each, more = divmod(stop - start, batches)
-    ends = [start + k * each + min(k, more) for k in range(batches + 1)]
-    means = np.array([samples.mean(READING, *part) for part in pairwise(ends)])
-    sd_mean = means.std(axis=0, ddof=1) / np.sqrt(batches) if batches > 1 else np.full(3, np.inf)
+    mean = mean_of(samples, run, one_g)
     return Pose(
         number=number,
         line=int(samples.one(ROW, start)),
         start_s=samples.one(TIME, start),
         duration_s=duration_s(samples, run),
-        reading=samples.mean(READING, start, stop),
-        sd_mean=sd_mean,
+        reading=mean.reading,
+        sd_mean=np.sqrt(np.diag(mean.covariance)),
         count=stop - start,
         temp_degc=float(samples.mean(TEMP, start, stop)) if TEMP in samples else None,
         label=samples.label(start),
         angles_rad=None,
+        covariance=mean.covariance,
+        scatter=mean.scatter,
+        drift=mean.drift,
     )
-
-
-def _no_poses(
-    samples: Samples, layout: RecordingLayout, refused: Sequence[RefusedPose]
-) -> RefusedError:
-    longest = max((r.duration_s for r in refused), default=0.0)
-    first = f"; pose {refused[0].number}: {refused[0].reason}" if refused else ""
-    return RefusedError(
-        samples.source,
-        f"no pose found: the longest stretch at rest lasts {longest:.3g} s{first}",
-        expected=f"poses of at least {layout.still_s:g} s",
-        remedy=_wrong_clock(samples, layout)
-        or "hold each pose longer, or lower [recording] still_s; "
-        "`triaxcal poses` shows what was found",
-    )
-
-
-def _wrong_clock(samples: Samples, layout: RecordingLayout) -> str:
-    """Remedy for a recording that is too short for a few poses; "" otherwise."""
-    whole = samples.one(TIME, len(samples) - 1) + samples.step_s
-    if whole > 4.0 * layout.still_s:
-        return ""
-    lasts = f"the whole recording lasts {whole:.3g} s"
-    if layout.sample_rate_hz is not None:
-        return f"{lasts} at {1.0 / samples.step_s:g} Hz: check sample_rate_hz"
-    if not layout.time:
-        return lasts
-    scale = TIME_UNITS[layout.time_unit[0]]
-    near = [
-        u for u, s in TIME_UNITS.items() if _STEPS_S[0] < samples.step_s / scale * s < _STEPS_S[1]
-    ]
-    return f"{lasts}: check time_unit" + (f', as time_unit = "{near[0]}"' if near else "")
 
 
 def orientation_groups(directions: FloatArray, angle_deg: float = ALIKE_DEG) -> list[list[int]]:

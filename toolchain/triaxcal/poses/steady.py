@@ -1,4 +1,4 @@
-"""Whether a still stretch is a pose: long enough, within range, held still, and not drifting."""
+"""Whether a still stretch is a pose: long enough, within range, and held still."""
 
 from __future__ import annotations
 
@@ -10,67 +10,60 @@ from triaxcal.poses.stillness import duration_s
 from triaxcal.readings.samples import READING, Samples
 from triaxcal.unit.recording import RecordingLayout
 
-_DRIFT_MAX = 6.0
-"""Of its standard error: how far the two halves of a pose may differ."""
 _MOVING = 0.1
 """Of 1 g: a pose whose readings scatter by more was not held still."""
+_SEEN = 5.0
+"""Of the noise: readings that span less show one orientation alone."""
+
+
+def reading_of_1_g(samples: Samples, layout: RecordingLayout) -> float:
+    """About the reading of 1 g: as stated, unless the readings are far from it.
+
+    Of counts it is half of what nine tenths of the samples span on the widest axis: their zero may
+    lie anywhere.
+    """
+    rows = samples.cut(np.concatenate(samples.table.spool.stretches()), READING)
+    length, stated = float(np.median(np.linalg.norm(rows, axis=1))), layout.reading_of_1_g
+    if stated is not None and 0.5 * stated <= length <= 2.0 * stated:
+        return stated
+    span = float(np.ptp(np.percentile(rows, [5.0, 95.0], axis=0), axis=0).max()) / 2.0
+    noise = float(np.median(np.abs(np.diff(rows, axis=0)))) if len(rows) > 1 else 0.0
+    return (span if span > _SEEN * noise else length) or 1.0
 
 
 class Steady:
-    """Judges the still stretches of one recording by what all of its readings span."""
+    """Judges the stretches of one recording by what all of its readings span."""
 
-    def __init__(self, samples: Samples, layout: RecordingLayout) -> None:
-        self._samples, self._layout = samples, layout
+    def __init__(self, samples: Samples, layout: RecordingLayout, one_g: float) -> None:
+        self._samples, self._layout, self._one_g = samples, layout, one_g
         self._low, self._high = samples.extremes(READING)
-        # Counts do not say: half of what nine tenths of the samples span on the widest axis.
-        rows = np.concatenate(samples.table.spool.stretches())
-        spans = np.ptp(np.percentile(samples.cut(rows, READING), [5.0, 95.0], axis=0), axis=0)
-        self._one_g = layout.reading_of_1_g or float(spans.max()) / 2.0
 
-    def reason(self, run: tuple[int, int]) -> str:
-        """Why a stretch at rest is no pose; "" if it is one."""
-        samples, (start, stop) = self._samples, run
-        length_s = duration_s(samples, run)
-        if length_s < self._layout.still_s:
+    def reason(self, run: tuple[int, int], scatter: FloatArray) -> str:
+        """Why a still stretch is no pose; "" if it is one."""
+        length_s = duration_s(self._samples, run)
+        # Stretches are found in whole cells: a rounding is no reason.
+        if length_s < self._layout.still_s - 0.5 * self._samples.step_s:
             return f"{length_s:.1f} s at rest, needs {self._layout.still_s:.1f}"
-        deviation = samples.deviation(READING, start, stop)
-        return (
-            self._clipped(deviation, samples.part(READING, start, start + 1)[0])
-            or self.moves(deviation)
-            or self._drifts(deviation, run)
-        )
+        first = self._samples.part(READING, run[0], run[0] + 1)[0]
+        return self._clipped(scatter, first) or self.moves(scatter)
 
-    def moves(self, deviation: FloatArray) -> str:
+    def moves(self, scatter: FloatArray) -> str:
         """Whether readings of that standard deviation, shape (3,), were not held still."""
-        if deviation.max() <= _MOVING * self._one_g:
+        if scatter.max() <= _MOVING * self._one_g:
             return ""
-        axis = int(deviation.argmax())
+        axis = int(scatter.argmax())
         return (
-            f"axis {AXES[axis]} scatters by {deviation[axis]:.3g} "
+            f"axis {AXES[axis]} scatters by {scatter[axis]:.3g} "
             f"{self._layout.acceleration_unit}: it is not held still"
         )
 
-    def _clipped(self, deviation: FloatArray, first: FloatArray) -> str:
+    def _clipped(self, scatter: FloatArray, first: FloatArray) -> str:
         for axis in range(3):
             moves = self._low[axis] < self._high[axis]
-            stuck = moves and deviation[axis] == 0.0 and (np.delete(deviation, axis) > 0.0).any()
+            stuck = moves and scatter[axis] == 0.0 and (np.delete(scatter, axis) > 0.0).any()
             if stuck and first[axis] in (self._low[axis], self._high[axis]):
                 return (
                     f"axis {AXES[axis]} is clipped: it stays at {first[axis]:g}, the largest or "
                     "smallest reading of the file; measure with a wider range"
                 )
-        return ""
-
-    def _drifts(self, deviation: FloatArray, run: tuple[int, int]) -> str:
-        samples, (start, stop) = self._samples, run
-        half = start + (stop - start) // 2
-        drift = np.abs(samples.mean(READING, half, stop) - samples.mean(READING, start, half))
-        # Halves of independent noise differ by 2 standard errors of the mean.
-        noise = 2.0 * deviation / np.sqrt(stop - start)
-        worst = int(np.argmax(drift - _DRIFT_MAX * noise))
-        if drift[worst] > _DRIFT_MAX * noise[worst] and drift[worst] > deviation[worst]:
-            return (
-                f"axis {AXES[worst]} drifts by {drift[worst]:.3g} "
-                f"{self._layout.acceleration_unit} between its halves: it is still turning"
-            )
         return ""

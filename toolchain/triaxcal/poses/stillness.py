@@ -1,89 +1,99 @@
-"""Where a recording is still: a threshold sweep over the activity of its samples.
+"""Where a recording is still, without one threshold for all of it.
 
-Activity is the standard deviation of the readings within a short window, all axes together, over
-its own floor (the tenth percentile); with a gyro, the larger of the two ratios. Still is what stays
-below a threshold. Too low a threshold cuts poses into pieces, too high a one joins them; between
-lies a plateau on which their number does not change. The middle of the longest plateau is taken.
+The *motion* at a moment is by how much the mean reading of the next 0.2 s differs from that of the
+last 0.2 s. Noise, tremor and vibration average out of it; turning does not. A stretch is still if
+its motion stays below a level, and that level is `CONTRAST` times the rms of its own motion: its
+ends move, against what it is itself. So a pose on a table and one in a hand of the same recording
+each have a level of their own, and all levels are tried, from the quietest on.
+
+The motion of a stretch is also even, and its sway is small: it is one orientation. A stretch that
+was found at a low level grows at a higher one only if it gains as much as a pose is long. So the
+first steps of a turn are not taken into a pose.
+
+Cost: a fixed number of passes over the cells.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
-from triaxcal.readings.samples import GAP, GYRO, READING, Samples
+from triaxcal.poses.cells import HALF, Cells
+from triaxcal.readings.samples import Samples
 from triaxcal.readings.spool import Spool
-from triaxcal.readings.table import LABEL, TIME
+from triaxcal.readings.table import TIME
 
-WINDOW_S = 0.5
-WINDOW_MIN = 8
-"""Samples: the deviation of fewer scatters by more than a quarter."""
-THRESHOLDS = tuple(1.25 * 2.0 ** (k / 4.0) for k in range(21))
-"""1.25 to 40 times the floor, four a doubling."""
-_FLOOR_PERCENTILE = 10.0
-_NOTED = 0.25
-"""Of the shortest pose: stretches at rest shorter than this are part of the movement."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """One threshold of the sweep: in units of the floor, and what it finds."""
-
-    threshold: float
-    poses: int
-    still_s: float
+SHORTEST_S = 0.5
+"""Shorter moments are part of a turn: a hand that reverses stands still as long."""
+CONTRAST = 2.5
+"""Motion about a pose, of the rms motion in it: about the largest of some hundred normal values."""
+SPREAD = math.radians(3.0)
+"""Sway within a pose, rms: the mean is then too short by 0.14 %, which its uncertainty has."""
+_EVEN = 1.5
+"""Rms motion of a stretch, of its mean motion; 1.09 for normal noise in three axes."""
+_LEVELS = 2.0**0.5
+CHUNK = 1 << 18
+"""Cells that are searched at once; a chunk ends where it moves most."""
+_GUARD = 1
+"""Cells left out at either end that borders on motion."""
+_SETTLING_S, _SETTLING_SHARE = 0.25, 0.1
+"""More left out there, of a stretch that is long enough: a hand lets go, a table calms down."""
+_ONE_POSE = math.radians(1.0)
+"""Sway, rms, of two neighbours and what lies between: a knock within a pose, and not a turn."""
 
 
 @dataclass(frozen=True)
 class Stillness:
-    """The sweep and its choice.
+    """What was found.
 
     Attributes
     ----------
-    time_s, activity : arrays, shape (m,)
-        For pictures: evenly spaced samples of a long recording, all of a short one; activity in
-        units of the floor.
-    steps : tuple of Step
-    chosen : int
-        Index of the step taken.
+    time_s, motion : arrays, shape (m,)
+        For pictures: evenly spaced moments; motion in the unit of the readings.
     runs : tuple of (start, stop)
-        Still stretches at that threshold of a quarter of the shortest pose and more, as indices of
-        samples, stop excluded; shorter ones are part of the movement.
+        Still stretches, as indices of samples, stop excluded.
+    quietest : float
+        Least motion that lasts for half of the shortest pose, in the unit of the readings.
     """
 
     time_s: FloatArray
-    activity: FloatArray
-    steps: tuple[Step, ...]
-    chosen: int
+    motion: FloatArray
     runs: tuple[tuple[int, int], ...]
-
-    @property
-    def threshold(self) -> float:
-        """Chosen threshold, in units of the floor."""
-        return self.steps[self.chosen].threshold
+    quietest: float
 
 
-def find_stillness(samples: Samples, still_s: float) -> Stillness:
-    """Sweep the threshold and choose; `still_s` is the shortest pose."""
-    activity = _Activity(samples)
-    found = _runs(samples, activity, THRESHOLDS, still_s)
-    steps = tuple(
-        Step(threshold, len(runs), sum(runs[:, 2].tolist()))
-        for threshold, runs in zip(THRESHOLDS, found, strict=True)
-    )
-    chosen = _plateau([step.poses for step in steps])
-    (runs,) = _runs(samples, activity, THRESHOLDS[chosen : chosen + 1], _NOTED * still_s)
-    return Stillness(
-        samples.cut(samples.table.spool.thinned(), TIME),
-        activity.of(activity.spool.thinned()),
-        steps,
-        chosen,
-        tuple((int(start), int(stop)) for start, stop, _ in runs),
-    )
+def find_stillness(
+    samples: Samples, shortest_s: float, one_g: float, least_motion: float
+) -> Stillness:
+    """Still stretches of `shortest_s` and more.
+
+    Parameters
+    ----------
+    one_g : float
+        Reading of 1 g, about.
+    least_motion : float
+        Motion that readings show in steps without moving, in their unit.
+    """
+    cells = Cells(samples, shortest_s)
+    shown, runs = Spool(2), []
+    for first, search in _chunks(cells, least_motion):
+        needed = math.ceil(shortest_s / (cells.size * samples.step_s))
+        found = search.joined(search.stretches(needed, one_g), needed, one_g)
+        settling = math.ceil(_SETTLING_S / (cells.size * samples.step_s))
+        trimmed = search.trimmed(found, partial(_guard, needed=needed, settling=settling)) + first
+        last = trimmed[:, 1] == len(cells)
+        trimmed *= cells.size
+        trimmed[last, 1] = len(samples)
+        runs += [(start, stop) for start, stop in trimmed.tolist()]
+        shown.append(np.column_stack([search.time_s, search.motion[:-1]])[~search.cut[:-1]])
+    thinned = shown.thinned() if len(shown) else np.empty((0, 2))
+    quietest = float(thinned[:, 1].min()) if len(thinned) else math.inf
+    return Stillness(thinned[:, 0], thinned[:, 1], tuple(runs), quietest)
 
 
 def duration_s(samples: Samples, run: tuple[int, int]) -> float:
@@ -92,126 +102,145 @@ def duration_s(samples: Samples, run: tuple[int, int]) -> float:
     return samples.one(TIME, stop - 1) - samples.one(TIME, start) + samples.step_s
 
 
-def _plateau(counts: list[int]) -> int:
-    """Middle of the longest run of equal counts above zero, the larger count among equals."""
-    best = (0, 0, 0)
-    start = 0
-    for k in range(1, len(counts) + 1):
-        if k == len(counts) or counts[k] != counts[start]:
-            best = max(best, (k - start if counts[start] else 0, counts[start], -start))
-            start = k
-    length, _, negative = best
-    return -negative + (length - 1) // 2 if length else len(counts) // 2
+def _chunks(cells: Cells, least_motion: float) -> Iterator[tuple[int, _Search]]:
+    """Index of the first cell, and the search, of each chunk; no pose lies across two of them."""
+    first = 0
+    while first < len(cells):
+        search = _Search(*cells.means(first, first + CHUNK), least_motion)
+        count = len(search.time_s)
+        if first + count < len(cells):
+            half = count // 2
+            moves = np.where(search.cut[half:count], np.inf, search.motion[half:count])
+            # The last windows are cut by the end of the chunk alone.
+            count = half + int(np.argmax(moves[: len(moves) - HALF]))
+            search = _Search(*cells.means(first, first + count), least_motion)
+        yield first, search
+        first += count
 
 
-class _Activity:
-    """Deviations within a short window, and their floors, of all samples."""
-
-    def __init__(self, samples: Samples) -> None:
-        window = max(WINDOW_MIN, math.ceil(WINDOW_S / samples.step_s))
-        names = [name for name in (READING, GYRO) if name in samples]
-        means = {name: samples.mean(name, 0, len(samples)) for name in names}
-        self.spool = Spool(len(names))
-        for first, rows in samples.pieces():
-            parts = [
-                _deviation(samples, name, means[name], window, first + np.arange(len(rows)))
-                for name in names
-            ]
-            self.spool.append(np.column_stack(parts))
-        seen = np.concatenate(self.spool.stretches())
-        self._floors = np.array([_floor(column) for column in seen.T.copy()])
-
-    def of(self, rows: FloatArray) -> FloatArray:
-        """Activity, (n,), of rows of the spool."""
-        activity: FloatArray = (rows / self._floors).max(axis=1)
-        return activity
+def _guard(length: int, needed: int, settling: int) -> int:
+    """Cells to leave out at an end of a stretch of some length."""
+    free = length - 2 * _GUARD
+    return _GUARD + min(settling, int(_SETTLING_SHARE * free), max(free - needed, 0) // 2)
 
 
-def _floor(deviation: FloatArray) -> float:
-    floor = float(np.percentile(deviation, _FLOOR_PERCENTILE))
-    if floor > 0.0:
-        return floor
-    # Readings that do not even flicker: the smallest deviation that is seen stands in.
-    positive = deviation[deviation > 0.0]
-    return float(np.percentile(positive, _FLOOR_PERCENTILE)) if len(positive) else 1.0
+class _Search:
+    """Search of still stretches in the means of some cells: runs of edges between them.
 
+    A run of edges [begin, end) has the cells from `HALF` before its first edge to `HALF` behind its
+    last one.
 
-def _deviation(
-    samples: Samples, name: str, mean: FloatArray, window: int, index: IntArray
-) -> FloatArray:
-    """Root of the summed variances within a window about each sample of consecutive ones, (n,)."""
-    n = len(samples)
-    start = np.clip(index - window // 2, 0, max(n - window, 0))
-    stop = np.minimum(start + window, n)
-    # Windows reach beyond the piece: what lies on either side is read with it.
-    centred = samples.part(name, int(start[0]), int(stop[-1])) - mean
-    start, stop = start - start[0], stop - start[0]
-    zero = np.zeros((1, centred.shape[1]))
-    sums = np.concatenate([zero, np.cumsum(centred, axis=0)])
-    squares = np.concatenate([zero, np.cumsum(centred**2, axis=0)])
-    count = (stop - start)[:, None]
-    inner = (sums[stop] - sums[start]) / count
-    variance = np.maximum((squares[stop] - squares[start]) / count - inner**2, 0.0)
-    result: FloatArray = np.sqrt(variance.sum(axis=1))
-    return result
-
-
-def _runs(
-    samples: Samples, activity: _Activity, thresholds: Sequence[float], shortest_s: float
-) -> list[FloatArray]:
-    """Still stretches of `shortest_s` and more at each threshold, shape (runs, 3).
-
-    Columns are start, stop (excluded) and duration in s. Gaps in time and changes of the section
-    cut a stretch.
+    Attributes
+    ----------
+    time_s : array, shape (n,)
+    motion, cut : arrays, shape (n + 1,)
+        Of the window about each edge; motion is infinite where the window is cut.
     """
-    scans = [_Scan(threshold, shortest_s, samples.step_s) for threshold in thresholds]
-    before_s, before_label = 0.0, math.nan
-    for first, rows in samples.pieces():
-        time_s = samples.cut(rows, TIME)
-        earlier_s = np.append(before_s, time_s[:-1])
-        cuts = time_s - earlier_s > GAP * samples.step_s
-        if LABEL in samples:
-            labels = samples.cut(rows, LABEL)
-            cuts |= labels != np.append(before_label, labels[:-1])
-            before_label = float(labels[-1])
-        level = activity.of(activity.spool.rows(first, first + len(rows)))
-        for scan in scans:
-            scan.go_on(first, level, cuts, time_s, earlier_s)
-        before_s = float(time_s[-1])
-    return [scan.closed(len(samples), before_s) for scan in scans]
 
-
-class _Scan:
-    """Still stretches at one threshold, piece after piece."""
-
-    def __init__(self, threshold: float, shortest_s: float, step_s: float) -> None:
-        self._threshold, self._shortest_s, self._step_s = threshold, shortest_s, step_s
-        self._open = np.empty((0, 2))  # start and its time of a stretch that goes on
-        self._found: list[FloatArray] = []
-
-    def go_on(
-        self,
-        first: int,
-        level: FloatArray,
-        cuts: BoolArray,
-        time_s: FloatArray,
-        earlier_s: FloatArray,
+    def __init__(
+        self, means: FloatArray, time_s: FloatArray, cut: BoolArray, least_motion: float
     ) -> None:
-        """Take the next samples, from index `first` on."""
-        still = level < self._threshold
-        before = np.append(len(self._open) > 0, still[:-1])
-        begins = np.flatnonzero(still & (cuts | ~before))
-        ends = np.flatnonzero(before & (cuts | ~still))
-        starts = np.vstack([self._open, np.column_stack([first + begins, time_s[begins]])])
-        self._open = starts[len(ends) :]
-        self._add(starts[: len(ends)], first + ends, earlier_s[ends])
+        self.time_s, self.cut = time_s, cut
+        middle = means.mean(axis=0) if len(means) else np.zeros(3)
+        self._sums = np.concatenate([np.zeros((1, 3)), np.cumsum(means - middle, axis=0)])
+        self._halves = (self._sums[HALF:] - self._sums[:-HALF]) / HALF
+        self.motion = np.full(len(cut), np.inf)
+        change = np.linalg.norm(self._halves[HALF:] - self._halves[:-HALF], axis=1)
+        inner = ~cut[HALF : len(cut) - HALF]
+        self.motion[HALF : len(cut) - HALF][inner] = np.hypot(change, least_motion)[inner]
+        moved = np.where(cut, 0.0, self.motion)
+        self._moved, self._moved_squared = _totals(moved), _totals(moved**2)
+        self._half_sums = _totals(self._halves)
+        self._half_squares = _totals((self._halves**2).sum(axis=1))
 
-    def closed(self, count: int, last_s: float) -> FloatArray:
-        """All stretches, with the one that goes on to the end."""
-        self._add(self._open, np.full(len(self._open), count), np.full(len(self._open), last_s))
-        return np.concatenate(self._found)
+    def stretches(self, needed: int, one_g: float) -> IntArray:
+        """Runs of edges, shape (runs, 2), that are still for `needed` cells and more."""
+        found = _Found(needed)
+        moving = self.motion[~self.cut]
+        if not len(moving):
+            return found.runs
+        level, last = max(float(moving.min()), 1e-9 * one_g), CONTRAST * float(moving.max())
+        while level < last * _LEVELS:
+            runs = _below(self.motion, level * _LEVELS)
+            runs = runs[runs[:, 1] - runs[:, 0] + 2 * HALF - 1 - 2 * _GUARD >= needed]
+            still = self._even(runs, level * _LEVELS) & (self._sway(runs) <= SPREAD * one_g)
+            found.add(runs[still])
+            level *= _LEVELS
+        return found.runs
 
-    def _add(self, starts: FloatArray, stops: IntArray, last_s: FloatArray) -> None:
-        length = last_s - starts[:, 1] + self._step_s
-        kept = length >= self._shortest_s
-        self._found.append(np.column_stack([starts[kept, 0], stops[kept], length[kept]]))
+    def joined(self, runs: IntArray, needed: int, one_g: float) -> IntArray:
+        """Runs, neighbours of one orientation as one where no turn can lie between them."""
+        found: list[tuple[int, int]] = []
+        for begin, end in runs.tolist():
+            if found and begin - found[-1][1] < needed:
+                whole = (found[-1][0], end)
+                uncut = not self.cut[found[-1][1] : begin].any()
+                if uncut and self._sway(np.array([whole]))[0] <= _ONE_POSE * one_g:
+                    found[-1] = whole
+                    continue
+            found.append((begin, end))
+        return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+    def trimmed(self, runs: IntArray, guard: Callable[[int], int]) -> IntArray:
+        """Runs of edges as runs of cells, less a guard at the ends that border on motion."""
+        found = np.empty_like(runs)
+        for k, (begin, end) in enumerate(runs.tolist()):
+            start, stop = begin - HALF, end - 1 + HALF
+            out = guard(stop - start)
+            found[k] = (
+                start if self.cut[begin - 1] else start + out,
+                stop if self.cut[end] else stop - out,
+            )
+        return found
+
+    def _even(self, runs: IntArray, level: float) -> BoolArray:
+        """Whether the motion is much alike in each run, and below what borders on it."""
+        begin, end = runs.T
+        mean = (self._moved[end] - self._moved[begin]) / (end - begin)
+        square = (self._moved_squared[end] - self._moved_squared[begin]) / (end - begin)
+        result: BoolArray = np.sqrt(square) <= np.minimum(_EVEN * mean, level / CONTRAST)
+        return result
+
+    def _sway(self, runs: IntArray) -> FloatArray:
+        """Rms distance of the means of half windows from their own mean."""
+        begin, end = runs[:, 0] - HALF, runs[:, 1]
+        count = end - begin
+        mean = (self._half_sums[end] - self._half_sums[begin]) / count[:, None]
+        squares = (self._half_squares[end] - self._half_squares[begin]) / count
+        result: FloatArray = np.sqrt(np.maximum(squares - (mean**2).sum(axis=1), 0.0))
+        return result
+
+
+class _Found:
+    """Still stretches of the levels so far, as runs of edges."""
+
+    def __init__(self, needed: int) -> None:
+        self.runs: IntArray = np.empty((0, 2), dtype=np.int64)
+        self._needed = needed
+
+    def add(self, runs: IntArray) -> None:
+        """Take runs of the next level: each holds whole runs of those before, or none."""
+        low = np.searchsorted(self.runs[:, 0], runs[:, 0])
+        high = np.searchsorted(self.runs[:, 0], runs[:, 1])
+        inner = _totals(self.runs[:, 1] - self.runs[:, 0])
+        gain = runs[:, 1] - runs[:, 0] - (inner[high] - inner[low])
+        taken = (high == low) | (gain >= self._needed)
+        replaced = np.zeros(len(self.runs) + 1, dtype=np.int64)
+        np.add.at(replaced, low[taken], 1)
+        np.add.at(replaced, high[taken], -1)
+        kept = np.cumsum(replaced[:-1]) == 0
+        found = np.concatenate([self.runs[kept], runs[taken]])
+        self.runs = found[np.argsort(found[:, 0], kind="stable")]
+
+
+def _totals(values: FloatArray | IntArray) -> FloatArray:
+    """Running sums from 0, one longer than the values."""
+    start = np.zeros((1, *values.shape[1:]))
+    return np.concatenate([start, np.cumsum(values, axis=0)])
+
+
+def _below(motion: FloatArray, level: float) -> IntArray:
+    """Runs in which the motion stays below a level, shape (runs, 2), stop excluded."""
+    still = np.concatenate([[False], motion < level, [False]])
+    edges = np.flatnonzero(still[1:] != still[:-1])
+    return edges.reshape(-1, 2)

@@ -19,20 +19,10 @@ _ARCSEC_PER_RAD = 180.0 * 3600.0 / np.pi
 
 
 def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
-    """The sweep, the poses, and the reason of every refusal."""
-    unit = layout.acceleration_unit
+    """The poses with their uncertainty, and the reason of every refusal."""
+    unit, mg = layout.acceleration_unit, 1e3 / poses.reading_of_1_g
     blocks = []
-    if poses.stillness is not None:
-        rows = [
-            [
-                f"{'*' if k == poses.stillness.chosen else ' '} {step.threshold:.1f}",
-                str(step.poses),
-                f"{step.still_s:.0f}",
-            ]
-            for k, step in enumerate(poses.stillness.steps)
-        ]
-        head = ["threshold, times the floor", "poses", "still s"]
-        blocks.append("\n".join(table(head, rows)))
+    sds, shares = poses.length_sd, poses.weights
     rows = [
         [
             f"{p.number}",
@@ -40,12 +30,17 @@ def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
             f"{p.start_s:.1f}",
             f"{p.duration_s:.1f}",
             *(f"{v:.6g}" for v in p.reading),
+            *_of_one(p.scatter, p.drift, mg),
+            "-" if sds is None else f"{sds[k]:.2g}",
+            "-" if sds is None else f"{sds[k] * mg:.2f}",
+            "-" if shares is None else f"{shares[k]:.2f}",
             "-" if p.temp_degc is None else f"{p.temp_degc:.1f}",
             p.label,
         ]
-        for p in poses.poses
+        for k, p in enumerate(poses.poses)
     ]
-    head = ["pose", "line", "from s", "still s", *(f"{a} {unit}" for a in AXES), "degC", "section"]
+    head = ["pose", "line", "from s", "still s", *(f"{a} {unit}" for a in AXES)]
+    head += ["scatter mg", "drift mg", f"sd {unit}", "sd mg", "weight", "degC", "section"]
     blocks.append("\n".join(table(head, rows)))
     if poses.refused:
         reasons = [f"pose {r.number} (line {r.line}): {r.reason}" for r in poses.refused]
@@ -57,8 +52,15 @@ def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
     return "\n\n".join(blocks)
 
 
+def _of_one(scatter: FloatArray | None, drift: FloatArray | None, mg: float) -> tuple[str, str]:
+    """Scatter and drift of a pose, all axes together, mg."""
+    if scatter is None or drift is None:
+        return "-", "-"
+    return f"{np.linalg.norm(scatter) * mg:.3g}", f"{np.linalg.norm(drift) * mg:.2g}"
+
+
 def poses_picture(samples: Samples, poses: PoseSet, layout: RecordingLayout) -> bytes:
-    """Readings over time with the poses behind them, and the activity with its threshold."""
+    """Readings over time, and their motion, with the poses behind them."""
     rows = samples.table.spool.thinned()
     t, reading = samples.cut(rows, TIME), samples.cut(rows, READING)
     bands = [Band(p.start_s, p.start_s + p.duration_s, GOOD, str(p.number)) for p in poses.poses]
@@ -76,17 +78,20 @@ def poses_picture(samples: Samples, poses: PoseSet, layout: RecordingLayout) -> 
         )
     ]
     if poses.stillness is not None:
-        activity = np.log10(np.maximum(poses.stillness.activity, 0.1))
-        level = np.full(2, np.log10(poses.stillness.threshold))
-        edges = t[[0, -1]]
+        motion = poses.stillness.motion * 1e3 / poses.reading_of_1_g
         panels.append(
             Panel(
-                "activity, times its floor (powers of ten)",
+                "change of the mean within 0.4 s, mg (powers of ten)",
                 "s",
                 [
-                    Line("activity", COLOURS[3], poses.stillness.time_s, activity),
-                    Line("threshold", "#d0021b", edges, level, dashed=True),
+                    Line(
+                        "motion",
+                        COLOURS[3],
+                        poses.stillness.time_s,
+                        np.log10(np.maximum(motion, 0.01)),
+                    )
                 ],
+                bands,
             )
         )
     return line_plot(f"{len(poses.poses)} poses", panels)

@@ -44,8 +44,8 @@ ANGLE_NAMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """The two angles that gravity sees, then the one that it does not."""
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
-STILL_S = 2.0
-"""Shortest pose by default: 200 samples at 100 Hz, 0.07 of their noise."""
+STILL_S = 0.5
+"""Shortest pose by default: a hand that turns back stands still for less."""
 
 
 @dataclass(frozen=True)
