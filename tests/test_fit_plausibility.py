@@ -23,7 +23,8 @@ from fit_cases import (
 )
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.grouping import group_dwells
-from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
+from triaxcal.fitting.tilter.outputs import refuse_mistaken_units
+from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions
 from triaxcal.readings.measurements import MeasurementSet
 
 POSITIONS = ("TP1", "TP2", "TP3", "TP4", "TP5", "TP6")

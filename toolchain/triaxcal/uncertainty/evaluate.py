@@ -21,6 +21,7 @@ from triaxcal.uncertainty.orientation import DIRECTIONS, QUANTITIES, force_varia
 from triaxcal.uncertainty.propagation import ROWS, Curves, propagation
 from triaxcal.uncertainty.recording_sources import recording_sources
 from triaxcal.uncertainty.rig_sources import rig_sources
+from triaxcal.uncertainty.run_sources import run_source
 from triaxcal.uncertainty.scatter import Scatter, scatter
 from triaxcal.uncertainty.source import Source
 from triaxcal.uncertainty.terms_sources import pair_source
@@ -147,7 +148,13 @@ def uncertainty(
         return Uncertainty(temps, t0_index, tuple(found), None, (), units)
     p = propagation(unit, measurements, calibration, temps)
     s = scatter(p)
-    sources = [*rig_sources(p, s), thermal_model(p, s), *pair_source(p), *device_sources(p, device)]
+    sources = [
+        *rig_sources(p, s),
+        *run_source(p),
+        thermal_model(p, s),
+        *pair_source(p),
+        *device_sources(p, device),
+    ]
     return Uncertainty(temps, t0_index, tuple(sources), s, tuple(_warnings(unit, s)), units)
 
 

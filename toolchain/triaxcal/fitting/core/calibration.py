@@ -134,6 +134,31 @@ class HeldOutTest:
 
 
 @dataclass(frozen=True)
+class RunRepeatability:
+    """How far the constants of one run are from those of others, noise included.
+
+    Attributes
+    ----------
+    runs : int
+        Complete runs in the mean, at the temperature with the fewest.
+    temperatures : int
+        At which there were more than one.
+    dof : int
+        Degrees of freedom of each constant's standard deviation.
+    bias_g, scale_ratio, cross_ratio : float
+        Standard deviations of a bias in g, of a scale factor and of a cross term by the scale
+        factor.
+    """
+
+    runs: int
+    temperatures: int
+    dof: int
+    bias_g: float
+    scale_ratio: float
+    cross_ratio: float
+
+
+@dataclass(frozen=True)
 class Calibration:
     """The twelve constants of one unit over temperature, with their covariance.
 
@@ -177,6 +202,8 @@ class Calibration:
         Empty in a file of triaxcal 0.1.0: its readings have the signs.
     held_out : HeldOutTest or None
         None for a recording, whose `recording` has it.
+    runs : RunRepeatability or None
+        Where a tilter's file has several complete runs.
     """
 
     serial: str
@@ -197,6 +224,7 @@ class Calibration:
     notes: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
     held_out: HeldOutTest | None = None
+    runs: RunRepeatability | None = None
 
     @property
     def findings(self) -> tuple[str, ...]:

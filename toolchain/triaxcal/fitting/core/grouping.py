@@ -33,11 +33,20 @@ class TemperatureGroup:
     temp_degc : float
         Mean of the six dwells' temperatures.
     dwells : tuple of six Dwell
-        TP1 to TP6.
+        TP1 to TP6; means over the runs, where there are several.
+    runs : tuple of tuples of six Dwell
+        Where every position was measured several times: the k-th dwells of the six, in the order of
+        the file, for each k. Empty for one run.
     """
 
     temp_degc: float
     dwells: tuple[Dwell, ...]
+    runs: tuple[tuple[Dwell, ...], ...] = ()
+
+    @property
+    def measured(self) -> tuple[Dwell, ...]:
+        """The dwells as they were measured, of all runs."""
+        return tuple(d for run in self.runs for d in run) or self.dwells
 
 
 @dataclass(frozen=True)
@@ -96,7 +105,8 @@ def group_dwells(measurements: MeasurementSet, t0_degc: float) -> tuple[Temperat
         )
     clusters = _clusters(rows)
     for cluster in clusters:
-        _refuse_doubled(source, cluster)
+        if not _runs(cluster):
+            _refuse_doubled(source, cluster)
         _refuse_drift(source, cluster)
     # The smallest first: one row with a wrong temperature spoils two groups, and shows there.
     for cluster in sorted(clusters, key=len):
@@ -180,11 +190,46 @@ def _clusters(rows: list[Dwell]) -> list[list[Dwell]]:
 
 
 def _group(cluster: list[Dwell]) -> TemperatureGroup:
+    runs = _runs(cluster)
     dwells = tuple(sorted(cluster, key=lambda d: d.position))
+    if runs:
+        dwells = tuple(_mean_of([run[k] for run in runs]) for k in range(len(TEST_POSITIONS)))
     first = dwells[0].temp_degc
     # Offsets from the first: the mean of six equal temperatures is then exactly that one.
     mean = first + sum(d.temp_degc - first for d in dwells) / len(dwells)
-    return TemperatureGroup(temp_degc=mean, dwells=dwells)
+    return TemperatureGroup(temp_degc=mean, dwells=dwells, runs=runs)
+
+
+def _runs(cluster: list[Dwell]) -> tuple[tuple[Dwell, ...], ...]:
+    """Complete runs at one temperature, two or more, each TP1 to TP6; none where there is one."""
+    of_position = [
+        sorted((d for d in cluster if d.position == p), key=lambda d: d.row)
+        for p in sorted(TEST_POSITIONS)
+    ]
+    counts = {len(dwells) for dwells in of_position}
+    return tuple(zip(*of_position, strict=True)) if len(counts) == 1 and min(counts) > 1 else ()
+
+
+def _mean_of(dwells: list[Dwell]) -> Dwell:
+    """The mean of dwells in one position, with the variance of their mean where all have theirs."""
+    first, n = dwells[0], len(dwells)
+    variances = [d.variance_of_mean_v2 for d in dwells]
+    known = [v for v in variances if v is not None]
+    counts = [d.count for d in dwells if d.count is not None]
+    complete = len(known) == len(counts) == n
+    count = sum(counts) if complete else None
+    sd_v = np.sqrt(sum(known) / n**2 * sum(counts)) if complete else None
+    # Offsets from the first: the mean of equal temperatures is then exactly that one.
+    temp = first.temp_degc + math.fsum(d.temp_degc - first.temp_degc for d in dwells) / n
+    voltage = np.mean([d.voltage_v for d in dwells], axis=0)
+    return Dwell(
+        row=first.row,
+        position=first.position,
+        temp_degc=temp,
+        voltage_v=voltage,
+        count=count,
+        sd_v=sd_v,
+    )
 
 
 def _refuse_doubled(source: str, cluster: list[Dwell]) -> None:
@@ -196,8 +241,8 @@ def _refuse_doubled(source: str, cluster: list[Dwell]) -> None:
                 f"{source}, rows {first.row} and {dwell.row}",
                 f"{dwell.position} twice at one temperature "
                 f"({first.temp_degc:.6g} and {dwell.temp_degc:.6g} degC)",
-                expected=f"each position once; temperatures within {GROUP_GAP_DEGC:g} degC "
-                "of the next are one",
+                expected="each position once, or all six equally often; temperatures within "
+                f"{GROUP_GAP_DEGC:g} degC of the next are one",
                 remedy="remove one of the rows, or correct its position or temperature",
             )
 

@@ -25,6 +25,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.grouping import TemperatureGroup, group_dwells
 from triaxcal.fitting.tilter.estimators import CONDITION_MAX
 from triaxcal.fitting.tilter.resolution import limit_below_a_code
+from triaxcal.fitting.tilter.runs import contradictory_runs
 from triaxcal.model.metrological import (
     force_from_voltage,
     unpack_constants,
@@ -82,8 +83,11 @@ def unacceptable(
             expected="at least one, to check the result",
             remedy="widen the range, or omit it",
         )
-    first = _singular_curve(unit, calibration) or limit_below_a_code(
-        unit, calibration, measurements
+    groups = group_dwells(measurements, unit.t0_degc)
+    first = (
+        _singular_curve(unit, calibration)
+        or limit_below_a_code(unit, calibration, measurements)
+        or contradictory_runs(unit, measurements.source, calibration.thermal, groups)
     )
     if first is not None:
         return first

@@ -33,9 +33,13 @@ from triaxcal.fitting.tilter.estimators import (
     refuse_ill_conditioned,
 )
 from triaxcal.fitting.tilter.heldout import check_errors, held_out_test
-from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions, refuse_mistaken_units
+from triaxcal.fitting.tilter.mounting import turned_notes
+from triaxcal.fitting.tilter.outputs import refuse_mistaken_units, refuse_silent_outputs
+from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions
 from triaxcal.fitting.tilter.resolution import code_notes
+from triaxcal.fitting.tilter.runs import repeatability, run_notes
 from triaxcal.fitting.tilter.selection import PREFERENCE, select
+from triaxcal.fitting.tilter.temperatures import refuse_unbelievable_temperatures
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS
@@ -63,7 +67,9 @@ def calibrate(
         do not determine what it asks for.
     """
     terms = NO_TERMS if pair is None else Terms(pair.quadratic)
+    refuse_unbelievable_temperatures(unit, measurements)
     groups = group_dwells(measurements, unit.t0_degc)
+    refuse_silent_outputs(measurements)
     refuse_mistaken_units(measurements)
     refuse_exchanged_positions(measurements.source, groups, unit.polarity)
     _refuse_singular(measurements.source, groups, unit.gravity_g)
@@ -80,14 +86,18 @@ def calibrate(
     chosen = data.only(estimators.index(selection.estimator))
     found = _calibration(unit, measurements, chosen, selection, range_degc, terms=terms)
     of_pair = () if pair is None else pair.findings
+    runs = repeatability(unit, found.thermal, groups)
     return replace(
         found,
         pair=pair,
         notes=(
             *contradiction(unit, groups),
+            *run_notes(runs),
+            *turned_notes(found.thermal.constants_at(unit.t0_degc)),
             *code_notes(unit, found, measurements),
             *of_pair,
         ),
+        runs=runs,
         held_out=held_out_test(chosen, selection.shape, groups, checks),
     )
 
@@ -247,8 +257,8 @@ def _working_range(
     if unit.range_degc is None:
         if len(groups) == 1:
             return low - EDGE_DEGC, high + EDGE_DEGC
-        coldest = max(low - EDGE_DEGC, min(d.temp_degc for d in groups[0].dwells))
-        hottest = min(high + EDGE_DEGC, max(d.temp_degc for d in groups[-1].dwells))
+        coldest = max(low - EDGE_DEGC, min(d.temp_degc for d in groups[0].measured))
+        hottest = min(high + EDGE_DEGC, max(d.temp_degc for d in groups[-1].measured))
         # The 1e-6 forgives the rounding of decimal temperatures: 0.3 / 0.1 is 2.9999999999999996.
         steps = math.floor(coldest / _STEP_DEGC + 1e-6), math.ceil(hottest / _STEP_DEGC - 1e-6)
         return round(steps[0] * _STEP_DEGC, 1), round(steps[1] * _STEP_DEGC, 1)

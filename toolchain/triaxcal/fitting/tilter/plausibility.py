@@ -1,6 +1,6 @@
-"""Mistakes that readings give away before any fit: mistaken units, exchanged positions.
+"""Exchanged positions, which readings give away before any fit.
 
-Exchanged positions. Along the six positions output i must follow s_i a_i, the force along its own
+Along the six positions output i must follow s_i a_i, the force along its own
 axis times the sign of K_ii. Let u_i be output i, mean removed, scaled to length 1, and
 
     M[d', d] = sum_i s_i u_i[d'] a_i[d] / sqrt(2):
@@ -31,7 +31,6 @@ from triaxcal.fitting.core.grouping import TemperatureGroup
 from triaxcal.fitting.tilter.estimators import DEAD_OUTPUT
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.types import FloatArray
-from triaxcal.readings.measurements import Dwell, MeasurementSet
 
 _GAIN_MIN = 0.25
 _FORCES = np.array(list(TEST_POSITIONS.values()), dtype=np.float64)
@@ -41,35 +40,6 @@ _AXIS_PAIRS = {(4, 5): 0, (1, 3): 1, (0, 2): 2}
 """Indices of the two positions along each axis: TP5/TP6 x, TP2/TP4 y, TP1/TP3 z."""
 
 Exchange = tuple[int, int]
-
-
-def refuse_mistaken_units(measurements: MeasurementSet) -> None:
-    """Refuse rows whose readings are about a thousand times those of the others, or a thousandth.
-
-    The length of (Ux, Uy, Uz) is of one size in every position; the median gives it. Within a
-    factor of ten of a thousand is near enough: nothing but a mistaken unit is in that window.
-
-    Raises
-    ------
-    RefusedError
-        Naming the rows.
-    """
-    dwells = measurements.dwells
-    lengths = np.array([float(np.linalg.norm(d.voltage_v)) for d in dwells])
-    typical = float(np.sort(lengths)[(len(lengths) - 1) // 2])
-    if typical == 0.0:
-        return
-    ratios = lengths / typical
-    for low, high, text in ((1e2, 1e4, "1000 times"), (1e-4, 1e-2, "1/1000 of")):
-        odd = [d for d, r in zip(dwells, ratios, strict=True) if low < r < high]
-        if odd:
-            temps = sorted({d.temp_degc for d in odd})
-            raise RefusedError(
-                f"{measurements.source}, {_rows(odd)}",
-                f"readings at {_temps(temps)} degC are about {text} those of the other rows",
-                expected="one unit throughout",
-                remedy="V taken for mV, or mV for V? convert these rows",
-            )
 
 
 def refuse_exchanged_positions(
@@ -210,8 +180,3 @@ def _exchanged(pairs: list[Exchange]) -> str:
 
 def _temps(temps: list[float]) -> str:
     return ", ".join(f"{t:.6g}" for t in temps)
-
-
-def _rows(dwells: list[Dwell]) -> str:
-    rows = [str(d.row) for d in sorted(dwells, key=lambda d: d.row)]
-    return f"row {rows[0]}" if len(rows) == 1 else "rows " + ", ".join(rows)
