@@ -27,6 +27,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 LONG = {
     "family/test_files.py",
     "family/test_formats.py",
+    "family/test_live_pair.py",
     "family/test_over_temperature.py",
     "family/test_pair_in_a_unit.py",
     "family/test_pair_on_a_tilter.py",

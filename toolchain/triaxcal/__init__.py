@@ -33,12 +33,12 @@ if TYPE_CHECKING:
         read_imu,
     )
     from triaxcal.api.imufirmware import ImuFirmware, firmware_imu
+    from triaxcal.api.pair import LivePair, cross_coupling
     from triaxcal.api.series import SeriesResult, calibrate_series
     from triaxcal.api.studies import (
         MeasurementPlan,
         Study,
         compare_history,
-        cross_coupling,
         find_poses,
         plan_measurements,
         plan_motion,
@@ -57,7 +57,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "FieldCheck", "Firmware",
-    "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck",
+    "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck", "LivePair",
     "MeasurementPlan", "RefusedError", "SeriesResult", "Study", "Unit", "UsageError", "Verdict",
     "Verification", "__version__", "calibrate_series", "compare_history", "cross_coupling",
     "deliver", "diagnose", "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "key_schema",
@@ -75,9 +75,10 @@ _MODULES = {
         "Imu", "ImuCalibration", "ImuConstants", "ImuState", "fit_imu", "load_imu", "read_imu",
     ),
     "triaxcal.api.imufirmware": ("ImuFirmware", "firmware_imu"),
+    "triaxcal.api.pair": ("LivePair", "cross_coupling"),
     "triaxcal.api.series": ("SeriesResult", "calibrate_series"),
     "triaxcal.api.studies": (
-        "MeasurementPlan", "Study", "compare_history", "cross_coupling", "find_poses",
+        "MeasurementPlan", "Study", "compare_history", "find_poses",
         "plan_measurements", "plan_motion", "simulate", "simulate_series", "study_drift",
     ),
     "triaxcal.api.unit": ("Unit", "read_unit"),

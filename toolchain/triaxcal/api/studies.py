@@ -1,4 +1,4 @@
-"""What the other commands do: poses, drift, a pair, history, design, simulation."""
+"""What the other commands do: poses, drift, history, design, simulation."""
 
 from __future__ import annotations
 
@@ -16,10 +16,8 @@ from triaxcal.design.search import Design, best, usual
 from triaxcal.design.words import comparison, rig_plan
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.fitting.core.drift import Drift, study
-from triaxcal.fitting.pair.cross_coupling import PairFit, fit_pair, recursive_pair
 from triaxcal.poses.poses import PoseSet
 from triaxcal.poses.poses import find_poses as poses_of
-from triaxcal.readings.pair import read_pair
 from triaxcal.readings.samples import Samples, read_samples
 from triaxcal.report import studies
 from triaxcal.report.dynamic import plan_summary
@@ -28,7 +26,6 @@ from triaxcal.simulation.series import write_series
 from triaxcal.simulation.unit import write_simulated_unit
 from triaxcal.uncertainty.history import Change, changes, read_history, repeatability
 from triaxcal.unit.recording import RecordingLayout
-from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 T = TypeVar("T")
 
@@ -94,29 +91,6 @@ def study_drift(unit: Unit) -> Study[Drift]:
         studies.drift_text(found, layout),
         lambda: studies.drift_picture(samples, found, layout),
     )
-
-
-def cross_coupling(
-    file: str | Path, gravity_m_per_s2: float = STANDARD_GRAVITY_M_PER_S2
-) -> Study[PairFit]:
-    """Cross-coupling of an orthogonal pair of accelerometers on a dividing head.
-
-    Parameters
-    ----------
-    file : path
-        CSV with columns theta_deg, a_g, b_g, one row for each position.
-    gravity_m_per_s2 : float
-
-    Raises
-    ------
-    RefusedError
-        When the file cannot be read, or its positions do not determine the coefficients.
-    """
-    theta, a, b = read_pair(Path(file))
-    gravity_g = gravity_m_per_s2 / STANDARD_GRAVITY_M_PER_S2
-    fit = fit_pair(str(file), theta, a, b, gravity_g)
-    recursion = recursive_pair(theta, a, b, gravity_g)
-    return Study(fit, studies.pair_text(fit, recursion), lambda: studies.pair_picture(recursion))
 
 
 def compare_history(unit: Unit) -> Study[list[Change]]:

@@ -1,4 +1,4 @@
-"""What `triaxcal poses`, `drift` and `crosscoupling` print, and their pictures."""
+"""What `triaxcal poses` and `drift` print, and their pictures."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from triaxcal.base.screentext import table
 from triaxcal.fitting.core.drift import Drift
-from triaxcal.fitting.pair.cross_coupling import NAMES, UNITS, PairFit, Recursion, converged_at
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
@@ -14,8 +13,6 @@ from triaxcal.readings.samples import READING, Samples
 from triaxcal.readings.table import TIME
 from triaxcal.report.pictures.line_plot import BAD, COLOURS, GOOD, Band, Line, Panel, line_plot
 from triaxcal.unit.recording import RecordingLayout
-
-_ARCSEC_PER_RAD = 180.0 * 3600.0 / np.pi
 
 
 def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
@@ -181,50 +178,3 @@ def _running(values: FloatArray, window: int = 25) -> FloatArray:
     low, high = np.maximum(index - window // 2, 0), np.minimum(index + window // 2 + 1, len(values))
     result: FloatArray = (sums[high] - sums[low]) / (high - low)
     return result
-
-
-def pair_text(fit: PairFit, recursion: Recursion) -> str:
-    """The seven coefficients with sd, and when they had settled."""
-    rows = [
-        [f"  {name}", *_coefficient(fit.values[k], fit.sd[k], UNITS[k])]
-        for k, name in enumerate(NAMES)
-    ]
-    rms = float(np.sqrt(np.mean(fit.residual_g2**2)))
-    count, settled = len(fit.residual_g2), converged_at(recursion)
-    lines = [
-        *table(["coefficients", "value", "sd", "unit"], rows),
-        "",
-        f"{count} positions, condition number {fit.condition:.2f}, residual of Z {rms:.2g} g^2 rms",
-        f"from position {settled} on the sd of both Kip stays within twice its last value",
-    ]
-    if fit.doubtful:
-        lines += ["", fit.doubtful]
-    return "\n".join(lines)
-
-
-def _coefficient(value: float, sd: float, unit: str) -> list[str]:
-    if unit == "rad":
-        return [f"{value * _ARCSEC_PER_RAD:.4g}", f"{sd * _ARCSEC_PER_RAD:.2g}", "arcsec"]
-    return [f"{value:.4e}", f"{sd:.1e}", unit or "-"]
-
-
-def pair_picture(recursion: Recursion) -> bytes:
-    """Estimates of both Kip after each position, with their sd on either side.
-
-    From twice as many positions as unknowns: before, they are off any scale that shows the end.
-    """
-    first = min(len(NAMES), len(recursion.values) - 2)
-    x = np.arange(first, len(recursion.values), dtype=np.float64) + len(NAMES)
-    panels = []
-    for k, name in ((4, "KipA"), (5, "KipB"), (6, "b0")):
-        scale, unit = (_ARCSEC_PER_RAD, "arcsec") if k == 6 else (1e6, "1e-6 g/g^2")
-        values, sd = recursion.values[first:, k] * scale, recursion.sd[first:, k] * scale
-        last, room = float(values[-1]), 12.0 * float(sd[-1]) or 1.0
-        lines = [
-            Line("estimate", COLOURS[0], x, values),
-            Line("estimate ± sd", COLOURS[1], x, values + sd, dashed=True),
-            Line("estimate ± sd", COLOURS[1], x, values - sd, dashed=True),
-        ]
-        title = f"{name}, {unit}"
-        panels.append(Panel(title, "position", lines, (), (last - room, last + room)))
-    return line_plot("Cross-coupling, position after position", panels)

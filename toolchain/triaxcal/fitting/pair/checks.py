@@ -15,6 +15,8 @@ SIZE_MAX = 1.5
 """A sensitivity further from 1 than by this factor is another unit, no scale error."""
 TURNED_MAX_DEG = 15.0
 """P3 is of first order in the coefficients and the head's zero: beyond are other axes or signs."""
+_FAR_G = 0.3
+"""Turned by 15 deg, or another sensitivity: beyond it is another position, sign or unit."""
 _UNITS = {9.80665: "m/s^2", 1000.0: "mg"}
 
 
@@ -54,14 +56,30 @@ def refuse_other_readings(
             )
 
 
-def doubtful_position(residual_g2: FloatArray, H: FloatArray) -> str:
-    """The position that the others contradict, in words; "" if there is none."""
-    left_out = left_out_residuals(residual_g2, H)
-    found = worst_outlier(residual_g2[:, None], left_out[:, None], H.shape[1])
+def doubtful_position(residual: FloatArray, H: FloatArray, root: FloatArray) -> str:
+    """The position that the others contradict, in words; "" if there is none.
+
+    `residual` and `H` are over `root`, the standard deviations of Z; 1 where they are unknown.
+    """
+    left_out = left_out_residuals(residual, H)
+    found = worst_outlier(residual[:, None], left_out[:, None], H.shape[1])
     if found is None:
         return ""
     k = found.indices[0]
     return (
-        f"position {k + 1} differs by {abs(float(left_out[k])):.2g} g^2 in Z from the fit of the "
-        f"others, whose residuals are {found.others:.2g} rms: check its row"
+        f"position {k + 1} differs by {abs(float(left_out[k] * root[k])):.2g} g^2 in Z from the "
+        f"fit of the others, whose residuals are {found.others * float(root.mean()):.2g} rms: "
+        "check its row"
     )
+
+
+def odd_reading(theta_rad: float, a_g: float, b_g: float, gravity_g: float) -> str:
+    """What is wrong with one position's readings, in words; "" where nothing is."""
+    expected = gravity_g * np.array([-np.cos(theta_rad), np.sin(theta_rad)])
+    for name, found, right in zip("AB", (a_g, b_g), expected, strict=True):
+        if not np.isfinite(found) or abs(found - right) > _FAR_G:
+            return (
+                f"{name} reads {found:.4g} at {np.degrees(theta_rad):.5g} deg; expected about "
+                f"{right:.3f} g (at 0 deg A reads -1 g, at 90 deg B reads +1 g)"
+            )
+    return ""

@@ -1,16 +1,6 @@
 """Cross-coupling coefficients from an orthogonal pair of accelerometers on a dividing head, P3.
 
-With phi = theta + dtheta + delta0 the pair reads, (3) and (5) rebuilt,
-
-    A = K0A - (1 + K1A) g cos phi - g^2 KipA sin phi cos phi
-    B = K0B + (1 + K1B) g sin(phi + b0) + g^2 KipB sin(phi + b0) cos(phi + b0)
-
-and Z = (A^2 + B^2 - g^2) / 2 is, to first order in the coefficients, with s, c of nominal theta,
-
-    Z = K0B g s - K0A g c + K1A g^2 c^2 + K1B g^2 s^2
-        + KipA g^3 s c^2 + KipB g^3 c s^2 + b0 g^2 s c.
-
-The squares cancel the table's error: it enters through products with the coefficients only.
+`model` has the equations, `recursion` the same estimate position after position.
 """
 
 from __future__ import annotations
@@ -23,29 +13,37 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.recorded import PairTerms
 from triaxcal.fitting.pair.checks import doubtful_position, refuse_other_readings
+from triaxcal.fitting.pair.model import (
+    NAMES,
+    condition_number,
+    design,
+    half_square,
+    half_square_sd,
+)
+from triaxcal.fitting.pair.recursion import believed
 from triaxcal.model.terms import PRODUCT_NAMES, Terms
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.pair import read_pair
 from triaxcal.unit.description import UnitDescription
 
-NAMES = ("K0B", "K0A", "K1A", "K1B", "KipA", "KipB", "b0")
-UNITS = ("g", "g", "", "", "g/g^2", "g/g^2", "rad")
 CONDITION_MAX = 100.0
 SIGNIFICANT_SD = 2.0
 
 
 @dataclass(frozen=True)
 class PairFit:
-    """Seven coefficients in the order of `NAMES`.
+    """Coefficients in the order of `NAMES`: eight, or seven without K3.
 
     Attributes
     ----------
-    values, sd : arrays, shape (7,)
-    covariance : array, shape (7, 7)
+    values, sd : arrays, shape (8,)
+    covariance : array, shape (8, 8)
     residual_g2 : array, shape (n,)
         Of Z.
     condition : float
         Of H, its columns scaled to length 1.
+    noise_ratio : float or None
+        Rms residual over the stated standard deviations, where there are some.
     doubtful : str
         The position that the others contradict, "" if there is none.
     """
@@ -56,113 +54,79 @@ class PairFit:
     residual_g2: FloatArray
     condition: float
     doubtful: str
-
-
-def design(theta_rad: FloatArray, gravity_g: float) -> FloatArray:
-    """H of (10), shape (n, 7), columns in the order of `NAMES`."""
-    g, s, c = gravity_g, np.sin(theta_rad), np.cos(theta_rad)
-    columns = (g * s, -g * c, g**2 * c**2, g**2 * s**2, g**3 * s * c**2, g**3 * c * s**2)
-    return np.stack([*columns, g**2 * s * c], axis=-1)
-
-
-def half_square(a_g: FloatArray, b_g: FloatArray, gravity_g: float) -> FloatArray:
-    """Z of (8), shape (n,), in g^2, of readings in g."""
-    result: FloatArray = (a_g**2 + b_g**2 - gravity_g**2) / 2.0
-    return result
+    noise_ratio: float | None = None
 
 
 def fit_pair(
-    source: str, theta_rad: FloatArray, a_g: FloatArray, b_g: FloatArray, gravity_g: float
+    source: str,
+    theta_rad: FloatArray,
+    a_g: FloatArray,
+    b_g: FloatArray,
+    gravity_g: float,
+    *,
+    sd_g: FloatArray | None = None,
+    cubic: bool = True,
 ) -> PairFit:
-    """Least squares of (11) over all positions at once.
+    """Least squares of (11) over all positions at once; with R of (12) where `sd_g` is given.
+
+    Parameters
+    ----------
+    sd_g : array, shape (n, 2), or None
+        Standard deviations of A and B. They are believed, unless the residuals exceed them
+        significantly; without them the noise is that of the residuals.
+    cubic : bool
+        Whether K3 is fitted.
 
     Raises
     ------
     RefusedError
-        When there are fewer than nine positions, or they leave a coefficient open; as
-        `refuse_other_readings`.
+        When there are fewer than two more positions than coefficients, or they leave one open;
+        as `refuse_other_readings`.
     """
-    refuse_positions(source, theta_rad, gravity_g)
+    refuse_positions(source, theta_rad, gravity_g, cubic=cubic)
     refuse_other_readings(source, theta_rad, a_g, b_g, gravity_g)
-    H, z = design(theta_rad, gravity_g), half_square(a_g, b_g, gravity_g)
-    values = np.linalg.lstsq(H, z, rcond=None)[0].astype(np.float64)
+    H, z = design(theta_rad, gravity_g, cubic=cubic), half_square(a_g, b_g, gravity_g)
+    root = np.ones_like(z) if sd_g is None else half_square_sd(a_g, b_g, sd_g)
+    white = H / root[:, None]
+    values = np.linalg.lstsq(white, z / root, rcond=None)[0].astype(np.float64)
     residual = z - H @ values
-    variance = float(residual @ residual) / (len(z) - len(NAMES))
-    covariance = (variance * np.linalg.inv(H.T @ H)).astype(np.float64)
+    dof = len(z) - H.shape[1]
+    found = float(np.sqrt(np.sum((residual / root) ** 2) / dof))
+    noise = found if sd_g is None else believed(found, dof)
+    covariance = (noise**2 * np.linalg.inv(white.T @ white)).astype(np.float64)
     sd: FloatArray = np.sqrt(np.diag(covariance))
-    doubtful = doubtful_position(residual, H)
-    return PairFit(values, sd, covariance, residual, condition_number(H), doubtful)
+    return PairFit(
+        values=values,
+        sd=sd,
+        covariance=covariance,
+        residual_g2=residual,
+        condition=condition_number(H),
+        doubtful=doubtful_position(residual / root, white, root),
+        noise_ratio=None if sd_g is None else found,
+    )
 
 
-@dataclass(frozen=True)
-class Recursion:
-    """Estimates after each position, from the seventh on: (12) in square-root information form.
-
-    Attributes
-    ----------
-    values, sd : arrays, shape (n - 6, 7)
-        `sd` for the noise that all residuals together show.
-    """
-
-    values: FloatArray
-    sd: FloatArray
-
-
-def recursive_pair(
-    theta_rad: FloatArray, a_g: FloatArray, b_g: FloatArray, gravity_g: float
-) -> Recursion:
-    """Take one position after the other: nothing but a triangle of eight is kept between them.
-
-    The Markov estimate of (12) with equal weights. Its covariance form needs a start that a guess
-    would bias; the triangle R of R X = d needs none, and gives the batch solution to rounding.
-    """
-    H, z = design(theta_rad, gravity_g), half_square(a_g, b_g, gravity_g)
-    triangle = np.zeros((len(NAMES) + 1, len(NAMES) + 1))
-    values, inverses = [], []
-    for k in range(len(z)):
-        row = np.append(H[k], z[k])[None]
-        triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, row]), mode="r"))
-        if k + 1 >= len(NAMES):
-            R, d = triangle[: len(NAMES), : len(NAMES)], triangle[: len(NAMES), -1]
-            values.append(np.linalg.solve(R, d))
-            inverses.append(np.linalg.inv(R))
-    dof = max(len(z) - len(NAMES), 1)
-    noise = abs(float(triangle[-1, -1])) / np.sqrt(dof)
-    sd = noise * np.array([np.linalg.norm(inverse, axis=1) for inverse in inverses])
-    return Recursion(np.array(values), sd)
-
-
-def converged_at(recursion: Recursion, factor: float = 2.0) -> int:
-    """Position, from 1, from which on the sd of both Kip stays within `factor` of the last."""
-    sd = recursion.sd[:, 4:6].max(axis=1)
-    beyond = np.flatnonzero(sd > factor * sd[-1])
-    return len(NAMES) + (int(beyond[-1]) + 1 if len(beyond) else 0)
-
-
-def condition_number(H: FloatArray) -> float:
-    """Of a design with columns scaled to length 1."""
-    length = np.linalg.norm(H, axis=0)
-    singular = np.linalg.svd(H / np.where(length > 0.0, length, 1.0), compute_uv=False)
-    return float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
-
-
-def refuse_positions(source: str, theta_rad: FloatArray, gravity_g: float) -> None:
+def refuse_positions(
+    source: str, theta_rad: FloatArray, gravity_g: float, *, cubic: bool = True
+) -> None:
     """Refuse too few positions, or positions that do not determine a coefficient."""
-    if len(theta_rad) < len(NAMES) + 2:
+    H = design(theta_rad, gravity_g, cubic=cubic)
+    unknowns = H.shape[1]
+    if len(theta_rad) < unknowns + 2:
         raise RefusedError(
             source,
             f"{len(theta_rad)} positions",
-            expected=f"at least {len(NAMES) + 2} for {len(NAMES)} coefficients; the paper has 28",
+            expected=f"at least {unknowns + 2} for {unknowns} coefficients; the paper has 28",
             remedy="measure more, as 28 positions from 5 deg in steps of 13 deg",
         )
-    condition = condition_number(design(theta_rad, gravity_g))
+    condition = condition_number(H)
     if condition > CONDITION_MAX:
         turned = ", are they in degrees?" if np.abs(theta_rad).max() > 7.0 else ""
         raise RefusedError(
             source,
             f"the angles, {np.degrees(theta_rad.min()):.4g} to {np.degrees(theta_rad.max()):.4g} "
             f"deg{turned}, do not determine all coefficients (condition number {condition:.3g})",
-            expected=f"at most {CONDITION_MAX:g}; 28 positions from 5 deg by 13 deg have 2.4",
+            expected=f"at most {CONDITION_MAX:g}; 28 positions from 5 deg by 13 deg have 3.1",
             remedy="spread the positions over the full turn",
         )
 
@@ -191,7 +155,8 @@ def stated_pair(unit: UnitDescription, folder: Path) -> PairTerms | None:
     if unit.pair is None:
         return None
     path = folder / unit.pair.cross_coupling
-    fit = fit_pair(str(path), *read_pair(path), unit.gravity_g)
+    read = read_pair(path)
+    fit = fit_pair(str(path), read.theta_rad, read.a_g, read.b_g, unit.gravity_g, sd_g=read.sd_g)
     return pair_terms(unit.pair.cross_coupling, fit, unit.pair.axes)
 
 
@@ -210,7 +175,7 @@ def pair_terms(file: str, fit: PairFit, axes: tuple[int, int]) -> PairTerms:
     )
     covariance = (J @ fit.covariance[4:6, 4:6] @ J.T).astype(np.float64)
     findings = (subtracted, *_insignificant(file, fit))
-    return PairTerms(Q, covariance, len(fit.residual_g2) - len(NAMES), findings)
+    return PairTerms(Q, covariance, len(fit.residual_g2) - len(fit.values), findings)
 
 
 def _insignificant(file: str, fit: PairFit) -> list[str]:
