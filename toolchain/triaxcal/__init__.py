@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from triaxcal.api.calibration import Calibration, Diagnosis, fit, load
-    from triaxcal.api.delivery import Delivered, deliver
+    from triaxcal.api.delivery import Delivered, deliver, update
     from triaxcal.api.diagnosis import diagnose
     from triaxcal.api.files import key_schema, write_first_file
     from triaxcal.api.firmware import CompiledFirmware, Firmware, firmware
@@ -52,22 +52,24 @@ if TYPE_CHECKING:
     from triaxcal.delivery.judgement import LimitCheck, Verdict
     from triaxcal.uncertainty.budget import Budget
     from triaxcal.uncertainty.check import FieldCheck
+    from triaxcal.uncertainty.updated import FieldUpdate
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "FieldCheck", "Firmware",
-    "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck", "LivePair",
-    "MeasurementPlan", "RefusedError", "SeriesResult", "Study", "Unit", "UsageError", "Verdict",
-    "Verification", "__version__", "calibrate_series", "compare_history", "cross_coupling",
-    "deliver", "diagnose", "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "key_schema",
-    "load", "load_imu", "plan_measurements", "plan_motion", "read_imu", "read_unit", "simulate",
-    "simulate_series", "study_drift", "verify_unit", "write_first_file",
+    "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "FieldCheck",
+    "FieldUpdate", "Firmware", "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState",
+    "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "SeriesResult", "Study", "Unit",
+    "UsageError", "Verdict", "Verification", "__version__", "calibrate_series", "compare_history",
+    "cross_coupling", "deliver", "diagnose", "find_poses", "firmware", "firmware_imu", "fit",
+    "fit_imu", "key_schema", "load", "load_imu", "plan_measurements", "plan_motion", "read_imu",
+    "read_unit", "simulate", "simulate_series", "study_drift", "update", "verify_unit",
+    "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
     "triaxcal.api.calibration": ("Calibration", "Diagnosis", "fit", "load"),
-    "triaxcal.api.delivery": ("Delivered", "deliver"),
+    "triaxcal.api.delivery": ("Delivered", "deliver", "update"),
     "triaxcal.api.diagnosis": ("diagnose",),
     "triaxcal.api.files": ("key_schema", "write_first_file"),
     "triaxcal.api.firmware": ("CompiledFirmware", "Firmware", "firmware"),
@@ -87,6 +89,7 @@ _MODULES = {
     "triaxcal.delivery.judgement": ("LimitCheck", "Verdict"),
     "triaxcal.uncertainty.budget": ("Budget",),
     "triaxcal.uncertainty.check": ("FieldCheck",),
+    "triaxcal.uncertainty.updated": ("FieldUpdate",),
 }  # fmt: skip
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

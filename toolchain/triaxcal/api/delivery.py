@@ -105,6 +105,96 @@ def _beside_earlier(refusal: RefusedError, folder: Path) -> RefusedError:
     return type(refusal)(refusal.place, refusal.found, expected=refusal.expected, remedy=remedy)
 
 
+def update(
+    folder: str | Path,
+    recorded: str | Path,
+    build: str | Path = "build",
+    *,
+    into: str | Path | None = None,
+    layout: str | Path | None = None,
+    gravity_m_per_s2: float | None = None,
+    bias_drift_mg: float | None = None,
+    scale_drift_ppm: float | None = None,
+    axes_drift_micro_rad: float | None = None,
+) -> Delivered:
+    """Bring a delivered calibration up to date by a few poses from the field, and deliver it.
+
+    Parameters
+    ----------
+    folder : path
+        Of the unit, whose calibration is in the folder of its name below `build`.
+    recorded : path
+        Recording of one still pose or more, in the layout of the unit.
+    build : path
+        The files there are replaced, all or none; those before are kept beside them in a folder of
+        the unit's name and the first eight digits of their inputs_sha256.
+    into : path or None
+        Folder that receives a folder of the unit's name instead.
+    layout : path or None
+        TOML file whose [recording] says what the columns are, in place of the unit's.
+    gravity_m_per_s2 : float or None
+        Local gravity where it was recorded; None is that of the unit.
+    bias_drift_mg, scale_drift_ppm, axes_drift_micro_rad : float or None
+        Standard deviations of the drift that is allowed for; None follows from the unit's limits.
+
+    Raises
+    ------
+    RefusedError
+        When there is no calibration, the recording has no still pose or contradicts it, or the
+        result is refused; nothing is written then.
+    """
+    from triaxcal.api.calibration import Calibration, load  # noqa: PLC0415
+    from triaxcal.api.field import bring_up_to_date  # noqa: PLC0415
+    from triaxcal.api.unit import Unit  # noqa: PLC0415
+    from triaxcal.base.publish import publish_beside  # noqa: PLC0415
+    from triaxcal.delivery.saved import Saved  # noqa: PLC0415
+    from triaxcal.delivery.unit import deliver_fitted  # noqa: PLC0415
+    from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
+    from triaxcal.report.passport.content import passport  # noqa: PLC0415
+    from triaxcal.report.summary import summary  # noqa: PLC0415
+    from triaxcal.report.update import update_text  # noqa: PLC0415
+
+    name, unit = Path(folder).absolute().name, Path(folder)
+    done = load(delivered_file(unit, Path(build))).fitted
+    drift = bias_drift_mg, scale_drift_ppm, axes_drift_micro_rad
+    made = bring_up_to_date(done, recorded, layout, gravity_m_per_s2, drift)
+    with reference_under_way() as reference:
+        delivery = deliver_fitted(made.fitted, reference)
+    page = passport(delivery, {})
+    files = all_files(delivery, page)
+    target = Path(build if into is None else into) / name
+    kept = target.with_name(f"{name}.{done.inputs_sha256[:8]}") if into is None else None
+    publish_beside(files, target, kept, SOMETIMES)
+    changed = update_text(done.unit.serial, made.found, done.calibration)
+    text = f"{changed}\n\n{summary(page, files, str(target))}"
+    if kept is not None:
+        text += f"\n\nthe files before are kept in {kept}/"
+    calibration = Calibration(Unit.of(delivery.unit, unit), Saved.of(delivery))
+    return Delivered(target, tuple(files), calibration, text)
+
+
+def delivered_file(unit: Path, build: Path) -> Path:
+    """calibration.json that was delivered for a unit.
+
+    Raises
+    ------
+    RefusedError
+        When there is no such unit, or nothing was delivered.
+    """
+    from triaxcal.unit.folder import find_unit  # noqa: PLC0415
+
+    find_unit(unit)
+    path = build / unit.absolute().name / "calibration.json"
+    if not path.is_file():
+        raise RefusedError(
+            str(path),
+            "no such file",
+            expected="a delivered calibration",
+            remedy=f"run `triaxcal calib {unit}` first, or name its folder with --build",
+        )
+    return path
+
+
 def _deliver_imu(unit: Path, build: Path, progress: Progress | None) -> Delivered:
     from triaxcal.api.imu import ImuCalibration  # noqa: PLC0415
     from triaxcal.base.publish import publish  # noqa: PLC0415

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from triaxcal.base.arrays import finite
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import Fitted, columns_of
+from triaxcal.delivery.inputs import files_sha256
+from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 if TYPE_CHECKING:
     from triaxcal.api.studies import Study
     from triaxcal.fitting.field.poses import FieldPoses
     from triaxcal.uncertainty.check import FieldCheck
+    from triaxcal.uncertainty.updated import FieldUpdate
 
 
 class InTheField:
@@ -67,6 +74,110 @@ class InTheField:
         parts = done.unit, done.measurements, done.calibration
         found = check_poses(parts, poses, gravity_g, c_error_g)
         return Study(found, check_text(done.unit.serial, found))
+
+    def update(
+        self,
+        recorded: Any,
+        *,
+        layout: str | Path | None = None,
+        gravity_m_per_s2: float | None = None,
+        bias_drift_mg: float | None = None,
+        scale_drift_ppm: float | None = None,
+        axes_drift_micro_rad: float | None = None,
+    ) -> Study[FieldUpdate]:
+        """Bring the calibration up to date by one still pose or more; nothing is written.
+
+        `triaxcal.update` also makes and proves the C.
+
+        Parameters
+        ----------
+        recorded, layout, gravity_m_per_s2
+            As `check`.
+        bias_drift_mg, scale_drift_ppm, axes_drift_micro_rad : float or None
+            Standard deviations of the drift that is allowed for; None follows from the limits.
+
+        Returns
+        -------
+        Study
+            Its `result` has the new constants and what changed.
+
+        Raises
+        ------
+        RefusedError
+            As `check`; when the poses contradict the calibration, or lower no uncertainty.
+        """
+        from triaxcal.api.studies import Study  # noqa: PLC0415
+        from triaxcal.report.update import update_text  # noqa: PLC0415
+
+        done, drift = self.fitted, (bias_drift_mg, scale_drift_ppm, axes_drift_micro_rad)
+        made = bring_up_to_date(done, recorded, layout, gravity_m_per_s2, drift)
+        return Study(made.found, update_text(done.unit.serial, made.found, done.calibration))
+
+
+@dataclass(frozen=True)
+class Updated:
+    """A calibration brought up to date, not yet delivered.
+
+    Attributes
+    ----------
+    before, fitted : Fitted
+    found : FieldUpdate
+        What changed.
+    """
+
+    before: Fitted
+    fitted: Fitted
+    found: FieldUpdate
+
+
+def bring_up_to_date(
+    done: Fitted,
+    recorded: Any,
+    layout: str | Path | None = None,
+    gravity_m_per_s2: float | None = None,
+    drift: tuple[float | None, float | None, float | None] = (None, None, None),
+) -> Updated:
+    """Update of a calibration by a recording; `drift` is mg, ppm, micro-rad, None by the limits."""
+    from triaxcal.fitting.field.update import Drift, default_drift  # noqa: PLC0415
+    from triaxcal.fitting.recorded.calibrate import pose_dwells  # noqa: PLC0415
+    from triaxcal.uncertainty.update import Source, update_by_poses  # noqa: PLC0415
+
+    gravity_g = stated_gravity_g(done, gravity_m_per_s2)
+    usual = default_drift(done.unit.limits)
+    sizes = zip(drift, (1e-3, 1e-6, 1e-6), (usual.bias_g, usual.scale, usual.axes_rad), strict=True)
+    names = ("bias_drift_mg", "scale_drift_ppm", "axes_drift_micro_rad")
+    allowed = Drift(*(
+        own if v is None else _positive(name, v) * to_si
+        for name, (v, to_si, own) in zip(names, sizes, strict=True)
+    ))  # fmt: skip
+    poses = poses_of(done, recorded, layout)
+    digest = _digest(recorded)
+    earlier = () if done.calibration.update is None else done.calibration.update.parents
+    source = Source((*earlier, done.inputs_sha256), Path(poses.source).name, digest)
+    parts = done.unit, done.measurements, done.calibration
+    found = update_by_poses(parts, poses, gravity_g, allowed, source)
+    stated = f"{done.inputs_sha256} {digest} {gravity_g!r} {allowed!r}"
+    inputs = hashlib.sha256(stated.encode()).hexdigest()
+    kept = found.poses
+    dwells = pose_dwells(kept.poses, kept.temps_degc)
+    measurements = MeasurementSet(kept.source, dwells)
+    return Updated(done, Fitted(done.unit, measurements, inputs, found.calibration), found)
+
+
+def _positive(name: str, value: float) -> float:
+    number = float(finite(name, value))
+    if not 0.0 < number <= 1e6:
+        raise RefusedError(name, f"found {number:g}", expected="a number above 0")
+    return number
+
+
+def _digest(recorded: Any) -> str:
+    if isinstance(recorded, str | Path):
+        return files_sha256((Path(recorded),), "name the recording")
+    digest = hashlib.sha256()
+    for name, values in sorted(columns_of(recorded).items()):
+        digest.update(f"{name} {hashlib.sha256(np.asarray(values).tobytes()).digest()!r}".encode())
+    return digest.hexdigest()
 
 
 def poses_of(done: Fitted, recorded: Any, layout: str | Path | None) -> FieldPoses:

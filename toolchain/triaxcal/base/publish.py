@@ -41,6 +41,32 @@ def publish(files: Mapping[str, bytes], target: Path, sometimes: Collection[str]
         shutil.rmtree(staging, ignore_errors=True)
 
 
+def publish_beside(
+    files: Mapping[str, bytes], target: Path, kept: Path | None, sometimes: Collection[str] = ()
+) -> None:
+    """As `publish`; what `target` held before is kept in the folder `kept`, where one is named.
+
+    Raises
+    ------
+    RefusedError
+        As `publish`; neither folder has changed then.
+    """
+    if kept is None or not target.is_dir() or kept.exists():
+        publish(files, target, sometimes)
+        return
+    _refuse_foreign(target, {*files, *sometimes})
+    try:
+        shutil.copytree(target, kept)
+    except OSError as error:
+        shutil.rmtree(kept, ignore_errors=True)
+        raise _refusal(kept, error) from error
+    try:
+        publish(files, target, sometimes)
+    except BaseException:
+        shutil.rmtree(kept, ignore_errors=True)
+        raise
+
+
 def renew(files: Mapping[str, bytes], target: Path) -> None:
     """Give files of the folder `target` new content, each in one step.
 

@@ -36,8 +36,11 @@ def check(
     - g is compared with the uncertainty that is expected there and with the limits of the unit. The
     exit code is 1 when the check fails.
     """
-    from triaxcal.cli.progress import delivered  # noqa: PLC0415
+    import triaxcal  # noqa: PLC0415
+    from triaxcal.api.delivery import delivered_file  # noqa: PLC0415
 
-    found = delivered(unit, build).check(recorded, layout=layout, gravity_m_per_s2=gravity)
+    found = triaxcal.load(delivered_file(unit, build)).check(
+        recorded, layout=layout, gravity_m_per_s2=gravity
+    )
     say(found.summary)
     sys.exit(not found.result.passed)

@@ -16,7 +16,7 @@ from triaxcal.cli.options import HELP, UnitFolder, WithKinds, example, unit_and_
 
 SECTIONS = {
     "Calibrate": ("calib", "dynamic", "batch"),
-    "In the field": ("check",),
+    "In the field": ("check", "update"),
     "Look at readings and results": ("diagnose", "poses", "drift", "crosscoupling", "history"),
     "Check the generated C": ("verify", "target"),
     "Plan, measure, simulate": ("init", "design", "rig", "simulate", "schema"),

@@ -6,18 +6,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from click.termui import progressbar
 
 from triaxcal import deliver
-from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
 from triaxcal.cli.options import say
-
-if TYPE_CHECKING:
-    from triaxcal import Calibration
 
 
 def calibrate(unit: Path, build: Path) -> None:
@@ -27,23 +23,6 @@ def calibrate(unit: Path, build: Path) -> None:
     say(done.summary)
     for warning in done.warnings:
         click.echo(warning, err=True)
-
-
-def delivered(unit: Path, build: Path) -> Calibration:
-    """The calibration that was delivered for a unit."""
-    from triaxcal import load  # noqa: PLC0415
-    from triaxcal.unit.folder import find_unit  # noqa: PLC0415
-
-    find_unit(unit)
-    path = build / unit.absolute().name / "calibration.json"
-    if not path.is_file():
-        raise RefusedError(
-            str(path),
-            "no such file",
-            expected="a delivered calibration",
-            remedy=f"run `triaxcal calib {unit}` first, or name its folder with --build",
-        )
-    return load(path)
 
 
 @contextmanager

@@ -139,6 +139,8 @@ def _beyond_the_tilter(calibration: Calibration) -> dict[str, Any]:
     recording = calibration.recording
     if calibration.inputs:
         found["inputs"] = list(calibration.inputs)
+    if calibration.update is not None:
+        found["update"] = plain(calibration.update)
     if calibration.notes:
         found["findings"] = list(calibration.notes)
     if recording is not None:

@@ -99,11 +99,16 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
         When the data or the result is refused, or a tool is missing.
     """
     with ExitStack() as stack:
-        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="triaxcal-")))
         unit = read_unit(folder)
         if reference is None:
             reference = stack.enter_context(reference_under_way())
-        fitted = fit_folder(unit, folder)
+        return deliver_fitted(fit_folder(unit, folder), reference)
+
+
+def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delivery:
+    """As `deliver`, for a calibration that was made."""
+    with ExitStack() as stack:
+        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="triaxcal-")))
         refuse_beyond_limits(fitted)
         unit = fitted.unit
         firmware = make_firmware(fitted)

@@ -22,9 +22,9 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.outliers import fisher_tail
+from triaxcal.fitting.field.force import force_and_slopes
 from triaxcal.fitting.field.poses import FieldPoses
-from triaxcal.model.metrological import force_from_voltage, unpack_constants
-from triaxcal.model.terms import PRODUCT_AXES
+from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
@@ -203,34 +203,8 @@ def _own_variance(
     variance = (slopes**2 * (noise + code)).sum(axis=1)
     least, dof = 0.0, math.inf
     if recording is not None:
-        held_out = recording.held_out_g or 0.0
-        least, dof = max(recording.rms_free_g, held_out) ** 2, float(recording.dof)
+        model = sum(s.sd or 0.0 for s in known.sources if s.key == "model")
+        least, dof = recording.rms_free_g**2 + model**2, float(recording.dof)
     elif scatter is not None:
         dof = scatter.noise_dof
     return np.maximum(variance, least), dof if (variance < least).any() else math.inf
-
-
-def force_and_slopes(
-    calibration: Calibration, readings: FloatArray, temps_degc: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Force (n, 3) in g, and derivative of its length by the reading (n, 3)."""
-    constants = calibration.thermal.constants_at(temps_degc)
-    linear = force_from_voltage(constants, readings)
-    force = calibration.terms.force_g(linear)
-    N = np.linalg.inv(unpack_constants(constants)[0])
-    slopes: FloatArray = np.einsum("ni,nij->nj", length_slopes(calibration, linear, force), N)
-    return force, slopes
-
-
-def length_slopes(calibration: Calibration, linear: FloatArray, force: FloatArray) -> FloatArray:
-    """Derivative of |a| by the linear result N (U - U0), shape (n, 3)."""
-    unit: FloatArray = force / np.linalg.norm(force, axis=1, keepdims=True)
-    Q = calibration.terms.quadratic_per_g
-    if Q is None:
-        return unit
-    slopes = np.zeros((len(linear), 6, 3))
-    for k, (i, j) in enumerate(PRODUCT_AXES):
-        slopes[:, k, i] += linear[:, j]
-        slopes[:, k, j] += linear[:, i]
-    more: FloatArray = np.einsum("ni,ik,nkj->nj", unit, Q, slopes)
-    return unit + more

@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.field.force import force_and_slopes
 from triaxcal.fitting.field.poses import FieldPoses
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import MeasurementSet
-from triaxcal.uncertainty.expected import Expected, chance_of, expected, force_and_slopes
+from triaxcal.uncertainty.expected import Expected, chance_of, expected
 from triaxcal.unit.description import UnitDescription
 
 Parts = tuple[UnitDescription, MeasurementSet, Calibration]

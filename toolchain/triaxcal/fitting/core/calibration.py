@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from triaxcal.fitting.core.fieldupdate import Update
 from triaxcal.fitting.core.recorded import PairTerms, RecordingFit
 from triaxcal.model.curves import ThermalModel
 from triaxcal.model.metrological import pack_blocks
@@ -204,6 +205,8 @@ class Calibration:
         None for a recording, whose `recording` has it.
     runs : RunRepeatability or None
         Where a tilter's file has several complete runs.
+    update : Update or None
+        Where it comes from, if it is an update of another by poses from the field.
     """
 
     serial: str
@@ -225,6 +228,7 @@ class Calibration:
     inputs: tuple[str, ...] = ()
     held_out: HeldOutTest | None = None
     runs: RunRepeatability | None = None
+    update: Update | None = None
 
     @property
     def findings(self) -> tuple[str, ...]:

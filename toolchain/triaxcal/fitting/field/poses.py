@@ -12,7 +12,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.poses import PoseSet, find_poses
+from triaxcal.poses.poses import Pose, PoseSet, find_poses
 from triaxcal.readings.identity import refuse_other_serial
 from triaxcal.readings.measurements import measurements_of, read_measurements
 from triaxcal.readings.samples import read_samples
@@ -37,8 +37,8 @@ class FieldPoses:
         Standard error of `readings`; NaN where it is unknown.
     temps_degc : array, shape (n,)
     findings : tuple of str
-    poses : PoseSet or None
-        What was found in a recording, its readings as `readings`.
+    poses : PoseSet
+        The same as a recording's; of a tilter each dwell is one.
     """
 
     source: str
@@ -47,16 +47,14 @@ class FieldPoses:
     sd: FloatArray
     temps_degc: FloatArray
     findings: tuple[str, ...]
-    poses: PoseSet | None = None
+    poses: PoseSet
 
     def __len__(self) -> int:
         return len(self.names)
 
     def select(self, kept: list[int]) -> FieldPoses:
         """Only poses of these indices."""
-        poses = self.poses
-        if poses is not None:
-            poses = replace(poses, poses=tuple(poses.poses[k] for k in kept))
+        poses = replace(self.poses, poses=tuple(self.poses.poses[k] for k in kept))
         return FieldPoses(
             self.source,
             tuple(self.names[k] for k in kept),
@@ -138,6 +136,12 @@ def _of_dwells(unit: UnitDescription, recorded: Path | Mapping[str, Any]) -> Fie
     dwells = measured.dwells
     variances = [d.variance_of_mean_v2 for d in dwells]
     sd = np.array([np.full(3, np.nan) if v is None else np.sqrt(v) for v in variances])
+    poses = tuple(
+        Pose(
+            k, d.row, 0.0, 0.0, d.voltage_v, sd[k - 1], d.count or 1, d.temp_degc, d.position, None
+        )
+        for k, d in enumerate(dwells, start=1)
+    )
     return FieldPoses(
         measured.source,
         tuple(f"{d.position}, row {d.row}" for d in dwells),
@@ -145,6 +149,7 @@ def _of_dwells(unit: UnitDescription, recorded: Path | Mapping[str, Any]) -> Fie
         sd,
         np.array([d.temp_degc for d in dwells]),
         (),
+        PoseSet(measured.source, poses, (), None, ()),
     )
 
 

@@ -1,0 +1,217 @@
+"""A delivered calibration as the prior, brought up to date by a few poses of |a| = g.
+
+The parameters are those of the constants' curves, in the order of `CONSTANT_NAMES`, and Q where its
+covariance is known. The prior is the calibration with its covariance and an allowance for drift:
+
+    dK = K(T0) S,    dU0 = K(T0) b,
+
+S symmetric (scales on its diagonal, half angles off it) and b the biases in g, each zero-mean and
+alike at all temperatures. The posterior is `fitting.core.posterior`'s; |a| sees no rotation, so a
+rotation of the frame stays as it was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.posterior import Posterior, Prior, fit_map
+from triaxcal.fitting.field.force import length_slopes
+from triaxcal.fitting.field.poses import FieldPoses
+from triaxcal.model.metrological import force_from_voltage, unpack_constants
+from triaxcal.model.terms import products
+from triaxcal.model.types import FloatArray
+from triaxcal.unit.limits import Limits
+
+_SCALE_OF_BIAS, _AXES_OF_BIAS = 0.25, 0.1
+"""Of the biases' drift in g: that of the scales, of the angles in rad. Data sheets of MEMS sensors
+state a sensitivity over life that is a quarter to a third of their zero-g offset's, in g per g."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Standard deviations of what a sensor may have drifted by.
+
+    Attributes
+    ----------
+    bias_g : float
+        Of each bias.
+    scale : float
+        Of each scale, relative.
+    axes_rad : float
+        Of each angle between two axes.
+    """
+
+    bias_g: float
+    scale: float
+    axes_rad: float
+
+
+def default_drift(limits: Limits) -> Drift:
+    """Drift of a unit that keeps its limits: two standard deviations of a bias are the limit."""
+    bias_g = limits.over_range_g / 2.0
+    return Drift(bias_g, _SCALE_OF_BIAS * bias_g, _AXES_OF_BIAS * bias_g)
+
+
+@dataclass(frozen=True)
+class State:
+    """Parameters of a calibration as one vector.
+
+    Attributes
+    ----------
+    calibration : Calibration
+    theta : array, shape (12 P,) or (12 P + 18,)
+        With Q row by row where the poses of the calibration determined it.
+    """
+
+    calibration: Calibration
+    theta: FloatArray
+
+    @property
+    def functions(self) -> int:
+        """P."""
+        return self.calibration.shape.parameters
+
+    def curves(self, theta: FloatArray) -> FloatArray:
+        """Constants' parameters, shape (12, P)."""
+        return theta[: 12 * self.functions].reshape(12, self.functions)
+
+    def quadratic(self, theta: FloatArray) -> FloatArray | None:
+        """Q, shape (3, 6), or None."""
+        rest = theta[12 * self.functions :]
+        return rest.reshape(3, 6) if len(rest) else self.calibration.terms.quadratic_per_g
+
+    def length(self, theta: FloatArray, poses: FieldPoses) -> tuple[FloatArray, FloatArray]:
+        """|a| at poses, (n,), in g, and its derivative by theta, (n, parameters)."""
+        basis = self.calibration.shape.basis(poses.temps_degc)
+        constants, Q = basis @ self.curves(theta).T, self.quadratic(theta)
+        linear = force_from_voltage(constants, poses.readings)
+        force = linear if Q is None else linear + products(linear) @ Q.T
+        rows = length_slopes(Q, linear, force)
+        by_output = np.einsum("ni,nij->nj", rows, np.linalg.inv(unpack_constants(constants)[0]))
+        of_gain = -(by_output[:, :, None] * linear[:, None, :]).reshape(len(linear), 9)
+        twelve = np.concatenate([of_gain, -by_output], axis=1)
+        columns = [(twelve[:, :, None] * basis[:, None, :]).reshape(len(linear), -1)]
+        length = np.linalg.norm(force, axis=1)
+        if len(theta) > 12 * self.functions:
+            unit = force / length[:, None]
+            columns.append((unit[:, :, None] * products(linear)[:, None, :]).reshape(-1, 18))
+        return length, np.concatenate(columns, axis=1)
+
+
+def state_of(calibration: Calibration) -> State:
+    """Parameters of a calibration: its curves in the functions of its shape."""
+    shape = calibration.shape
+    temps = np.linspace(*calibration.range_degc, 8 * shape.parameters + 1)
+    temps = np.unique([*temps, calibration.thermal.t0_degc])
+    values = calibration.thermal.constants_at(temps)
+    curves = np.linalg.lstsq(shape.basis(temps), values, rcond=None)[0].T
+    recording, Q = calibration.recording, calibration.terms.quadratic_per_g
+    known = recording is not None and recording.terms.quadratic is not None
+    rest = Q.ravel() if known and Q is not None else np.zeros(0)
+    return State(calibration, np.concatenate([curves.ravel(), rest]))
+
+
+def calibration_covariance(state: State, at_t0: FloatArray) -> FloatArray:
+    """Covariance of theta; `at_t0`, (12, 12), is what is alike at all temperatures besides."""
+    calibration, P, size = state.calibration, state.functions, len(state.theta)
+    covariance = np.zeros((size, size))
+    recording = calibration.recording
+    if recording is not None:
+        covariance[: 12 * P, : 12 * P] = recording.covariance.reshape(12 * P, 12 * P)
+        if size > 12 * P and recording.terms.cross is not None:
+            cross = recording.terms.cross.reshape(12 * P, 18)
+            covariance[: 12 * P, 12 * P :], covariance[12 * P :, : 12 * P] = cross, cross.T
+            covariance[12 * P :, 12 * P :] = recording.terms.quadratic
+    else:
+        block = np.zeros((12, P, 12, P))
+        for i in range(3):
+            rows = np.array([3 * i, 3 * i + 1, 3 * i + 2, 9 + i])
+            own = calibration.parameter_covariance[i]
+            for k, row in enumerate(rows):
+                block[row][:, rows] = own[k]
+        covariance[: 12 * P, : 12 * P] = block.reshape(12 * P, 12 * P)
+    return covariance + _everywhere(state, at_t0)
+
+
+def drift_covariance(state: State, drift: Drift) -> FloatArray:
+    """Covariance of theta that an allowance for drift adds."""
+    t0 = state.calibration.thermal.t0_degc
+    K = unpack_constants(state.calibration.thermal.constants_at(t0))[0]
+    columns = []
+    for i in range(3):
+        bias = np.zeros(12)
+        bias[9:] = K[:, i] * drift.bias_g
+        columns.append(bias)
+        for j in range(i, 3):
+            S = np.zeros((3, 3))
+            S[i, j] = S[j, i] = drift.scale if i == j else drift.axes_rad / 2.0
+            columns.append(np.concatenate([(K @ S).ravel(), np.zeros(3)]))
+    factor = np.array(columns).T
+    return _everywhere(state, factor @ factor.T)
+
+
+def _everywhere(state: State, twelve: FloatArray) -> FloatArray:
+    """Covariance of theta of errors of the constants, (12, 12), alike at all temperatures."""
+    P, shape = state.functions, state.calibration.shape
+    temps = np.linspace(*state.calibration.range_degc, 8 * P + 1)
+    basis = shape.basis(temps)
+    ones = np.linalg.lstsq(basis, np.ones(len(basis)), rcond=None)[0]
+    result = np.zeros((len(state.theta), len(state.theta)))
+    spread = np.einsum("ab,p,q->apbq", twelve, ones, ones).reshape(12 * P, 12 * P)
+    result[: 12 * P, : 12 * P] = spread
+    return result
+
+
+@dataclass(frozen=True)
+class Innovation:
+    """Poses against a prior.
+
+    Attributes
+    ----------
+    error_g : array, shape (n,)
+        |a| - g by the calibration.
+    covariance : array, shape (n, n)
+        Of these errors: prior, drift, noise.
+    """
+
+    error_g: FloatArray
+    covariance: FloatArray
+
+    @property
+    def chi_square(self) -> float:
+        """r^T S^-1 r."""
+        return float(self.error_g @ np.linalg.solve(self.covariance, self.error_g))
+
+    @property
+    def left_out(self) -> tuple[FloatArray, FloatArray]:
+        """Each error against what the prior and the others predict, and its sd, (n,) both, g."""
+        inverse = np.linalg.inv(self.covariance)
+        diagonal = np.diag(inverse)
+        return (inverse @ self.error_g) / diagonal, 1.0 / np.sqrt(diagonal)
+
+
+def innovation(
+    state: State, covariance: FloatArray, poses: FieldPoses, noise: FloatArray, gravity_g: float
+) -> Innovation:
+    """Poses against a prior of this covariance; `noise` (n, n) is that of |a| in the poses."""
+    length, slopes = state.length(state.theta, poses)
+    return Innovation(length - gravity_g, slopes @ covariance @ slopes.T + noise)
+
+
+def updated(
+    state: State, covariance: FloatArray, poses: FieldPoses, noise: FloatArray, gravity_g: float
+) -> Posterior:
+    """The most probable parameters after the poses, and what is known of them."""
+    whiten = np.linalg.inv(np.linalg.cholesky(noise))
+
+    def model(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        length, slopes = state.length(theta, poses)
+        return whiten @ (length - gravity_g), whiten @ slopes
+
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    unit = covariance / np.outer(scale, scale)
+    root = Prior.of(np.zeros(len(scale)), unit).factor * scale[:, None]
+    return fit_map(model, Prior(state.theta, root), np.ones(len(poses)), scale=1.0)

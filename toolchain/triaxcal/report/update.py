@@ -1,0 +1,58 @@
+"""What an update changed, for the terminal."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+import numpy as np
+
+from triaxcal.base.screentext import table
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.model.framefree import NAMES, UNITS, relative_scales
+from triaxcal.model.types import FloatArray
+from triaxcal.uncertainty.updated import FieldUpdate
+
+_K = 2.0
+
+
+def update_text(serial: str, found: FieldUpdate, before: Calibration) -> str:
+    """Changes of the nine frame-free constants against their uncertainty, and the poses."""
+    t0 = before.thermal.t0_degc
+    name = PurePath(found.poses.source.replace("\\", "/")).name
+    count = len(found.poses)
+    before_mg, now_mg = (_rms(e) for e in (found.error_before_g, found.error_after_g))
+    lines = [
+        f"{serial} updated by {count} poses of {name}; constants at {t0:g} degC",
+        "",
+        *_table(found, before),
+        "",
+        f"chi-square   {found.chi_square:.1f}, {count} expected: the poses against the prior",
+        f"|a| - g      {before_mg} mg rms at these poses before, {now_mg} mg now",
+    ]
+    recording = found.calibration.recording
+    findings = () if recording is None else recording.findings
+    return "\n".join([*lines, *(f"found        {finding}" for finding in findings)])
+
+
+def _table(found: FieldUpdate, before: Calibration) -> list[str]:
+    at_t0 = before.thermal.constants_at(before.thermal.t0_degc)
+    scale = relative_scales(at_t0)
+    rows = []
+    for k, name in enumerate(NAMES):
+        by = (found.after[k] - found.before[k]) * scale[k]
+        sds = (found.sd_before[k], found.sd_allowed[k], found.sd_after[k])
+        rows.append(
+            [
+                f"  {name}",
+                f"{by:+.4g}",
+                *(f"{_K * sd * abs(scale[k]):.3g}" for sd in sds),
+                f"{100 * found.share[k]:.0f} %",
+                UNITS[k],
+            ]
+        )
+    head = ["constant", "changed by", "+- before", "+- drifted", "+- now", "by the poses", "unit"]
+    return table(head, rows, left=(0, 6))
+
+
+def _rms(values: FloatArray) -> str:
+    return f"{float(np.sqrt(np.mean(np.square(values)))) * 1e3:.3g}"
