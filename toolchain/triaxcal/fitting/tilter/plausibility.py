@@ -26,7 +26,7 @@ from itertools import combinations
 
 import numpy as np
 
-from triaxcal.base.errors import ContradictionError, RefusedError
+from triaxcal.base.errors import ContradictionError
 from triaxcal.fitting.core.grouping import TemperatureGroup
 from triaxcal.fitting.tilter.estimators import DEAD_OUTPUT
 from triaxcal.model.positions import AXES, TEST_POSITIONS
