@@ -15,6 +15,7 @@ from triaxcal.base.jsontext import json_bytes
 from triaxcal.base.plaindata import plain
 from triaxcal.base.tomltable import content_of, text_of
 from triaxcal.delivery.causes import with_cause
+from triaxcal.delivery.coderange import settled_codes
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import PairTerms
@@ -38,7 +39,7 @@ class Fitted:
     Attributes
     ----------
     unit : UnitDescription
-        Its raw codes settled, where a recording left them open.
+        Its raw codes settled, where a recording left them open or own-axis squares need fewer.
     measurements : MeasurementSet
         Dwells, or the poses of a recording as dwells.
     inputs_sha256 : str
@@ -71,6 +72,7 @@ def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
     else:
         measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
         calibration = _of_tilter(unit, measurements, stated_pair(unit, folder))
+        unit, calibration = settled_codes(unit, calibration)
     if inputs_sha256(folder, unit) != inputs:
         raise _changed(folder)
     return Fitted(unit, measurements, inputs, calibration)
@@ -119,6 +121,7 @@ def fit_columns(unit: UnitDescription, readings: Any) -> Fitted:
         measurements = measurements_of(columns, unit)
         digest.update(json_bytes(plain(measurements)))
         calibration = _of_tilter(unit, measurements, None)
+        unit, calibration = settled_codes(unit, calibration)
     return Fitted(unit, measurements, digest.hexdigest(), calibration)
 
 

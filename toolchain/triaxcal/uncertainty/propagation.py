@@ -22,6 +22,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.grouping import group_dwells, grouped_readings
 from triaxcal.fitting.tilter.curves import TilterData, parameter_operator, shifted_voltage
 from triaxcal.fitting.tilter.estimators import estimator_operators
+from triaxcal.fitting.tilter.squares import straight
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.model.types import FloatArray
@@ -141,6 +142,7 @@ def propagation(
 ) -> Propagation:
     """Propagation of a unit that has been calibrated from these measurements."""
     groups = group_dwells(measurements, unit.t0_degc)
+    groups = straight(groups, calibration.terms, unit.gravity_g)
     readings = grouped_readings(groups, unit.adc.volts_per_code)
     operators = estimator_operators(
         calibration.estimator, unit.gravity_g, readings.variance_v2, len(groups)

@@ -11,7 +11,7 @@ import numpy as np
 
 from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.model.types import FloatArray
-from triaxcal.uncertainty.propagation import ROWS, Curves
+from triaxcal.uncertainty.propagation import ROWS, Curves, Propagation, square
 from triaxcal.uncertainty.source import STUDENT, Source, direct
 
 _LINEAR = tuple(10 * i + k for i in range(3) for k in range(4))
@@ -36,6 +36,32 @@ def pair_source(p: Curves) -> list[Source]:
             origin="scatter of the pair's readings on the dividing head",
             advice="measure the pair in more positions, or leave [quadratic] cross_coupling out",
             force=force,
+        )
+    ]
+
+
+def squares_source(p: Propagation) -> list[Source]:
+    """Own-axis squares of the six positions: a wrong one moves the biases with it."""
+    squares = p.calibration.squares
+    if squares is None or not squares.included:
+        return []
+    # A Q_ii too large by one takes K_ki a_i^2 too little off the readings of its two positions.
+    readings = p.dwell_gain * (p.forces_g**2)[:, None, :]
+    factor = np.zeros((len(p.temps_degc), 30, 3))
+    factor[:, _LINEAR] = p.force_factor(p.constants_factor(readings))
+    factor[:, _QUADRATIC] = np.eye(18)[:, [0, 7, 14]]
+    factor *= squares.sd_per_g
+    return [
+        Source(
+            key="own_squares",
+            name="the own-axis squares",
+            sd=squares.sd_per_g,
+            unit="g/g^2",
+            distribution=STUDENT,
+            dof=3.0,
+            origin="squareness and noise in the half-sums over opposite positions, with the prior",
+            advice="square the tilter's faces, or add check dwells",
+            force=square(factor),
         )
     ]
 

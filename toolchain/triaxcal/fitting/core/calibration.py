@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.fitting.core.fieldupdate import Update
+from triaxcal.fitting.core.outliers import CHANCE
 from triaxcal.fitting.core.recorded import PairTerms, RecordingFit
 from triaxcal.model.curves import ThermalModel
 from triaxcal.model.metrological import pack_blocks
@@ -14,6 +15,7 @@ from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell
+from triaxcal.unit.priors import AUTO, LINEAR
 
 
 @dataclass(frozen=True)
@@ -135,6 +137,54 @@ class HeldOutTest:
 
 
 @dataclass(frozen=True)
+class OwnSquares:
+    """Squares of the axes' own accelerations from six positions, and whether they go into the C.
+
+    Attributes
+    ----------
+    per_g : array, shape (3,)
+        Of x, y, z in g/g^2, as Q has them.
+    sd_per_g, prior_per_g : float
+        Standard deviation of each, and of its prior.
+    data_share : float
+        How much of each the readings determine; the rest is the prior.
+    effect_g, matters_g : float
+        The largest at 1 g, and what it has to exceed.
+    chance : float
+        Probability that squareness and noise alone make such squares.
+    held_out_g, checks_g : tuple of two floats, or None
+        Rms without and with the squares: of what shows them at temperatures held out, and of
+        |a| - g at check dwells. None where there are none.
+    asked : str
+        [firmware] terms.
+    """
+
+    per_g: FloatArray
+    sd_per_g: float
+    prior_per_g: float
+    data_share: float
+    effect_g: float
+    matters_g: float
+    chance: float
+    held_out_g: tuple[float, float] | None
+    checks_g: tuple[float, float] | None
+    asked: str
+
+    @property
+    def significant(self) -> bool:
+        """Whether they matter, and are more than squareness and noise make."""
+        return self.effect_g > self.matters_g and self.chance < CHANCE
+
+    @property
+    def included(self) -> bool:
+        """Whether they go into the C."""
+        if self.asked != AUTO:
+            return self.asked != LINEAR
+        judged = (j for j in (self.held_out_g, self.checks_g) if j is not None)
+        return self.significant and all(having < without for without, having in judged)
+
+
+@dataclass(frozen=True)
 class RunRepeatability:
     """How far the constants of one run are from those of others, noise included.
 
@@ -207,6 +257,8 @@ class Calibration:
         Where a tilter's file has several complete runs.
     update : Update or None
         Where it comes from, if it is an update of another by poses from the field.
+    squares : OwnSquares or None
+        Of a tilter's six positions; in `terms` where they are included.
     """
 
     serial: str
@@ -229,6 +281,7 @@ class Calibration:
     held_out: HeldOutTest | None = None
     runs: RunRepeatability | None = None
     update: Update | None = None
+    squares: OwnSquares | None = None
 
     @property
     def findings(self) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from triaxcal.fitting.core.grouping import TemperatureGroup, group_dwells
 from triaxcal.fitting.tilter.estimators import CONDITION_MAX
 from triaxcal.fitting.tilter.resolution import limit_below_a_code
 from triaxcal.fitting.tilter.runs import contradictory_runs
+from triaxcal.fitting.tilter.squares import straight
 from triaxcal.model.metrological import (
     force_from_voltage,
     unpack_constants,
@@ -186,7 +187,7 @@ def dwells_in_range(
 def _largest_disagreement(
     unit: UnitDescription, calibration: Calibration, measurements: MeasurementSet
 ) -> _Disagreement:
-    groups = group_dwells(measurements, unit.t0_degc)
+    groups = straight(group_dwells(measurements, unit.t0_degc), calibration.terms, unit.gravity_g)
     found = []
     for group, point in zip(groups, calibration.points, strict=True):
         residual = {

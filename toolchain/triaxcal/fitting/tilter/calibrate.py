@@ -8,7 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint, CheckResult, Selection
+from triaxcal.fitting.core.calibration import (
+    Calibration,
+    CalibrationPoint,
+    CheckResult,
+    OwnSquares,
+    Selection,
+)
 from triaxcal.fitting.core.grouping import (
     GroupedReadings,
     TemperatureGroup,
@@ -39,6 +45,13 @@ from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions
 from triaxcal.fitting.tilter.resolution import code_notes
 from triaxcal.fitting.tilter.runs import repeatability, run_notes
 from triaxcal.fitting.tilter.selection import PREFERENCE, select
+from triaxcal.fitting.tilter.squares import (
+    judged_by_checks,
+    own_squares,
+    square_notes,
+    straight,
+    with_squares,
+)
 from triaxcal.fitting.tilter.temperatures import refuse_unbelievable_temperatures
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import NO_TERMS, Terms
@@ -73,6 +86,28 @@ def calibrate(
     refuse_mistaken_units(measurements)
     refuse_exchanged_positions(measurements.source, groups, unit.polarity)
     _refuse_singular(measurements.source, groups, unit.gravity_g)
+    squares = own_squares(unit, groups)
+    linear = _fit(unit, measurements, groups, pair, terms)
+    if not squares.included:
+        return _with_squares(linear, squares)
+    terms = with_squares(terms, squares)
+    straightened = _fit(unit, measurements, straight(groups, terms, unit.gravity_g), pair, terms)
+    squares = judged_by_checks(squares, linear, straightened)
+    return _with_squares(straightened if squares.included else linear, squares)
+
+
+def _with_squares(found: Calibration, squares: OwnSquares) -> Calibration:
+    return replace(found, squares=squares, notes=(*square_notes(squares), *found.notes))
+
+
+def _fit(
+    unit: UnitDescription,
+    measurements: MeasurementSet,
+    groups: tuple[TemperatureGroup, ...],
+    pair: PairTerms | None,
+    terms: Terms,
+) -> Calibration:
+    """Curves and estimator of groups whose readings are those of a linear unit."""
     range_degc = _working_range(unit, groups)
     readings = grouped_readings(groups, unit.adc.volts_per_code)
     estimators = PREFERENCE if unit.estimator == "auto" else (unit.estimator,)
