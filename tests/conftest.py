@@ -25,6 +25,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 LONG = {
+    "family/test_check.py",
     "family/test_files.py",
     "family/test_formats.py",
     "family/test_live_pair.py",
@@ -37,6 +38,7 @@ LONG = {
     "family/test_table_terms.py",
     "family/test_tables.py",
     "family/test_unchecked.py",
+    "family/test_update.py",
     "rig/test_cli_rig.py",
     "rig/test_firmware.py",
     "rig/test_live.py",

@@ -12,10 +12,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import triaxcal
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.history import history as command
 from triaxcal.cli.main import main
 from triaxcal.fitting.tilter.calibrate import calibrate
+from triaxcal.model.types import FloatArray
+from triaxcal.report.history import read_history
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.truth import Imperfections, Truth, read_truth
 from triaxcal.simulation.unit import write_simulated_unit
@@ -23,8 +26,6 @@ from triaxcal.uncertainty.history import (
     EN_MAX,
     Calibrated,
     changes,
-    latest_change,
-    read_history,
     repeatability,
 )
 from triaxcal.unit.description import UnitDescription, read_unit
@@ -199,23 +200,104 @@ def test_a_broken_file_of_the_history_is_named(folder: Path) -> None:
         read_history(folder, read_unit(folder))
 
 
-def test_a_recording_has_no_history(unit: UnitDescription, tmp_path: Path) -> None:
-    """The file of its history is no measurements.csv: that is told, and calib goes on without."""
+def recorded(folder: Path, name: str, poses: FloatArray, K: FloatArray, U0: FloatArray) -> None:
+    """A recording of poses, one a row, with the noise of a mean of 0.1 mg."""
+    seed = sum(name.encode())
+    noise = 1e-3 * np.random.default_rng(seed).standard_normal(poses.shape)
+    readings = poses @ K.T + U0 + noise
+    rows = [",".join(f"{v:.9g}" for v in row) for row in readings]
+    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_text("\n".join(["ax,ay,az", *rows]) + "\n", encoding="utf-8")
+
+
+@pytest.fixture
+def poses() -> FloatArray:
+    random = np.random.default_rng(5).standard_normal((24, 3))
+    return random / np.linalg.norm(random, axis=1, keepdims=True)
+
+
+RECORDED = (
+    'format = 1\nserial = "R-1"\n[site]\nlocal_gravity_m_per_s2 = 9.80665\n'
+    '[recording]\nfile = "log.csv"\nacceleration = ["ax", "ay", "az"]\n'
+    'acceleration_unit = "m/s^2"\nrows = "poses"\n'
+)
+GAIN = np.array([[9.85, 0.03, -0.02], [0.01, 9.79, 0.05], [-0.04, 0.02, 9.90]])
+BIAS = np.array([0.21, -0.33, 0.12])
+
+
+def test_recordings_are_compared_by_what_no_frame_changes(
+    tmp_path: Path,
+    poses: FloatArray,
+) -> None:
     folder = tmp_path / "units" / "R-1"
-    (folder / "history").mkdir(parents=True)
-    (folder / "history" / "2025-03-30.csv").write_text("t,ax,ay,az\n", encoding="utf-8")
-    (folder / "unit.toml").write_text(
-        'format = 1\nserial = "R-1"\n[site]\nlocal_gravity_m_per_s2 = 9.80665\n'
-        '[recording]\nfile = "log.csv"\nacceleration = ["ax", "ay", "az"]\n'
-        'acceleration_unit = "m/s^2"\ntime = "t"\n',
-        encoding="utf-8",
-    )
-    with pytest.raises(RefusedError) as refusal:
-        command.main([str(folder)], standalone_mode=False)
-    assert str(refusal.value) == (
-        f"{folder}: its readings are a recording; expected a unit with measurements.csv from a "
-        "tilter; compare the uncertainties in the passports by hand"
-    )
+    recorded(folder, "history/2024-03-30.csv", poses, GAIN, BIAS)
+    recorded(folder, "history/2025-03-30.csv", poses[::-1], GAIN, BIAS)
+    moved = BIAS + GAIN @ [0.0, 2e-3, 0.0]
+    recorded(folder, "log.csv", poses, GAIN, moved)
+    (folder / "unit.toml").write_text(RECORDED, encoding="utf-8")
+    done = CliRunner().invoke(command, [str(folder), "--build", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    unit = read_unit(folder)
+    first, second = changes(unit, read_history(folder, unit))
+    assert not first.contradicts
+    assert second.contradicts
+    assert second.nine[7] == pytest.approx(2.0, abs=0.3)  # bias y, mg
+    assert second.nine_where.startswith("bias y")
+    assert (np.abs(second.nine[[0, 1, 2]]) < 400.0).all()
+    assert "warning: calibration now contradicts 2025-03-30: " in done.output
+    assert max(map(len, done.output.splitlines())) <= 80
+
+
+def test_a_turned_frame_is_no_change_of_the_sensor(unit: UnitDescription) -> None:
+    """The same sensor in another mounting: K R with a rotation of 2 mrad about z."""
     truth, _ = read_truth(AT_SIM)
-    (newest,) = calibrations(unit, [truth], 1)
-    assert latest_change(folder, read_unit(folder), newest) is None
+    turn = np.array([[1.0, -2e-3, 0.0], [2e-3, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    curves = truth.constants.curves
+    gain = curves.coefficients[:, :9].reshape(len(curves.coefficients), 3, 3, -1)
+    turned = np.einsum("mijn,jk->mikn", gain, turn).reshape(len(gain), 9, -1)
+    coefficients = np.concatenate([turned, curves.coefficients[:, 9:]], axis=1)
+    other = replace(
+        truth,
+        constants=replace(truth.constants, curves=replace(curves, coefficients=coefficients)),
+    )
+    (change,) = changes(unit, calibrations(unit, [truth, other], 5))
+    assert abs(change.cross_axis_micro_rad) == pytest.approx(2000.0, rel=0.1)
+    assert change.en > EN_MAX
+    assert change.contradicts  # on a rig the mounting has changed, and that is told
+    assert not change.nine_contradicts
+    # The rig's own squareness of 8 arcsec, 39 micro-rad a position, is in the angles.
+    assert (np.abs(change.nine[3:6]) < 200.0).all()
+    (moved,) = changes(unit, calibrations(unit, [truth, aged(truth, 10, 2e-4)], 5))
+    assert moved.nine_contradicts
+    assert moved.nine[7] == pytest.approx(0.365, abs=0.05)  # of |k_y|: the sign of U0y
+
+
+def test_an_update_in_the_field_comes_last(
+    tmp_path: Path,
+    poses: FloatArray,
+) -> None:
+    folder = tmp_path / "units" / "R-1"
+    recorded(folder, "log.csv", poses, GAIN, BIAS)
+    (folder / "unit.toml").write_text(RECORDED, encoding="utf-8")
+    made = triaxcal.deliver(folder, tmp_path / "build")
+    with pytest.raises(RefusedError, match="no earlier measurements"):
+        triaxcal.compare_history(triaxcal.read_unit(folder), tmp_path / "build")
+    field = tmp_path / "field"
+    recorded(field, "field.csv", np.concatenate([np.eye(3), -np.eye(3)]), GAIN, BIAS)
+    triaxcal.update(folder, field / "field.csv", tmp_path / "build")
+    found = triaxcal.compare_history(triaxcal.read_unit(folder), tmp_path / "build")
+    (change,) = found.result
+    assert (change.before, change.name) == ("now", "update")
+    assert not change.contradicts
+    assert f"update: calibration {_sha(made)[:8]} updated by 6 poses of field.csv." in found.summary
+    # The calibration.json of that day is a part of the history like readings are.
+    kept = tmp_path / "build" / f"R-1.{_sha(made)[:8]}" / "calibration.json"
+    (folder / "history").mkdir()
+    shutil.copy(kept, folder / "history" / "2025-01-01.json")
+    first, _ = triaxcal.compare_history(triaxcal.read_unit(folder), tmp_path / "build").result
+    assert (first.before, first.name, first.en) == ("2025-01-01", "now", 0.0)
+
+
+def _sha(made: triaxcal.Delivered) -> str:
+    assert isinstance(made.calibration, triaxcal.Calibration)
+    return made.calibration.fitted.inputs_sha256

@@ -21,10 +21,10 @@ from triaxcal.poses.poses import find_poses as poses_of
 from triaxcal.readings.samples import Samples, read_samples
 from triaxcal.report import studies
 from triaxcal.report.dynamic import plan_summary
-from triaxcal.report.history import history_text
+from triaxcal.report.history import history_text, read_history
 from triaxcal.simulation.series import write_series
 from triaxcal.simulation.unit import write_simulated_unit
-from triaxcal.uncertainty.history import Change, changes, read_history, repeatability
+from triaxcal.uncertainty.history import Change, changes, repeatability
 from triaxcal.unit.recording import RecordingLayout
 
 T = TypeVar("T")
@@ -93,15 +93,19 @@ def study_drift(unit: Unit) -> Study[Drift]:
     )
 
 
-def compare_history(unit: Unit) -> Study[list[Change]]:
-    """Changes between the calibrations of a unit: `history/*.csv`, then measurements.csv.
+def compare_history(unit: Unit, build: str | Path = "build") -> Study[list[Change]]:
+    """Changes between the calibrations of a unit: those in history/, then that of its readings.
+
+    Where the calibration delivered in a folder of the unit's name below `build` is an update by
+    poses from the field, it comes last.
 
     Raises
     ------
     RefusedError
         When the unit has no folder, or one of them cannot be calibrated.
     """
-    found = read_history(_folder(unit), unit.description)
+    delivered = Path(build) / unit.name / "calibration.json"
+    found = read_history(_folder(unit), unit.description, delivered)
     change = changes(unit.description, found)
     repeat = repeatability(unit.description, found)
     return Study(change, history_text(unit.serial, found, change, repeat))

@@ -11,7 +11,7 @@ import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.uncertainty.budget import Budget, budget
 from triaxcal.uncertainty.coverage import coverage_factor
@@ -63,6 +63,23 @@ class Uncertainty:
     def constants_u(self) -> FloatArray:
         """Expanded uncertainty (95 %) of the twelve constants, shape (n, 12), V/g and V."""
         each = [_sd(s.constants)[:, list(ROWS)] for s in self._of_constants()]
+        return _expanded(np.stack(each), [s.dof for s in self._of_constants()])
+
+    def of_constants(self, slopes: FloatArray, kept: BoolArray) -> FloatArray:
+        """Expanded uncertainty (95 %) of functions of the twelve constants, shape (m, k).
+
+        Parameters
+        ----------
+        slopes : array, shape (m, k, 12)
+            Their derivatives, in the order of `CONSTANT_NAMES`, at the m kept temperatures.
+        kept : array, shape (n,)
+        """
+        order, each = np.array(ROWS), []
+        for s in self._of_constants():
+            assert s.constants is not None
+            covariance = s.constants[kept][:, order[:, None], order]
+            variance = np.einsum("mka,mab,mkb->mk", slopes, covariance, slopes)
+            each.append(np.sqrt(np.maximum(variance, 0.0)))
         return _expanded(np.stack(each), [s.dof for s in self._of_constants()])
 
     @cached_property

@@ -7,6 +7,10 @@ Two results x1, x2 of one constant agree when
 is about 1 or less (ISO 13528), U being expanded (95 %). Twelve constants at T0 and at both ends of
 the common range are compared, so the largest En of 36 counts: by chance it exceeds `EN_MAX` in one
 comparison of twenty. Errors that both calibrations share, as on one rig, make En smaller.
+
+Beside the twelve stand nine that no rotation of the frame changes (`model.framefree`), of which the
+largest En of 27 counts. Where |a| = g alone is known of the poses, the frame is a convention, and
+only the nine can contradict. Where it is the rig's, a turned sensor contradicts by the twelve.
 """
 
 from __future__ import annotations
@@ -20,19 +24,20 @@ from statistics import NormalDist
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import PairTerms
-from triaxcal.fitting.pair.cross_coupling import stated_pair
 from triaxcal.fitting.tilter.calibrate import calibrate
+from triaxcal.model.framefree import NAMES, frame_free, frame_free_slopes, relative_scales
 from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
-from triaxcal.readings.measurements import MEASUREMENTS_FILE, MeasurementSet, read_measurements
+from triaxcal.readings.measurements import MeasurementSet, read_measurements
 from triaxcal.uncertainty.evaluate import uncertainty
 from triaxcal.unit.description import UnitDescription
 
 HISTORY_FOLDER = "history"
 EN_MAX = NormalDist().inv_cdf(1.0 - 0.05 / 72.0) / NormalDist().inv_cdf(0.975)
+EN_MAX_NINE = NormalDist().inv_cdf(1.0 - 0.05 / 54.0) / NormalDist().inv_cdf(0.975)
+"""The same for 27 values."""
 _OWN_AXIS = (0, 4, 8)
 _DAYS_A_YEAR = 365.25
 
@@ -44,15 +49,24 @@ class Calibrated:
     Attributes
     ----------
     name : str
-        Of its file, without the suffix; "now" is the unit's own measurements.csv.
+        Of its file, without the suffix; "now" is the unit's own readings, "update" its calibration
+        after poses from the field.
     day : date or None
         From a name as 2025-03-30, or [measured] date.
+    unit : UnitDescription or None
+        That it was made with; None is the present one.
     """
 
     name: str
     day: datetime.date | None
     measurements: MeasurementSet
     calibration: Calibration
+    unit: UnitDescription | None = None
+
+    def frame_is_free(self, unit: UnitDescription) -> bool:
+        """Whether only |a| = g was known of its poses: its axes are then a convention."""
+        layout = (self.unit or unit).recording
+        return layout is not None and layout.angles is None and not layout.faces
 
 
 @dataclass(frozen=True)
@@ -73,6 +87,14 @@ class Change:
         How much that constant changed, and the expanded uncertainty of the difference (95 %).
     of_unit : str
         Unit of both: mg, ppm or micro-rad.
+    nine, nine_u : arrays, shape (9,)
+        Changes at T0 of what no rotation of the frame changes, and their expanded uncertainty, in
+        `model.framefree.UNITS`.
+    nine_en : float
+        Largest En of the 27.
+    nine_where : str
+    frame_is_free : bool
+        Whether the frame of one of the two is a convention.
     """
 
     name: str
@@ -85,45 +107,26 @@ class Change:
     by: float
     expanded: float
     of_unit: str
+    nine: FloatArray
+    nine_u: FloatArray
+    nine_en: float
+    nine_where: str
+    frame_is_free: bool
 
     @property
     def contradicts(self) -> bool:
         """Whether the two cannot both be right."""
-        return self.en > EN_MAX
+        return self.nine_contradicts or (self.en > EN_MAX and not self.frame_is_free)
+
+    @property
+    def nine_contradicts(self) -> bool:
+        """Whether the sensor itself has changed, and not only its frame."""
+        return self.nine_en > EN_MAX_NINE
 
 
 def older_files(folder: Path) -> list[Path]:
     """Measurements of earlier calibrations, by name; none when the unit has no history."""
     return sorted((folder / HISTORY_FOLDER).glob("*.csv"))
-
-
-def read_history(folder: Path, unit: UnitDescription) -> list[Calibrated]:
-    """All calibrations of a unit, the oldest first, the present one last.
-
-    Raises
-    ------
-    RefusedError
-        When the unit's readings are a recording, there is no earlier one, or one is refused.
-    """
-    if unit.recording is not None:
-        raise RefusedError(
-            str(folder),
-            "its readings are a recording",
-            expected="a unit with measurements.csv from a tilter",
-            remedy="compare the uncertainties in the passports by hand",
-        )
-    older = older_files(folder)
-    if not older:
-        raise RefusedError(
-            str(folder / HISTORY_FOLDER),
-            "no earlier measurements",
-            expected=f"{HISTORY_FOLDER}/<day>.csv, as {HISTORY_FOLDER}/2025-03-30.csv",
-            remedy=f"move {MEASUREMENTS_FILE} there before you put a new one in its place",
-        )
-    pair = stated_pair(unit, folder)
-    found = [calibrated(path, unit, path.stem, _day(path.stem), pair) for path in older]
-    newest = calibrated(folder / MEASUREMENTS_FILE, unit, "now", unit.measured.date, pair)
-    return [*found, newest]
 
 
 def calibrated(
@@ -138,7 +141,8 @@ def calibrated(
     return Calibrated(name, day, measurements, calibrate(unit, measurements, pair))
 
 
-def _day(name: str) -> datetime.date | None:
+def day_of(name: str) -> datetime.date | None:
+    """Day of a file whose name begins with one."""
     try:
         return datetime.date.fromisoformat(name[:10])
     except ValueError:
@@ -159,7 +163,7 @@ def latest_change(folder: Path, unit: UnitDescription, newest: Calibrated) -> Ch
     if not older or unit.recording is not None:
         return None
     name = older[-1].stem
-    last = calibrated(older[-1], unit, name, _day(name), newest.calibration.pair)
+    last = calibrated(older[-1], unit, name, day_of(name), newest.calibration.pair)
     return _change(unit, last, newest)
 
 
@@ -167,18 +171,25 @@ def _change(unit: UnitDescription, before: Calibrated, after: Calibrated) -> Cha
     low = max(c.calibration.range_degc[0] for c in (before, after))
     high = min(c.calibration.range_degc[1] for c in (before, after))
     temps = np.unique(np.clip([low, unit.t0_degc, high], min(low, high), max(low, high)))
-    values, expanded = [], []
+    values, expanded, nine, nine_u = [], [], [], []
     for c in (before, after):
-        u = uncertainty(unit, c.measurements, c.calibration, None, _with_t0(temps, unit))
+        u = uncertainty(c.unit or unit, c.measurements, c.calibration, None, _with_t0(temps, unit))
         keep = np.isin(u.temps_degc, temps)
-        values.append(c.calibration.thermal.constants_at(temps))
+        constants = c.calibration.thermal.constants_at(temps)
+        values.append(constants)
         expanded.append(u.constants_u[keep])
+        nine.append(frame_free(constants))
+        nine_u.append(u.of_constants(np.stack([frame_free_slopes(row) for row in constants]), keep))
     difference, its_u = values[1] - values[0], np.hypot(expanded[0], expanded[1])
     en = np.abs(difference) / its_u
     row, constant = map(int, np.unravel_index(int(en.argmax()), en.shape))
     at_t0 = [c.calibration.thermal.constants_at(unit.t0_degc) for c in (before, after)]
     bias, scale, cross = _kinds(at_t0[1] - at_t0[0], at_t0[0])
     scale_of = _scales(at_t0[0])
+    change, change_u = nine[1] - nine[0], np.hypot(nine_u[0], nine_u[1])
+    nine_en = np.abs(change) / change_u
+    k, which = map(int, np.unravel_index(int(nine_en.argmax()), nine_en.shape))
+    t0_row, to_unit = int(np.abs(temps - unit.t0_degc).argmin()), relative_scales(at_t0[0])
     return Change(
         name=after.name,
         before=before.name,
@@ -190,6 +201,11 @@ def _change(unit: UnitDescription, before: Calibrated, after: Calibrated) -> Cha
         by=float(difference[row, constant] * scale_of[constant]),
         expanded=float(its_u[row, constant] * abs(scale_of[constant])),
         of_unit=_unit_of(constant),
+        nine=change[t0_row] * to_unit,
+        nine_u=change_u[t0_row] * to_unit,
+        nine_en=float(nine_en.max()),
+        nine_where=f"{NAMES[which]} at {temps[k]:.4g} °C",
+        frame_is_free=before.frame_is_free(unit) or after.frame_is_free(unit),
     )
 
 
