@@ -324,6 +324,13 @@ CAUSE_OF = {
     "unit": "block_temperature",
     "blocks": "exchanged_blocks",
 }
+WITHOUT_SIZE = {
+    "exchanged", "half_turn", "polarity", "sign", "unsigned", "unit", "blocks", "dead", "copied",
+    "scatter", "gain", "mounting", "left_handed",
+}  # fmt: skip
+"""Faults of one size."""
+NEEDS_CHECKS = {"hysteresis", "drift"}
+"""Without check dwells these are a part of the curves of one rising pass, whatever the method."""
 
 
 # ---- what no cause of the list is

@@ -21,6 +21,14 @@ from triaxcal.model.types import FloatArray
 
 _CAREFUL = 7
 """Causes that are judged with care."""
+_FEWEST = 3
+"""Causes that are judged with care, however far behind they are."""
+_FAR = 80.0
+"""Log evidence behind the best beyond which a cause is not judged with care."""
+_HOPELESS = -9.5
+"""Quick log evidence against a sound unit below which a cause is not judged with care."""
+_SEVERAL = 6
+"""Dwells that may be wrong at once."""
 _BEHIND = 10.0
 """Log evidence by which a second place may be behind the first, to be judged with care."""
 
@@ -47,18 +55,27 @@ class Ranked:
         return self.places[0]
 
 
-def rank(readings: Readings) -> tuple[Sound, list[Ranked]]:
-    """Causes by falling evidence, and the sound unit they stand against."""
+def rank(
+    readings: Readings, nominal: tuple[FloatArray | None, float] = (None, 0.1)
+) -> tuple[Sound, list[Ranked]]:
+    """Causes by falling evidence, and the sound unit they stand against.
+
+    `nominal` are the nominal sensitivities in V/g, shape (3,), and their relative tolerance.
+    """
     sound = _sound(readings)
     readings = standing_force(readings, sound.fit.theta)
-    known = Known(readings, sound.fit.theta)
     # What the sound unit takes for noise, tilts and curvature may be the mistake.
     curved = replace(Scales(), curvature=max(sound.scales.curvature, 3.0))
     screen = Screen(sound.system, (sound.scales, Scales(), curved))
+    known = Known(readings, sound.fit.theta, screen.standing_out(_SEVERAL), *nominal)
     screened = [(cause, _screened(cause, known, screen)) for cause in CAUSES]
     screened = [item for item in screened if item[1]]
     screened.sort(key=lambda item: -item[1][0].log_evidence)
-    found = [_careful(c, s, readings, screen.theta) for c, s in screened[:_CAREFUL]]
+    best = screened[0][1][0].log_evidence
+    least = max(sound.fit.log_evidence + _HOPELESS, best - _FAR)
+    near = [item for item in screened[:_CAREFUL] if item[1][0].log_evidence > least]
+    near += screened[len(near) : max(_FEWEST, len(near))]
+    found = [_careful(c, s, readings, screen.theta) for c, s in near]
     found.sort(key=lambda r: -r.best.log_evidence)
     return sound, found
 

@@ -52,7 +52,7 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
                 rows=rows,
                 change=f"with {temps} in {rows_in_words(rows)}",
                 places=2.0 * len(_FORMS) * (len(blocks) if one else len(together)),
-                log_prior=_at_t0(readings, own, new, tests),
+                log_prior=_at_t0(readings, own, new, tests) * (1.0 if one else 2.5),
             )
 
 

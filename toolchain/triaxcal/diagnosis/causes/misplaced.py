@@ -27,6 +27,7 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
             readings.rows[own],
             f"with {name} tilted at every temperature",
             places=6.0,
+            sizes=(2e-3, 20e-3, 200e-3),
         )
 
 

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known
-from triaxcal.diagnosis.core.readings import Readings
-from triaxcal.model.types import FloatArray
+from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, unchanged
 
-_FACTORS = (6.0, 15.0, 40.0, 100.0, 250.0, 600.0, 1500.0, 4000.0, 10000.0, 25000.0)
+_FACTORS = (4.5, 7.0, 11.0, 18.0, 40.0, 100.0, 250.0, 600.0, 1500.0, 4000.0, 10000.0, 25000.0)
 
 
 def _hypotheses(_known: Known) -> Iterator[Hypothesis]:
-    yield Hypothesis("", _same, change="nothing", noise=_FACTORS, log_prior=-3.0)
-
-
-def _same(readings: Readings, _amplitudes: FloatArray) -> Readings:
-    return readings
+    yield Hypothesis("", unchanged, change="nothing", noise=_FACTORS, log_prior=-3.0)
 
 
 ENTRY = Cause(

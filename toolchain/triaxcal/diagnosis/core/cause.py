@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from triaxcal.diagnosis.core.readings import Readings, rows_in_words
+from triaxcal.diagnosis.core.readings import Readings
 from triaxcal.diagnosis.core.sound import BendFeatures, residuals
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
@@ -77,9 +77,11 @@ class Hypothesis:
     log_density: float = 0.0
 
     @property
-    def where(self) -> str:
-        """Rows, where it is about some of them."""
-        return rows_in_words(self.rows) if len(self.rows) else ""
+    def blind(self) -> bool:
+        """Whether an output is lost, so that |a| in check positions is unknown."""
+        return self.unused is not None and bool(
+            (self.unused.sum(axis=0) > len(self.unused) / 3).any()
+        )
 
     def columns(self, readings: Readings, theta: FloatArray, about: FloatArray) -> FloatArray:
         """Effect of each amplitude on the rows, about some amplitudes, shape (n, k)."""
@@ -90,6 +92,16 @@ class Hypothesis:
             step[k] = _SMALL
             effects.append((base - residuals(self.undo(readings, about + step), theta)) / _SMALL)
         return np.stack(effects, axis=1)
+
+
+def unchanged(readings: Readings, _amplitudes: FloatArray) -> Readings:
+    """Undo nothing: the cause explains some outputs, or the noise, by itself."""
+    return readings
+
+
+def explained(log_density: float, count: int) -> float:
+    """`log_density` of `count` outputs, for a model that takes them as normal of variance 1 g^2."""
+    return log_density + 0.5 * count * float(np.log(2.0 * np.pi))
 
 
 def falling(undo: Undo) -> Undo:
@@ -110,10 +122,8 @@ class Known:
     readings : Readings
     theta : array
         Constants of the first fit.
-    residual : array, shape (dwells, 3)
-        Of the first fit, in its standard deviations; of a check dwell in column 0.
-    standing_out : tuple of int
-        Rows of the model that stand out one after the other, when those before are left out.
+    standing_out : tuple of (dwell, output)
+        What stands out most, then what does when that is left out, and so on.
     sensitivity_v_per_g : array, shape (3,), or None
         Nominal ones, where the description states them.
     tolerance : float

@@ -28,7 +28,9 @@ _TURNS = 6
 _CONDITION_MAX = 4.0
 """Of K with unit rows, beyond which the constants say nothing about the check dwells."""
 _STILL_G = 3e-6
-_ABSURD = 2.0
+_STANDS_OUT = 12.0
+"""Squared, in standard deviations."""
+_ABSURD = 10.0
 
 
 @dataclass(frozen=True)
@@ -76,16 +78,16 @@ def linked(
 ) -> System:
     """Model of readings whose check dwells are linear about the constants that fit them."""
     unused = None if hypothesis is None else hypothesis.unused
-    if readings.test.all() or (unused is not None and unused.any()):
+    if readings.test.all() or (hypothesis is not None and hypothesis.blind):
         return System(readings, None, unused)
     turns = 1
     if theta is None:
-        theta = System(readings, None).fit(scales).theta
+        theta = System(readings, None, unused).fit(scales).theta
         turns = 2
     for _ in range(turns):
         if not _sensible(theta, readings):
-            return System(readings, None)
-        system = System(readings, theta)
+            return System(readings, None, unused)
+        system = System(readings, theta, unused)
         theta = system.fit(scales).theta
     return system
 
@@ -150,7 +152,7 @@ def _with_amplitudes(
     checks = not readings.test.all()
     for turn in range(_TURNS):
         mended = hypothesis.undo(readings, about)
-        use_checks = checks and hypothesis.unused is None and _sensible(theta, mended)
+        use_checks = checks and not hypothesis.blind and _sensible(theta, mended)
         system = System(mended, theta if use_checks else None, hypothesis.unused)
         added = Added(hypothesis.columns(readings, theta, about), size, about)
         if turn < 2:
@@ -161,7 +163,7 @@ def _with_amplitudes(
         theta = fit.theta
         moved = np.abs(fit.amplitudes - about).max()
         small = not checks and np.abs(added.columns @ fit.amplitudes).max() < 0.3e-3
-        if moved < _STILL_G or moved > _ABSURD or small:
+        if moved < _STILL_G or moved > _ABSURD * max(hypothesis.sizes) or small:
             break
         about = fit.amplitudes
     fit, scales = climb(system, scales, added)
@@ -218,6 +220,27 @@ class Screen:
         best = int(np.argmax(values))
         return Screened(hypothesis, values[best] + log_prior(hypothesis), scales[best])
 
+    def standing_out(self, most: int) -> tuple[tuple[int, int], ...]:
+        """Dwell and output that stand out most, then most when that is left out, and so on."""
+        _, root, projector, rest = self._parts[min(1, len(self._parts) - 1)]
+        inner = projector * root
+        Q, b = np.diag(root**2) - inner.T @ inner, root * rest
+        rows = self.system.rows
+        found: list[tuple[int, int]] = []
+        for _ in range(most):
+            diagonal = np.maximum(np.diag(Q), 1e-12)
+            gain = np.where(self.system.used & (np.diag(Q) > 1e-6 * root**2), b**2 / diagonal, 0.0)
+            r = int(gain.argmax())
+            if gain[r] < _STANDS_OUT:
+                break
+            dwell, output = int(rows.dwell[r]), int(rows.output[r])
+            if output < 0:
+                output = int(np.abs(self.readings.force[dwell]).argmax())
+            found.append((dwell, output))
+            b = b - Q[:, r] * b[r] / Q[r, r]
+            Q = Q - np.outer(Q[:, r], Q[r]) / Q[r, r]
+        return tuple(found)
+
     def _additive(self, hypothesis: Hypothesis) -> list[float]:
         """Evidence of one whose amplitudes are taken as small, at each setting."""
         about = np.zeros(len(hypothesis.parameters))
@@ -241,11 +264,11 @@ class Screen:
         """Evidence of one without amplitudes; the check dwells only where the tests allow it."""
         mended = hypothesis.undo(self.readings, np.zeros(0))
         alone = System(mended, None, hypothesis.unused).fit(self._plain)
-        if self.readings.test.all() or hypothesis.unused is not None:
+        if self.readings.test.all() or hypothesis.blind:
             return alone.log_evidence
-        if alone.log_evidence < self._tests_alone - 30.0:
+        if alone.log_evidence + hypothesis.log_density < self._tests_alone - 30.0:
             return self._fit + alone.log_evidence - self._tests_alone
-        return linked(mended, self._plain, alone.theta).fit(self._plain).log_evidence
+        return linked(mended, self._plain, alone.theta, hypothesis).fit(self._plain).log_evidence
 
 
 def standing_force(readings: Readings, theta: FloatArray) -> Readings:

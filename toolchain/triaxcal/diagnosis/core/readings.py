@@ -147,8 +147,8 @@ def _volts_per_g(unit: UnitDescription, volts: FloatArray, force: FloatArray) ->
 
     The signs are those of the description; without one +, or - where all three outputs show it.
     """
-    own = np.array([_own_volts(volts[:, i], force[:, i]) for i in range(3)])
-    size = np.abs(own)
+    each = np.array([[_half_span(volts[:, i], force[:, j]) for j in range(3)] for i in range(3)])
+    own, size = np.diag(each), np.linalg.norm(each, axis=1)
     strongest = max(float(size.max()), float(np.abs(volts).max()) / 10.0, 1e-12)
     size = np.where(size > 0.2 * strongest, size, strongest)
     if unit.polarity is not None:
@@ -156,7 +156,7 @@ def _volts_per_g(unit: UnitDescription, volts: FloatArray, force: FloatArray) ->
     return np.asarray(-size if (own < 0).all() else size)
 
 
-def _own_volts(volts: FloatArray, force: FloatArray) -> float:
+def _half_span(volts: FloatArray, force: FloatArray) -> float:
     up, down = volts[force > 0.5], volts[force < -0.5]
     if not len(up) or not len(down):
         return 0.0

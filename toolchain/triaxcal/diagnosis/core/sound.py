@@ -59,16 +59,18 @@ class Scales:
 _CHOICES: dict[str, tuple[tuple[float, ...], float, float]] = {
     "noise": ((0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), 1.0, 0.5),
     "tilt": ((4e-6, 10e-6, 20e-6, 40e-6, 80e-6, 160e-6), 30e-6, 0.8),
-    "seat": ((15e-6, 40e-6, 80e-6, 160e-6, 320e-6), 100e-6, 0.7),
+    "seat": ((15e-6, 40e-6, 80e-6, 160e-6, 240e-6), 80e-6, 0.6),
     "curvature": ((0.1, 0.3, 1.0, 3.0, 10.0, 30.0), 1.5, 1.5),
-    "bend": ((0.0, 50e-6, 100e-6, 200e-6, 350e-6), 70e-6, 0.8),
+    "bend": ((0.0, 50e-6, 100e-6, 200e-6), 70e-6, 0.8),
 }
 """Values of each scale, and mean and standard deviation of its logarithm."""
 
 
 def _log_prior(scales: Scales) -> float:
     total = 0.0
-    for name, (_, middle, spread) in _CHOICES.items():
+    for name, (choices, middle, spread) in _CHOICES.items():
+        if not choices[0] <= getattr(scales, name) <= choices[-1]:
+            continue  # of a cause that is about this scale, and pays for it itself
         value = max(getattr(scales, name), 20e-6 if name == "bend" else 0.0)
         total -= 0.5 * (np.log(value / middle) / spread) ** 2
     return float(total)

@@ -1,0 +1,43 @@
+"""The outputs are those of a left-handed triad: two columns are exchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from triaxcal.diagnosis.causes.mounting import LOG_VOLUME, turned
+from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known
+from triaxcal.diagnosis.core.turns import nearest_rotation, sensitivity
+from triaxcal.model.positions import AXES
+
+
+def _hypotheses(known: Known) -> Iterator[Hypothesis]:
+    turn = nearest_rotation(sensitivity(known.readings))
+    if turn is None or np.linalg.det(turn) > 0.0:
+        return
+    largest = np.abs(turn).argmax(axis=1)
+    if (largest == np.arange(3)).all():
+        return  # an inverted output: polarity
+    names = ", ".join(
+        f"{AXES[i]} answers to {'-' if turn[i, largest[i]] < 0 else ''}{AXES[largest[i]]}"
+        for i in range(3)
+        if largest[i] != i
+    )
+    yield Hypothesis(
+        f"output {names}",
+        turned(turn),
+        change="with these columns exchanged",
+        log_prior=LOG_VOLUME / 2.0,
+    )
+
+
+ENTRY = Cause(
+    name="left_handed",
+    label="left-handed axes: outputs exchanged",
+    doc="Two outputs stand in each other's columns.",
+    hypotheses=_hypotheses,
+    apart="the wiring and the columns of the log",
+    discrete=True,
+    rank=36,
+)
