@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         simulate_series,
         study_drift,
     )
+    from triaxcal.api.table import TableGrid, study_angle_errors
     from triaxcal.api.unit import Unit, read_unit
     from triaxcal.api.verification import Verification, verify_unit
     from triaxcal.base.errors import RefusedError, UsageError
@@ -59,12 +60,12 @@ __version__ = "0.1.0"
 __all__ = [
     "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "FieldCheck",
     "FieldUpdate", "Firmware", "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState",
-    "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "SeriesResult", "Study", "Unit",
-    "UsageError", "Verdict", "Verification", "__version__", "calibrate_series", "compare_history",
-    "cross_coupling", "deliver", "diagnose", "find_poses", "firmware", "firmware_imu", "fit",
-    "fit_imu", "key_schema", "load", "load_imu", "plan_measurements", "plan_motion", "read_imu",
-    "read_unit", "simulate", "simulate_series", "study_drift", "update", "verify_unit",
-    "write_first_file",
+    "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "SeriesResult", "Study",
+    "TableGrid", "Unit", "UsageError", "Verdict", "Verification", "__version__", "calibrate_series",
+    "compare_history", "cross_coupling", "deliver", "diagnose", "find_poses", "firmware",
+    "firmware_imu", "fit", "fit_imu", "key_schema", "load", "load_imu", "plan_measurements",
+    "plan_motion", "read_imu", "read_unit", "simulate", "simulate_series", "study_angle_errors",
+    "study_drift", "update", "verify_unit", "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
@@ -83,6 +84,7 @@ _MODULES = {
         "MeasurementPlan", "Study", "compare_history", "find_poses",
         "plan_measurements", "plan_motion", "simulate", "simulate_series", "study_drift",
     ),
+    "triaxcal.api.table": ("TableGrid", "study_angle_errors"),
     "triaxcal.api.unit": ("Unit", "read_unit"),
     "triaxcal.api.verification": ("Verification", "verify_unit"),
     "triaxcal.base.errors": ("RefusedError", "UsageError"),

@@ -14,6 +14,7 @@ Everything is solved by QR of the design, which needs no (17) nor (20); those ar
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +76,36 @@ def inverse_linear(readings: FloatArray, force: FloatArray) -> OrientedFit:
     return OrientedFit(K, middle - K @ solution[0], None, scaled_condition(design))
 
 
+def inverse_two_stage(
+    readings: FloatArray, force: FloatArray, *, as_printed: bool = False
+) -> OrientedFit:
+    """P0 (25): the linear function first, then the products on what it leaves.
+
+    As printed the products are fitted to those residuals as they are. But what they have in common
+    with the linear functions is no longer in the residuals, so too little of Q is found. Freed of
+    that part first (Frisch and Waugh), the products give the Q of the solution at once, and the
+    linear part follows; each round as in `inverse_quadratic`.
+    """
+    if as_printed:
+        fit = inverse_linear(readings, force)
+        linear = fit.force_g(readings)
+        design = products(linear) @ TRACELESS.T
+        Q = _solve(design, force - linear).T @ TRACELESS
+        return OrientedFit(fit.K, fit.U0, Q, scaled_condition(design))
+    return _rounds(readings, force, _in_two_stages)
+
+
+def _in_two_stages(linear: FloatArray, bent: FloatArray, force: FloatArray) -> FloatArray:
+    basis = np.linalg.qr(linear)[0]
+    free = bent - basis @ (basis.T @ bent)
+    quadratic = _solve(free, force - basis @ (basis.T @ force))
+    return np.concatenate([_solve(linear, force - bent @ quadratic), quadratic])
+
+
+def _at_once(linear: FloatArray, bent: FloatArray, force: FloatArray) -> FloatArray:
+    return _solve(np.concatenate([linear, bent], axis=1), force)
+
+
 def inverse_quadratic(readings: FloatArray, force: FloatArray) -> OrientedFit:
     """P0 (13), (22) in products of the linear result: all nine unknowns an axis at once.
 
@@ -84,12 +115,19 @@ def inverse_quadratic(readings: FloatArray, force: FloatArray) -> OrientedFit:
     g = c0 + C l + Q p(l) is solved with l of (12); then C l + c0 is the next l, until it stays: the
     linear part of the answer is then l itself. Each round gains the size of Q.
     """
+    return _rounds(readings, force, _at_once)
+
+
+def _rounds(
+    readings: FloatArray,
+    force: FloatArray,
+    solve: Callable[[FloatArray, FloatArray, FloatArray], FloatArray],
+) -> OrientedFit:
     fit = inverse_linear(readings, force)
     K, U0, Q = fit.K, fit.U0, np.zeros((3, 6))
     for _ in range(_ROUNDS):
         linear = OrientedFit(K, U0, None, 1.0).force_g(readings)
-        design = np.concatenate([_with_one(linear), products(linear) @ TRACELESS.T], axis=1)
-        solution = _solve(design, force)
+        solution = solve(_with_one(linear), products(linear) @ TRACELESS.T, force)
         K = (K @ np.linalg.inv(solution[1:4].T)).astype(np.float64)
         U0 = U0 - K @ solution[0]
         Q = solution[4:].T @ TRACELESS
@@ -111,13 +149,18 @@ class SerialGrid:
     condition: float
 
     @staticmethod
-    def of(force: FloatArray, *, quadratic: bool = False) -> SerialGrid:
-        """Grid of forces (n, 3) in g."""
-        design = _with_one(force)
-        if quadratic:
-            design = np.concatenate([design, products(force) @ TRACELESS.T], axis=1)
-        Q, R = np.linalg.qr(design)
-        return SerialGrid(np.linalg.solve(R, Q.T).astype(np.float64), scaled_condition(design))
+    def of(force: FloatArray, *, quadratic: bool = False, centred: bool = False) -> SerialGrid:
+        """Grid of forces (n, 3) in g; `centred` solves (33) to (35), one order less, with (32)."""
+        bent = products(force) @ TRACELESS.T if quadratic else np.zeros((len(force), 0))
+        functions = np.concatenate([force, bent], axis=1)
+        condition = scaled_condition(_with_one(functions))
+        if not centred:
+            return SerialGrid(_inverse(_with_one(functions)), condition)
+        middle = functions.mean(axis=0)
+        part = _inverse(functions - middle)
+        mean = np.full((1, len(force)), 1.0 / len(force))
+        # (32): d0 = mean of the readings less the others at the middle of the functions.
+        return SerialGrid(np.concatenate([mean - middle @ part, part]), condition)
 
     def unknowns(self, readings: FloatArray) -> FloatArray:
         """Unknowns, shape (3, 4 or 9), of readings (n, 3) taken on the grid."""
@@ -160,6 +203,13 @@ def design_condition(force: FloatArray) -> float:
 
 def _with_one(values: FloatArray) -> FloatArray:
     return np.concatenate([np.ones((len(values), 1)), values], axis=1)
+
+
+def _inverse(design: FloatArray) -> FloatArray:
+    """(A^T A)^-1 A^T, by QR."""
+    Q, R = np.linalg.qr(design)
+    result: FloatArray = np.linalg.solve(R, Q.T).astype(np.float64)
+    return result
 
 
 def _solve(design: FloatArray, right: FloatArray) -> FloatArray:
