@@ -145,8 +145,8 @@ def picture(found: dict[str, FloatArray]) -> bytes:
     x = np.arange(1.0, 7.0)
     names = {"uncompensated": 0, "method 1": 1, "method 2": 3, "three": 2, "seven": 2}
     labels = {
-        "three": "this program, 3 temperatures",
-        "seven": "this program, 7 temperatures",
+        "three": "ours, 3 temperatures",
+        "seven": "ours, 7 temperatures",
         "method 1": "paper, method 1",
         "method 2": "paper, method 2",
     }

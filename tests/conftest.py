@@ -35,6 +35,7 @@ LONG = {
     "family/test_rate_term.py",
     "family/test_real_recordings.py",
     "family/test_saved.py",
+    "family/test_table_forms.py",
     "family/test_table_terms.py",
     "family/test_tables.py",
     "family/test_unchecked.py",
