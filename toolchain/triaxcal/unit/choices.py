@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from triaxcal.base.keys import TableKeys, setting
-from triaxcal.base.kinds import TEXT, checked, number, three, whole, word
+from triaxcal.base.kinds import TEXT, Kind, checked, number, three, whole, word
 from triaxcal.model.methods.registry import METHODS
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
@@ -34,6 +35,18 @@ class Fit:
     loss: str = setting(word(LOSSES), "linear")
 
 
+def _one_or_three() -> Kind[tuple[float, float, float]]:
+    """A sensitivity for all outputs, or one for each; none is zero."""
+    item = number(-1e3, 1e3)
+    each = three(item, "a number that is not zero, or a list of three", lambda v: v != 0.0)
+
+    def parse(value: Any) -> tuple[float, float, float]:
+        return each.parse(value if isinstance(value, list) else [value] * 3)
+
+    schema = {"anyOf": [dict(item.schema), dict(each.schema)]}
+    return Kind(each.expected, parse, schema, example="0.27")
+
+
 @dataclass(frozen=True)
 class Sensor:
     """[sensor]: the sensor itself.
@@ -42,6 +55,11 @@ class Sensor:
     ----------
     polarity
         Signs of Kxx, Kyy, Kzz, where they differ.
+    nominal_v_per_g
+        Sensitivity of the data sheet, signed: one number for all three outputs, or three. Readings
+        that differ are refused: wrong full scale, wrong gain, exchanged signs.
+    nominal_tolerance
+        How far a sensitivity may be from nominal_v_per_g, relative.
     """
 
     polarity: tuple[int, int, int] | None = setting(
@@ -52,6 +70,10 @@ class Sensor:
         None,
         words="all alike",
     )
+    nominal_v_per_g: tuple[float, float, float] | None = setting(
+        _one_or_three(), None, "V/g", words="not checked", example="0.27"
+    )
+    nominal_tolerance: float = setting(number(0.0, 1.0), 0.2)
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,13 @@ from triaxcal.unit.folder import (
     find_unit,
     refuse_duplicate_serial,
 )
+from triaxcal.unit.gravity import gravity_difference_m_per_s2, refuse_wrong_gravity
 from triaxcal.unit.limits import LIMITS, RECORDED_LIMITS, Limits
 from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.pair import QUADRATIC, PairSource, pair_source
 from triaxcal.unit.priors import AUTO, FIRMWARE, PRIORS, FirmwareChoice, Priors
 from triaxcal.unit.recording import RECORDING, RecordingLayout, recording_layout
-from triaxcal.unit.site import SITE, STANDARD_GRAVITY_M_PER_S2, Site
+from triaxcal.unit.site import SITE, STANDARD_GRAVITY_M_PER_S2, PlacedSite
 from triaxcal.unit.thermal import Temperatures, ThermalChoice, thermal_choice, thermal_table
 from triaxcal.unit.thermometer import TEMPERATURE_SENSOR, TemperatureSensor
 from triaxcal.unit.uncertainty import UNCERTAINTY, StatedUncertainty
@@ -74,7 +75,12 @@ class UnitDescription:
     range_degc : tuple of two floats, or None
         Working temperature range; None is the calibrated range.
     polarity : tuple of three signs, or None
-        Signs of Kxx, Kyy, Kzz; None means that all three are alike.
+        Signs of Kxx, Kyy, Kzz, those of `nominal_v_per_g` where it is stated; None means that all
+        three are alike.
+    nominal_v_per_g : tuple of three floats, or None
+        Sensitivities of the data sheet; a tilter's are within `nominal_tolerance` of them.
+    gravity_difference_m_per_s2 : float or None
+        Stated less normal gravity, where the place is stated.
     recording : RecordingLayout or None
         Where the readings are, when they are no measurements.csv of a tilter.
     terms, loss : str
@@ -115,6 +121,9 @@ class UnitDescription:
     pair: PairSource | None = None
     priors: Priors = field(default_factory=Priors)
     firmware_terms: str = AUTO
+    nominal_v_per_g: tuple[float, float, float] | None = None
+    nominal_tolerance: float = 0.2
+    gravity_difference_m_per_s2: float | None = None
     measured: Measured = field(default_factory=Measured)
     toml: str = field(default="", repr=False, compare=False)
     source: str = field(default=UNIT_FILE, compare=False)
@@ -159,7 +168,9 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
     temperatures = tables["thermal"].record(Temperatures)
     recording = recording_layout(tables["recording"]) if "recording" in tables else None
     _ = tables[""][DESCRIPTION]  # not used, but checked
-    adc, site = tables["adc"], tables["site"].record(Site)
+    adc, site = tables["adc"], tables["site"].record(PlacedSite)
+    refuse_wrong_gravity(site, tables["site"].file)
+    sensor = tables["sensor"].record(Sensor)
     return UnitDescription(
         name=name,
         serial=tables[""][SERIAL],
@@ -168,7 +179,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         gravity_g=site.local_gravity_m_per_s2 / STANDARD_GRAVITY_M_PER_S2,
         t0_degc=temperatures.t0_degc,
         range_degc=temperatures.range_degc,
-        polarity=tables["sensor"].record(Sensor).polarity,
+        polarity=_polarity(sensor, tables["sensor"]),
         estimator=fit.estimator,
         thermal=thermal_choice(tables["thermal"]),
         method=compensation.method,
@@ -184,5 +195,24 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         pair=pair_source(tables["quadratic"]),
         priors=tables["priors"].record(Priors),
         firmware_terms=tables["firmware"].record(FirmwareChoice).terms,
+        nominal_v_per_g=sensor.nominal_v_per_g,
+        nominal_tolerance=sensor.nominal_tolerance,
+        gravity_difference_m_per_s2=gravity_difference_m_per_s2(site),
         measured=tables["measured"].record(Measured),
     )
+
+
+def _polarity(sensor: Sensor, values: Values) -> tuple[int, int, int] | None:
+    """Signs of the sensitivities, from `polarity` or else from the nominal ones.
+
+    Raises
+    ------
+    RefusedError
+        Where both are stated and differ.
+    """
+    if sensor.nominal_v_per_g is None:
+        return sensor.polarity
+    x, y, z = (1 if v > 0.0 else -1 for v in sensor.nominal_v_per_g)
+    if sensor.polarity not in (None, (x, y, z)):
+        raise values.refuse("polarity", f"the signs of nominal_v_per_g, [{x}, {y}, {z}]")
+    return x, y, z

@@ -24,6 +24,26 @@ class Site:
 
 
 @dataclass(frozen=True)
+class PlacedSite(Site):
+    """[site]: where the unit is measured.
+
+    Attributes
+    ----------
+    latitude_deg
+        Of the place, north positive: checks local_gravity_m_per_s2.
+    height_m
+        Of the place above sea level, with latitude_deg.
+    """
+
+    latitude_deg: float | None = setting(
+        number(-90.0, 90.0), None, "deg", words="not checked", example="50.45"
+    )
+    height_m: float | None = setting(
+        number(-500.0, 9000.0), None, "m", words="any height", example="180"
+    )
+
+
+@dataclass(frozen=True)
 class _OnEarth:
     """Where the earth's rotation counts.
 
@@ -41,4 +61,4 @@ class TurningSite(Site, _OnEarth):
     """[site]: where the unit is turned."""
 
 
-SITE, TURNING_SITE = TableKeys.of(Site), TableKeys.of(TurningSite)
+SITE, TURNING_SITE = TableKeys.of(PlacedSite), TableKeys.of(TurningSite)

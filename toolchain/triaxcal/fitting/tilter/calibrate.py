@@ -45,6 +45,7 @@ from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions
 from triaxcal.fitting.tilter.resolution import code_notes
 from triaxcal.fitting.tilter.runs import repeatability, run_notes
 from triaxcal.fitting.tilter.selection import PREFERENCE, select
+from triaxcal.fitting.tilter.sensitivity import refuse_other_sensitivity
 from triaxcal.fitting.tilter.squares import (
     judged_by_checks,
     own_squares,
@@ -60,6 +61,7 @@ from triaxcal.model.thermal.shape import EDGE_DEGC, ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.gravity import gravity_notes
 
 _STEP_DEGC = 0.1
 """A working range taken from the calibrated temperatures is rounded outward to this."""
@@ -86,6 +88,7 @@ def calibrate(
     refuse_mistaken_units(measurements)
     refuse_exchanged_positions(measurements.source, groups, unit.polarity)
     _refuse_singular(measurements.source, groups, unit.gravity_g)
+    refuse_other_sensitivity(unit, measurements.source, groups)
     squares = own_squares(unit, groups)
     linear = _fit(unit, measurements, groups, pair, terms)
     if not squares.included:
@@ -128,6 +131,7 @@ def _fit(
         notes=(
             *contradiction(unit, groups),
             *run_notes(runs),
+            *gravity_notes(unit.gravity_difference_m_per_s2),
             *turned_notes(found.thermal.constants_at(unit.t0_degc)),
             *code_notes(unit, found, measurements),
             *of_pair,
