@@ -106,6 +106,24 @@ def test_the_verdict_and_the_poses_of_a_loaded_calibration_have_the_converters_s
     assert again.uncertainty(20.0).expanded == pytest.approx(cal.uncertainty(20.0).expanded)
 
 
+def test_uncertainty_does_not_depend_on_the_signs_of_columns(tmp_path: Path) -> None:
+    """The same poses with and without a minus: the same budgets of every component."""
+    rows = converter(log(directions(24), sd=0.005))
+    bare = np.column_stack([rows[:, 0], rows[:, 1], -rows[:, 2], -rows[:, 3]])
+    names = 'acceleration = ["ACC2", "ACC1", "ACC3"]\nacceleration_unit = "count"\ntime = "t"\n'
+    plain = triaxcal.fit(
+        triaxcal.read_unit(write_unit(tmp_path / "P" / "U", bare, names, header=HEADER))
+    )
+    turned = triaxcal.fit(triaxcal.read_unit(unit_of_poses(tmp_path / "T" / "U")))
+    np.testing.assert_allclose(
+        turned.constants(20.0)[0], plain.constants(20.0)[0] * SIGNS[:, None], rtol=1e-6, atol=1e-3
+    )
+    for quantity in ("a_x", "a_y", "a_z", "|a|"):
+        for direction in ((0.6, 0.0, 0.8), (0.5, -0.7, 0.5), (1.0, 1.0, 1.0)):
+            budgets = [c.uncertainty(20.0, direction, quantity) for c in (turned, plain)]
+            assert budgets[0].expanded == pytest.approx(budgets[1].expanded, rel=1e-6)
+
+
 def test_the_lowest_code_of_a_turned_column_fits_its_width(tmp_path: Path) -> None:
     """-32768 of a column with a minus is a reading of +32768, but 16 bits of the converter."""
     rows = converter(log(directions(24), sd=0.005))

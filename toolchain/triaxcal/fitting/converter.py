@@ -9,13 +9,15 @@ that codes as the converter gives them give the right answer.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.model.curves import ThermalModel
+from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
 from triaxcal.readings.measurements import Dwell, MeasurementSet
@@ -81,12 +83,31 @@ def _dwell(dwell: Dwell, signs: FloatArray) -> Dwell:
 
 
 def _recording(found: RecordingFit, signs: FloatArray, twelve: FloatArray) -> RecordingFit:
-    covariance = found.covariance * twelve[:, None, None, None] * twelve[:, None]
-    terms = found.terms
-    if terms.cross is not None:
-        terms = replace(terms, cross=terms.cross * twelve[:, None, None])
-    poses = _poses(found.poses, signs)
-    return replace(found, covariance=covariance, terms=terms, poses=poses)
+    turned: RecordingFit = _turned(replace(found, poses=_poses(found.poses, signs)), twelve)
+    return turned
+
+
+def _turned(value: Any, twelve: FloatArray) -> Any:
+    """Signs of the constants in whatever a fit holds of them, at any depth.
+
+    `covariance` (12, P, 12, P), `cross` (12, P, ...) and single constants by their `name`.
+    """
+    if isinstance(value, tuple):
+        return tuple(_turned(item, twelve) for item in value)
+    if not is_dataclass(value) or isinstance(value, PoseSet | type):
+        return value
+    changed = {}
+    for name in (field.name for field in fields(value)):
+        old = getattr(value, name)
+        if name == "covariance" and isinstance(old, np.ndarray) and old.ndim == 4:
+            changed[name] = old * twelve[:, None, None, None] * twelve[:, None]
+        elif name == "cross" and old is not None:
+            changed[name] = old * twelve[:, None, None]
+        elif name == "value" and (of := getattr(value, "name", "")) in CONSTANT_NAMES:
+            changed[name] = old * float(twelve[CONSTANT_NAMES.index(of)])
+        else:
+            changed[name] = _turned(old, twelve)
+    return replace(value, **changed)
 
 
 def _poses(found: PoseSet, signs: FloatArray) -> PoseSet:
