@@ -238,8 +238,15 @@ def test_poses_in_a_plane_are_called_so(tmp_path: Path, noise: float, normal: in
     poses = np.roll(flat, normal + 1, axis=0).T
     rows = np.column_stack([poses @ K.T + U0])
     recording = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "m/s^2"'
-    with pytest.raises(RefusedError, match="13 poses lie near one plane"):
-        calibrated(write_unit(tmp_path / "U", rows, recording, header="a,b,c"))
+    calibration = calibrated(write_unit(tmp_path / "U", rows, recording, header="a,b,c"))
+    axis = "xyz"[normal]
+    assert f"13 poses lie near one plane (within {0.0:.0f}" in calibration.findings[0]
+    assert f"do not determine U0{axis}: it is bounded by [priors]" in calibration.findings[0]
+    sd = np.sqrt(np.diag(calibration.constants_covariance(20.0)))[9:] / 9.80665
+    # The bias across the plane is bounded by its prior of 0.1 g; those in it are known.
+    assert 5.0 * np.delete(sd, normal).max() < sd[normal] < 0.101
+    error = calibration.thermal.constants_at(20.0)[9:] / 9.80665 - U0 / 9.80665
+    assert np.abs(error / sd).max() < 4.0
 
 
 # ---- pictures ----

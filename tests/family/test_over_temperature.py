@@ -46,7 +46,7 @@ def test_biases_of_second_order_are_found_and_end_in_c(tmp_path: Path) -> None:
     assert calibration.shape.order in (2, 3)
     scores = {c.label: c.held_out_g or 1.0 for c in calibration.candidates}
     assert min(scores.values()) < 0.25e-3
-    assert scores["linear, nine constants; order 1"] > 1e-3
+    assert scores["linear, with priors; order 1"] > 1e-3
     assert (calibration.range_degc, delivery.unit.t0_degc) == ((-20.0, 60.0), 20.0)
     temps = np.array([-15.0, 10.0, 35.0, 55.0])
     d = (temps - 20.0)[:, None]
@@ -161,9 +161,9 @@ def test_what_is_told_as_left_out_are_orientations_and_not_temperatures(tmp_path
     gains = (next(c.parameters for c in calibration.candidates if c.chosen) - 6) // 6
     own = slow_left_out(readings, temps, np.tile(np.arange(12), 5), gains)
     expected = float(np.sqrt(np.mean(own**2)))
-    # Both solve to rounding; nine digits are written, 1e-8 m/s^2 of 8 mg.
-    assert recording.left_out_length_g == pytest.approx(expected, rel=1e-6)
-    assert recording.held_out_g != pytest.approx(expected, rel=1e-3)
+    # Beside a misfit of 8 mg, cross terms of 10 mrad and thermal terms feel their priors.
+    assert recording.left_out_length_g == pytest.approx(expected, rel=0.08)
+    assert (recording.held_out_g or 0.0) > 1.01 * recording.left_out_length_g
 
 
 def test_the_order_of_averaged_rows_says_nothing(tmp_path: Path) -> None:

@@ -148,6 +148,8 @@ def verdict_words(calibration: Calibration, *, checked: bool, shown: bool) -> st
 
 def not_tested(calibration: Calibration) -> str:
     """What no reading outside the fit has tested, in words; empty where something has."""
+    if calibration.recording is not None and not calibration.recording.tested:
+        return "not tested: nothing was held out"
     test = calibration.held_out
     if test is None or test.between:
         return ""

@@ -152,7 +152,8 @@ def _beyond_the_tilter(calibration: Calibration) -> dict[str, Any]:
             "rms_per_degree_of_freedom_g": recording.rms_free_g if recording.checked else None,
             "held_out_g": recording.held_out_g,
             "left_out_length_g": recording.left_out_length_g,
-            "condition_number": recording.condition,
+            "condition_number": plain(recording.condition),
+            "constants": plain(recording.shares),
             "findings": list(recording.findings),
         }
     return found

@@ -12,6 +12,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.converter import as_converted, signs_of
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.fitting.pair.cross_coupling import stated_pair
 from triaxcal.fitting.recorded.calibrate import calibrate_poses
 from triaxcal.fitting.recorded.faces import face_measurements
@@ -100,7 +101,7 @@ def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Sample
 
 
 def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) -> None:
-    """P1 (13) at the poses; the compiled C is checked again afterwards."""
+    """P1 (13) at the poses and at held-out poses; the compiled C is checked again afterwards."""
     recording = calibration.recording
     if recording is None:
         return
@@ -110,6 +111,7 @@ def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) 
     limits = np.array([unit.limits.at(t, unit.t0_degc)[0] for t in temps])
     worst = int((np.abs(errors) / limits).argmax())
     if abs(errors[worst]) <= limits[worst]:
+        _refuse_held_out(unit, recording, float(limits.max()))
         return
     pose = poses[worst]
     key = unit.limits.at(temps[worst], unit.t0_degc)[1]
@@ -120,4 +122,20 @@ def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) 
         expected=f"at most {limits[worst] * 1e3:g} mg ({key})",
         remedy="check that pose with `triaxcal poses`; if it is good, state the limit that "
         "this sensor keeps",
+    )
+
+
+def _refuse_held_out(unit: UnitDescription, recording: RecordingFit, limit_g: float) -> None:
+    """Refuse an error at unseen poses that is beyond the limit, whatever the residual is."""
+    error_g = recording.left_out_length_g
+    if error_g is None or error_g <= limit_g:
+        return
+    key = "limits.at_t0_g" if limit_g == unit.limits.at_t0_g else "limits.over_range_g"
+    raise RefusedError(
+        recording.poses.source,
+        f"| |a| - g | = {error_g * 1e3:.4g} mg rms at held-out poses; the fit's residual is "
+        f"{recording.rms_g * 1e3:.3g} mg rms",
+        expected=f"at most {limit_g * 1e3:g} mg ({key})",
+        remedy="record more poses, in different orientations; `triaxcal poses` shows those that "
+        "there are",
     )

@@ -44,13 +44,13 @@ def certificate_xml(p: Passport, details: CertificateDetails) -> bytes:
     Raises
     ------
     RefusedError
-        When there are as many constants as poses, so that nothing checks them.
+        When nothing that the fit did not use has tested the constants.
     """
-    if not p.checked:
+    if not p.tested:
         raise RefusedError(
             f"{p.delivery.unit.source}, [certificate]",
-            "the constants are not checked: there are as many constants as poses",
-            expected="more poses than constants",
+            "the constants are not tested: no pose could be held out",
+            expected="poses that the others determine",
             remedy="record more poses, or remove the table",
         )
     for prefix, uri in (("dcc", DCC), ("si", SI), ("xsi", XSI)):

@@ -13,9 +13,12 @@ from triaxcal.model.positions import AXES
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.words.measured import measured_words
 from triaxcal.report.words.numbers import thousands
+from triaxcal.report.words.shares import share_rows
 from triaxcal.report.words.temperatures import by_temperature, degrees
 
 _LABEL = 16
+CONDITION_SHOWN = 1e6
+"""A condition number from here on says that a constant is not seen at all."""
 
 
 def summary(made: Passport, files: Iterable[str], where: str) -> str:
@@ -24,6 +27,7 @@ def summary(made: Passport, files: Iterable[str], where: str) -> str:
     blocks = [
         _head(delivery),
         _constants(delivery.calibration),
+        *_shares(delivery.calibration),
         _candidates(delivery.calibration),
         _residuals(delivery),
         _uncertainty(made),
@@ -71,15 +75,19 @@ def _findings(calibration: Calibration) -> list[str]:
         return found
     worth = f"condition number {recording.condition:.3g} (1 is the best)"
     worth += f"; the poses determine {recording.weakest} least" if recording.weakest else ""
+    if not recording.condition < CONDITION_SHOWN:
+        worth = f"the poses alone do not determine {recording.weakest}: [priors] bounds the rest"
     return [_held_out(recording), _entry("observability", worth), *found]
 
 
 def _held_out(recording: RecordingFit) -> str:
     """The held-out error of a recording: |a| at poses outside the fit."""
     if recording.left_out_length_g is None:
-        return _entry("held out", "none: the fit needs every pose, so none is left to check it")
-    rms = recording.left_out_length_g * 1e3
-    return _entry("held out", f"|a| - g: {rms:.4f} mg rms at held-out poses")
+        words = "none: no pose is determined by the others; the constants are not tested"
+        return _entry("held out", words)
+    rms, poses = recording.left_out_length_g * 1e3, len(recording.poses.poses)
+    of = f", {recording.held_out_poses} of {poses}" if 0 < recording.held_out_poses < poses else ""
+    return _entry("held out", f"|a| - g: {rms:.4f} mg rms at held-out poses{of}")
 
 
 def _method_words(delivery: Delivery) -> str:
@@ -110,6 +118,16 @@ def _constants(calibration: Calibration) -> str:
     return "\n".join(table(head, rows))
 
 
+def _shares(calibration: Calibration) -> list[str]:
+    """How much the poses, and how much the prior, determine each constant of a recording."""
+    rows = share_rows(calibration)
+    if not rows:
+        return []
+    cells = [[f"  {r.name}", r.value, r.sd, r.prior_sd, r.data, r.prior] for r in rows]
+    head = ["determined by", "value", "sd", "prior's sd", "poses", "prior"]
+    return ["\n".join(table(head, cells))]
+
+
 def _candidates(calibration: Calibration) -> str:
     poses = calibration.recording is not None  # of which there is one estimator
     rows = [
@@ -119,13 +137,17 @@ def _candidates(calibration: Calibration) -> str:
             str(c.parameters),
             _micro_g(c.fit_residual_g),
             "-" if c.held_out_g is None else _micro_g(c.held_out_g),
-            *([] if c.condition is None else [f"{c.condition:.3g}"]),
+            *([] if not poses else [_condition(c.condition)]),
         ]
         for c in calibration.candidates
     ]
     head = ["candidates, rms micro-g", *([] if poses else ["bias estimator"])]
     head += ["terms", "fitted", "held out", *(["condition"] if poses else [])]
     return "\n".join(table(head, rows))
+
+
+def _condition(value: float | None) -> str:
+    return "-" if value is None or not value < CONDITION_SHOWN else f"{value:.3g}"
 
 
 def _micro_g(value_g: float) -> str:

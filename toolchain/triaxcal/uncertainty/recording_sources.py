@@ -6,17 +6,50 @@ import math
 
 import numpy as np
 
-from triaxcal.fitting.core.recorded import RecordingFit
+from triaxcal.fitting.core.recorded import (
+    LEFT_OUT_PART,
+    NOISE_PART,
+    PRIOR_PART,
+    CovariancePart,
+    RecordingFit,
+)
+from triaxcal.model.types import FloatArray
+from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance
 from triaxcal.uncertainty.propagation import ROWS, Curves, mapped
 from triaxcal.uncertainty.rig_sources import gravity, thermometer
-from triaxcal.uncertainty.source import STUDENT, Source, direct
+from triaxcal.uncertainty.source import NORMAL, STUDENT, Source, direct
 from triaxcal.uncertainty.terms_sources import rate_source, with_quadratic
+
+_NORMAL_95 = 1.959963984540054
+
+
+_ORIGINS = {
+    NOISE_PART: (
+        "poses",
+        "the scatter of the poses",
+        "|a| - g at the poses and what is known of their noise beforehand",
+        "record more poses, in different orientations",
+    ),
+    PRIOR_PART: (
+        "priors",
+        "what the poses leave open",
+        "[priors]: the constants as far as the poses do not determine them",
+        "record more poses, in different orientations, or learn [priors] (batch --learn-priors)",
+    ),
+    LEFT_OUT_PART: (
+        "left_out_terms",
+        "terms that the firmware leaves out",
+        "difference of the constants in the C from those of the fit with all terms",
+        'state [firmware] terms = "quadratic"',
+    ),
+}
+"""Key, name, origin and advice of each part."""
 
 
 def recording_sources(p: Curves, recording: RecordingFit) -> list[Source]:
     """All sources but the device's own."""
     return [
-        _poses(p, recording),
+        *_fit(p, recording),
         *rate_source(p, recording),
         _gravity(p),
         *thermometer(p),
@@ -25,32 +58,60 @@ def recording_sources(p: Curves, recording: RecordingFit) -> list[Source]:
     ]
 
 
-def _poses(p: Curves, recording: RecordingFit) -> Source:
-    """Scatter of the poses: the covariance of the fit."""
+def _fit(p: Curves, recording: RecordingFit) -> list[Source]:
+    """The covariance of the fit, part by part where it has priors."""
+    if recording.parts:
+        return [_part(p, recording, part) for part in recording.parts]
+    key, name, _, advice = _ORIGINS[NOISE_PART]
     if not recording.checked:
-        return Source(
-            key="poses",
-            name="the scatter of the poses",
+        origin = "unknown: as many constants as poses"
+        return [Source(key=key, name=name, unit="g", advice=advice, origin=origin)]
+    constants, force = _effects(p, CovariancePart(key, recording.covariance, recording.terms))
+    return [
+        Source(
+            key=key,
+            name=name,
             unit="g",
-            advice="record more poses, in other orientations",
-            origin="unknown: as many constants as poses",
+            advice=advice,
+            origin="|a| - g at the poses, per degree of freedom",
+            sd=recording.rms_free_g,
+            distribution=STUDENT,
+            dof=float(recording.dof),
+            constants=constants,
+            force=force,
         )
-    covariance = p.calibration.constants_covariance(p.temps_degc)
-    order = np.empty(12, dtype=np.int64)
-    order[list(ROWS)] = np.arange(12)
-    constants = covariance[:, order][:, :, order]
+    ]
+
+
+def _part(p: Curves, recording: RecordingFit, part: CovariancePart) -> Source:
+    key, name, origin, advice = _ORIGINS[part.key]
+    constants, force = _effects(p, part)
+    effect = float(force_variance(force, DIRECTIONS)[..., :3].max())
+    sd, distribution = math.sqrt(max(effect, 0.0)), NORMAL
+    if part.key == NOISE_PART:
+        # 1.96 of it is half the 95 % interval of a noise that is itself uncertain: as a Student's
+        # part of few degrees of freedom, beside others, Welch and Satterthwaite make it too small.
+        sd, distribution = recording.noise_95_g / _NORMAL_95, f"{STUDENT}, 95 % interval"
     return Source(
-        key="poses",
-        name="the scatter of the poses",
-        sd=recording.rms_free_g,
+        key=key,
+        name=name,
         unit="g",
-        distribution=STUDENT,
-        dof=float(recording.dof),
-        origin="|a| - g at the poses, per degree of freedom",
-        advice="record more poses, in different orientations",
+        advice=advice,
+        origin=origin,
+        sd=sd,
+        distribution=distribution,
         constants=constants,
-        force=with_quadratic(p, recording, mapped(-p.inverse, constants)),
+        force=force,
     )
+
+
+def _effects(p: Curves, part: CovariancePart) -> tuple[FloatArray, FloatArray]:
+    """Covariances of [K U0] and of D."""
+    basis = p.calibration.shape.basis(p.temps_degc)
+    covariance = np.einsum("np,apbq,nq->nab", basis, part.covariance, basis, optimize=True)
+    order = np.argsort(ROWS)
+    constants = covariance[:, order][:, :, order]
+    return constants, with_quadratic(p, part.terms, mapped(-p.inverse, constants))
 
 
 def _gravity(p: Curves) -> Source:
@@ -71,7 +132,8 @@ def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
             advice="record more poses",
             origin="unknown: no pose can be held out",
         )
-    sd = math.sqrt(max(held_out**2 - recording.rms_free_g**2, 0.0))
+    expected = recording.rms_free_g if recording.expected_g is None else recording.expected_g
+    sd = math.sqrt(max(held_out**2 - expected**2, 0.0))
     return Source(
         key="model",
         name="the model",
@@ -79,7 +141,7 @@ def _unmodelled(p: Curves, recording: RecordingFit) -> Source:
         unit="g",
         distribution=STUDENT,
         dof=float(len(recording.residual_g)),
-        origin="held-out |a| - g beyond the scatter of the poses",
+        origin="held-out |a| - g beyond what the fit expects of it",
         advice="record more poses, in different orientations",
         force=direct(p, np.broadcast_to(np.eye(3) * sd, (len(p.temps_degc), 3, 3))),
     )

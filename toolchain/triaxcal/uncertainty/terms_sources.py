@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from triaxcal.fitting.core.recorded import RecordingFit
+from triaxcal.fitting.core.recorded import RecordingFit, TermsCovariance
 from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.propagation import ROWS, Curves, Propagation, square
 from triaxcal.uncertainty.source import STUDENT, Source, direct
@@ -88,9 +88,9 @@ def rate_source(p: Curves, recording: RecordingFit) -> list[Source]:
     ]
 
 
-def with_quadratic(p: Curves, recording: RecordingFit, force: FloatArray) -> FloatArray:
+def with_quadratic(p: Curves, terms: TermsCovariance, force: FloatArray) -> FloatArray:
     """Covariance of D, (n, 12, 12), with Q of the same fit: (n, 30, 30) if there is one."""
-    own, cross = recording.terms.quadratic, recording.terms.cross
+    own, cross = terms.quadratic, terms.cross
     if own is None or cross is None:
         return force
     basis = p.calibration.shape.basis(p.temps_degc)

@@ -97,6 +97,11 @@ class Posterior:
     weight: FloatArray
     at: Linearised
 
+    @property
+    def half_width(self) -> float:
+        """Half the 95 % interval of the noise of a value of weight 1."""
+        return NORMAL_95 * self.reach * self.scale
+
     @cached_property
     def _directions(self) -> FloatArray:
         result: FloatArray = self.prior.factor @ self.at.vectors
@@ -147,6 +152,7 @@ def fit_map(
     weight: FloatArray,
     noise: NoisePrior = NOISE,
     *,
+    values: float | None = None,
     start: FloatArray | None = None,
     scale: float | None = None,
     loss: str = "linear",
@@ -156,7 +162,10 @@ def fit_map(
     Parameters
     ----------
     weight : array, shape (n,)
-        Square roots of the weights; the sum of their squares is the number of values.
+        Square roots of the weights.
+    values : float or None
+        How many values there are; None for the sum of the squares of `weight`, which counts as one
+        what is weighted as one.
     start : array, shape (k,), or None
         z to start from, (theta - m) = L z.
     scale : float or None
@@ -164,23 +173,23 @@ def fit_map(
     loss : str
         One of `unit.choices.LOSSES`; the robust ones turn at three robust deviations.
     """
-    L = prior.factor
+    L, count = prior.factor, float((weight**2).sum()) if values is None else values
     z = np.zeros(L.shape[1]) if start is None else start
     s = noise.median if scale is None else scale
     residual, slopes = model(prior.mean + L @ z)
     for step_number in range(_STEPS_MAX):
         w = weight * _robust(residual * weight, loss) if step_number > 1 else weight
         B, y = w[:, None] * (slopes @ L), w * residual
-        at = Linearised.about(B, y - B @ z, float((w**2).sum()))
+        at = Linearised.about(B, y - B @ z, count)
         if scale is None:
             s = math.exp(noise_of(at, noise).mean)
         step = at.best(s) - z
         z, residual, slopes = _line_search(model, prior, w / s, (z, step), residual)
-        if np.abs(step).max(initial=0.0) < _SETTLED and step_number > 1:
+        if np.abs(step).max(initial=0.0) < _SETTLED and (loss == "linear" or step_number > 1):
             break
     w = weight * _robust(residual * weight, loss)
     B = w[:, None] * (slopes @ L)
-    at = Linearised.about(B, w * residual - B @ z, float((w**2).sum()))
+    at = Linearised.about(B, w * residual - B @ z, count)
     known = noise_of(at, noise)
     found, reach, dof = math.exp(known.mean), known.half_width() / NORMAL_95, known.dof
     if scale is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from triaxcal.model.types import FloatArray
@@ -52,6 +53,49 @@ class TermsCovariance:
 NO_TERMS_COVARIANCE = TermsCovariance()
 
 
+NOISE_PART, PRIOR_PART, LEFT_OUT_PART = "noise", "priors", "left out"
+
+
+@dataclass(frozen=True)
+class CovariancePart:
+    """A part of the covariance about the delivered constants, of errors independent of the others.
+
+    Attributes
+    ----------
+    key : str
+        `NOISE_PART`: the scatter of the poses; `PRIOR_PART`: what is left of the priors;
+        `LEFT_OUT_PART`: terms that the C does not compute.
+    covariance : array, shape (12, P, 12, P)
+    terms : TermsCovariance
+    """
+
+    key: str
+    covariance: FloatArray
+    terms: TermsCovariance
+
+
+@dataclass(frozen=True)
+class ConstantShare:
+    """One constant at T0, and how much the poses and how much the prior determine it.
+
+    Attributes
+    ----------
+    name, unit : str
+    value, sd : float
+        Of the fit that knows all terms, in the sensor's frame.
+    prior_sd : float
+    data : float
+        Share of the poses, 0 to 1: 1 - variance / variance of the prior.
+    """
+
+    name: str
+    unit: str
+    value: float
+    sd: float
+    prior_sd: float
+    data: float
+
+
 @dataclass(frozen=True)
 class RecordingFit:
     """The poses behind a calibration, and how well they determine it.
@@ -64,8 +108,9 @@ class RecordingFit:
     covariance : array, shape (12, P, 12, P)
         Of the constants' parameters, in the order of `CONSTANT_NAMES`.
         NaN without any degree of freedom.
-    dof : int
-        Degrees of freedom of the residuals; 0 where there are as many constants as poses.
+    dof : float
+        Degrees of freedom with which the noise is known; 0 in a file of an earlier version where
+        there are as many constants as poses.
     rms_g, rms_free_g : float
         Rms of |a| - g (of its components, where angles are known) at the fitted poses, and the
         same per degree of freedom; the latter NaN without any.
@@ -83,12 +128,22 @@ class RecordingFit:
     findings : tuple of str
         What the user should know, the worst first.
     terms : TermsCovariance
+    parts : tuple of CovariancePart
+        Their sum is `covariance` and `terms`; empty where the fit has no priors.
+    noise_95_g : float
+        Half the 95 % interval of the noise of a pose; 1.96 of its standard deviation and more, as
+        far as that is unknown. NaN without priors.
+    expected_g : float or None
+        Rms error that the fit expects of what is held out, its noise included.
+    held_out_poses : int
+        Of how many poses `left_out_length_g` is.
+    shares : tuple of ConstantShare
     """
 
     poses: PoseSet
     route: str
     covariance: FloatArray
-    dof: int
+    dof: float
     rms_g: float
     rms_free_g: float
     held_out_g: float | None
@@ -98,8 +153,18 @@ class RecordingFit:
     residual_g: FloatArray
     findings: tuple[str, ...]
     terms: TermsCovariance = NO_TERMS_COVARIANCE
+    parts: tuple[CovariancePart, ...] = ()
+    noise_95_g: float = math.nan
+    expected_g: float | None = None
+    held_out_poses: int = 0
+    shares: tuple[ConstantShare, ...] = ()
 
     @property
     def checked(self) -> bool:
-        """Whether anything but the fitted constants themselves checks them."""
-        return self.dof > 0
+        """Whether the uncertainty of the constants is known."""
+        return bool(self.parts) or self.dof > 0
+
+    @property
+    def tested(self) -> bool:
+        """Whether poses that the fit did not use have tested it."""
+        return self.left_out_length_g is not None

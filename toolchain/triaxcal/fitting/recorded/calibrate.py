@@ -3,42 +3,54 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.outliers import left_out_residuals, worst_outlier
 from triaxcal.fitting.recorded.checks import (
     crowd_finding,
-    refuse_few,
+    open_finding,
     refuse_left_handed,
-    refuse_plane,
-    refuse_unseen,
+    refuse_no_numbers,
     refuse_wrong_unit,
 )
 from triaxcal.fitting.recorded.made import Made
-from triaxcal.fitting.recorded.magnitude import fit_scalar
+from triaxcal.fitting.recorded.magnitude import fit_with_prior
+from triaxcal.fitting.recorded.prior import LINEAR, Known, reading_of_zero
 from triaxcal.fitting.recorded.rate import half_cycle_turns, pose_rates
-from triaxcal.fitting.recorded.scalar import MODELS, NINE, ScalarData, ScalarModel, scalar_data
+from triaxcal.fitting.recorded.scalar import (
+    MODELS,
+    ScalarData,
+    ScalarModel,
+    scalar_data,
+    unscaled_data,
+)
 from triaxcal.fitting.recorded.temperatures import (
     gain_functions,
     temperature_findings,
     temperature_groups,
     thermal_shapes,
 )
+from triaxcal.fitting.recorded.terms import choose_terms, models_of
 from triaxcal.fitting.recorded.trials import (
     TURNS_MAX,
     Judged,
     PoseClimate,
     Trial,
+    Turn,
     choose,
-    folds,
+    expected_errors,
     judge,
-    reason,
-    unscored,
+    orientation_turns,
+    temperature_turns,
     without_idle_rates,
+    worth_judging,
 )
+from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet, find_poses, orientation_groups
 from triaxcal.readings.measurements import Dwell, MeasurementSet
@@ -49,90 +61,147 @@ from triaxcal.unit.recording import RecordingLayout
 BEYOND_1_G = "quadratic terms are measured at 1 g; above it they grow with the square, unchecked"
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """Scaled poses, their temperatures, what is known beforehand, and what has been found.
+
+    `one_way` says that all poses point alike.
+    """
+
+    data: ScalarData
+    temps: FloatArray
+    known: Known
+    orientations: list[list[int]]
+    temperatures: list[list[int]]
+    findings: list[str]
+    one_way: bool
+
+
+@dataclass(frozen=True)
+class Turns:
+    """What is held out in turn, the poses alone that the others determine.
+
+    Attributes
+    ----------
+    orientations, temperatures, halves : list of Turn
+    words : str
+    """
+
+    orientations: list[Turn]
+    temperatures: list[Turn]
+    halves: list[Turn]
+    words: str
+
+    @property
+    def all(self) -> list[Turn]:
+        """In the order of the scores."""
+        return self.orientations + self.temperatures + self.halves
+
+    @staticmethod
+    def values(turns: list[Turn]) -> int:
+        """How many values turns judge."""
+        return sum(int(judged.sum()) for _, judged in turns)
+
+
 def calibrate_poses(
-    unit: UnitDescription, layout: RecordingLayout, samples: Samples, known: FloatArray
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples, quadratic: FloatArray
 ) -> tuple[MeasurementSet, Calibration]:
-    """Calibrate from poses of which only |a| = g is known; `known` is a part of Q, (3, 6).
+    """Calibrate from poses of which only |a| = g is known; `quadratic` is known of Q, (3, 6).
 
     Raises
     ------
     RefusedError
-        When the poses are too few, alike, in one plane, in another unit or left-handed, or do not
+        When there is no pose, readings are in another unit or left-handed, or the poses do not
         carry what unit.toml asks for.
     """
     poses = find_poses(samples, layout)
-    data, temps, findings = _prepared(unit, layout, samples, poses)
-    orientations, temperatures = _groups(data, temps)
-    halves = half_cycle_turns(temps)
+    found = _prepared(unit, layout, samples, poses)
+    halves = half_cycle_turns(found.temps)
     rates = pose_rates(samples, poses, layout) if halves else None
-    if rates is None:
-        halves = []  # they judge a term in dT/dt; without a clock the order has no meaning
-    climate = PoseClimate(temps, rates, unit.loss)
-    left_out = folds(orientations, temperatures, len(temps)) + halves
-    trials = [
-        replace(trial, model=replace(trial.model, known=known))
-        for trial in _trials(unit, climate, temperatures)
+    climate = PoseClimate(found.temps, rates, unit.loss)
+    shapes = thermal_shapes(unit, found.temps, found.temperatures)
+    base = Trial(_with(quadratic, LINEAR), shapes[0], 1, known=found.known)
+    turns = _turns(unit, found, climate, base, halves if rates is not None else [])
+    thermal = _thermal_rows(found, climate, shapes, base, turns)
+    best = choose(without_idle_rates(thermal, Turns.values(turns.halves)))
+    rows = [best] + [
+        judge(replace(best.trial, model=_with(quadratic, model)), found.data, climate, turns.all)
+        for model in models_of(unit)[1:]
     ]
-    rows = [judge(trial, data, climate, left_out) for trial in trials]
-    turns = _turns(orientations, temperatures, len(halves))
-    if unscored(rows):
-        # Single poses, not half-cycles, are held out here: nothing could judge a term in dT/dt.
-        halves, trials = [], [trial for trial in trials if not trial.rate]
-        left_out = folds([[k] for k in range(len(temps))], temperatures, len(temps))
-        rows = [judge(trial, data, climate, left_out) for trial in trials]
-        turns = f"{len(temps)} single poses, those of equal orientation kept,"
-    if not any(row.able for row in rows):
-        largest = max(rows, key=lambda row: -row.trial.parameters)
-        refuse_unseen(poses, largest.fit.condition, largest.fit.unseen())
-        refuse_few(poses, len(orientations), rows[0].trial.parameters + 1)
-    values = sum(int(judged.sum()) for _, judged in left_out)
-    able = without_idle_rates(rows, sum(int(judged.sum()) for _, judged in halves))
-    best = choose(able)
-    why = reason(able, best, turns, values)
-    findings += _outlier(_widest_linear(rows, best), poses, unit.loss) + (
-        [BEYOND_1_G] if len(best.fit.model.quadratic) else []
-    )
+    delivered = choose_terms(unit, rows)
+    plain = _plain_rows(unit, found, climate, replace(base, known=None), turns)
+    why = _reason(thermal, delivered.own, turns, delivered.reason)
+    findings = found.findings + _outlier(best, poses, unit.loss)
+    findings += [BEYOND_1_G] if len(delivered.own.fit.model.quadratic) else []
     shown = climate.rates if best.trial.rate else None
-    measurements = MeasurementSet(poses.source, pose_dwells(poses, temps, shown))
-    made = Made(unit, layout, poses, climate, rows, best, why, findings)
+    measurements = MeasurementSet(poses.source, pose_dwells(poses, found.temps, shown))
+    others = [row for row in thermal if row is not best]
+    made = Made(
+        unit,
+        layout,
+        poses,
+        climate,
+        [*rows, *others, *plain],
+        delivered,
+        best,
+        Turns.values(turns.orientations),
+        why,
+        findings,
+    )
     return measurements, made.calibration()
 
 
 def _prepared(
     unit: UnitDescription, layout: RecordingLayout, samples: Samples, poses: PoseSet
-) -> tuple[ScalarData, FloatArray, list[str]]:
-    """Scaled poses with weights, their temperatures, and what has been found so far."""
+) -> Prepared:
     findings = [*poses.findings]
+    refuse_no_numbers(poses)
     refuse_wrong_unit(poses.source, poses.readings, layout)
     recorded = poses.temps_degc
     temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
-    refuse_few(poses, len(poses.poses), MODELS[0].parameters)
     ones = np.ones(len(temps))
     rough = scalar_data(poses.readings, ones[:, None], ones, unit.gravity_g)
+    left_open, spans = open_finding(poses, rough.radius, unit.priors)
+    if left_open:
+        findings.append(left_open)
+        rough = unscaled_data(poses.readings, ones[:, None], ones, unit.gravity_g)
     axes = refuse_left_handed(samples, layout, rough.centre)
-    orientations, _ = _groups(rough, temps)
-    refuse_few(poses, len(orientations), MODELS[0].parameters)
-    refuse_plane(poses, rough.radius)
+    orientations, temperatures = orientation_groups(_directions(rough)), temperature_groups(temps)
     crowd = crowd_finding(orientations, poses)
     if crowd:
         findings.append(crowd)
     findings += temperature_findings(unit, recorded)
     findings.append(axes)
-    weight = np.ones(len(temps))
+    count = ones.copy()
     for group in _cells(orientations, temps):
-        weight[group] = 1.0 / math.sqrt(len(group))
-    data = scalar_data(poses.readings, ones[:, None], weight, unit.gravity_g)
-    return data, temps, findings
+        count[group] = 1.0 / len(group)
+    zero = reading_of_zero(unit.priors, rough, all_round=not left_open)
+    known = Known(unit.priors, layout.reading_of_1_g, zero)
+    data = replace(rough, weight=np.sqrt(count * _own_weights(poses, known)), count=count)
+    return Prepared(data, temps, known, orientations, temperatures, findings, spans < 2)
+
+
+def _own_weights(poses: PoseSet, known: Known) -> FloatArray:
+    """Weights of the poses by their own scatter, beside the noise that all have, at most 1."""
+    sd = poses.length_sd
+    if sd is None:
+        return np.ones(len(poses.poses))
+    variance = known.noise.median**2 + np.minimum(sd / poses.reading_of_1_g, 1.0) ** 2
+    if not np.isfinite(variance).all():
+        k = int(np.flatnonzero(~np.isfinite(variance))[0])
+        raise RefusedError(
+            f"{poses.source}, line {poses.poses[k].line}",
+            f"the scatter of pose {poses.poses[k].number}, its weight, is no number",
+            expected="a finite scatter",
+            remedy="remove that pose",
+        )
+    result: FloatArray = variance.min() / variance
+    return result
 
 
 def _directions(data: ScalarData) -> FloatArray:
     unit: FloatArray = data.reading / np.linalg.norm(data.reading, axis=1, keepdims=True)
     return unit
-
-
-def _groups(data: ScalarData, temps: FloatArray) -> tuple[list[list[int]], list[list[int]]]:
-    """Poses by orientation, and by temperature (rising)."""
-    return orientation_groups(_directions(data)), temperature_groups(temps)
 
 
 def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
@@ -144,64 +213,108 @@ def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
     ]
 
 
-def _trials(
-    unit: UnitDescription, climate: PoseClimate, temperatures: list[list[int]]
-) -> list[Trial]:
-    """Every model at one temperature, and the nine constants with each thermal order.
+def _with(quadratic: FloatArray, model: ScalarModel) -> ScalarModel:
+    """A model with a part of Q that is known beforehand."""
+    return replace(model, known=quadratic)
 
-    With a term in dT/dt besides, where there are half-cycles to judge it on.
+
+def _turns(
+    unit: UnitDescription, found: Prepared, climate: PoseClimate, base: Trial, halves: list[Turn]
+) -> Turns:
+    """What is held out: orientations, or single poses where those determine nothing of each other.
+
+    Single poses judge no half-cycle: nothing could judge a term in dT/dt.
     """
+    count = len(found.temps)
+    limit_g = np.array([unit.limits.at(t, unit.t0_degc)[0] for t in found.temps])
+
+    def judged(turns: list[Turn]) -> list[Turn]:
+        return worth_judging(turns, expected_errors(base, found.data, climate, turns), limit_g)
+
+    inner = judged(temperature_turns(found.temperatures, count))
+    if found.one_way:  # nothing of another orientation is tested
+        return Turns([], [], [], "no orientation")
+    kept = judged(orientation_turns(found.orientations, count))
+    if kept:
+        groups = f" in {TURNS_MAX} groups" if len(found.orientations) > TURNS_MAX else ""
+        words = f"{len(found.orientations)} orientations{groups}"
+        if len(kept) < min(len(found.orientations), TURNS_MAX):
+            words = f"{len(kept)} of {words}, those that the others determine"
+        halves = judged(halves)
+        words += f" and {len(inner)} temperatures" if inner else ""
+        words += f" and {len(halves)} half-cycles" if halves else ""
+        return Turns(kept, inner, halves, words)
+    single = judged(orientation_turns([[k] for k in range(count)], count)) if count > 1 else []
+    words = f"{Turns.values(single)} single poses, those of equal orientation kept,"
+    return Turns(single, inner if single else [], [], words)
+
+
+def _thermal_rows(
+    found: Prepared,
+    climate: PoseClimate,
+    shapes: Sequence[ThermalShape],
+    base: Trial,
+    turns: Turns,
+) -> list[Judged]:
+    """The linear constants with priors by each thermal function, with and without dT/dt."""
     trials = []
-    temps = climate.temps_degc
-    for shape in thermal_shapes(unit, temps, temperatures):
-        if shape.parameters == 1:
-            trials += [Trial(model, shape, 1) for model in _models(unit)]
-        else:
-            gains = gain_functions(shape)
-            trials += [Trial(NINE, shape, g) for g in gains]
-            if climate.rates is not None:
-                trials += [Trial(NINE, shape, g, rate=True) for g in gains]
-    return trials
+    for shape in shapes:
+        gains = [1] if shape.parameters == 1 else gain_functions(shape)
+        trials += [replace(base, shape=shape, gain_functions=g) for g in gains]
+        if shape.parameters > 1 and climate.rates is not None and turns.halves:
+            trials += [replace(base, shape=shape, gain_functions=g, rate=True) for g in gains]
+    return [judge(trial, found.data, climate, turns.all) for trial in trials]
 
 
-def _models(unit: UnitDescription) -> tuple[ScalarModel, ...]:
-    kept = {"auto": MODELS, "linear": MODELS[:3], "quadratic": MODELS[3:]}
-    return kept[unit.terms]
+def _plain_rows(
+    unit: UnitDescription,
+    found: Prepared,
+    climate: PoseClimate,
+    base: Trial,
+    turns: Turns,
+) -> list[Judged]:
+    """Candidates without priors at one temperature: a diagnosis."""
+    if base.shape.parameters > 1:
+        return []
+    models = {"auto": MODELS, "linear": MODELS[:3], "quadratic": MODELS[3:]}[unit.terms]
+    trials = [replace(base, model=_with(base.model.known, model)) for model in models]
+    trials = [trial for trial in trials if trial.parameters <= len(found.temps)]
+    return [judge(trial, found.data, climate, turns.all) for trial in trials]
 
 
-def _turns(orientations: list[list[int]], temperatures: list[list[int]], halves: int) -> str:
-    inner = max(len(temperatures) - 2, 0) if len(temperatures) >= 4 else 0
-    groups = f" in {TURNS_MAX} groups" if len(orientations) > TURNS_MAX else ""
-    words = f"{len(orientations)} orientations{groups}"
-    words += f" and {inner} temperatures" if inner else ""
-    return words + (f" and {halves} half-cycles" if halves else "")
+def _reason(thermal: Sequence[Judged], best: Judged, turns: Turns, terms: str) -> str:
+    """Why this calibration, in words."""
+    label = best.trial.label
+    if best.held_out_g is None:
+        text = f"{label}: no pose is determined by the others, so none is held out"
+    else:
+        text = (
+            f"{label}: held-out error {best.held_out_g * 1e3:.3g} mg over "
+            f"{Turns.values(turns.all)} values ({turns.words} held out in turn)"
+        )
+    if len(thermal) > 1:
+        how = "no other is significantly better" if best.held_out_g else "the most probable"
+        text += f"; of {len(thermal)} thermal functions, {how}"
+    return f"{text}. Terms beyond the linear constants: {terms}"
 
 
-def _widest_linear(rows: list[Judged], best: Judged) -> Judged:
-    """The chosen row or the one with most constants that is linear and follows temperature alike.
-
-    One wrong pose can make a small model win, in which all residuals are as large as its own.
-    """
-    alike = [
-        row
-        for row in rows
-        if row.able
-        and not len(row.trial.model.quadratic)
-        and row.trial.shape.parameters == best.trial.shape.parameters
-        and row.trial.gain_functions == best.trial.gain_functions
-        and row.trial.rate == best.trial.rate
-    ]
-    return max([best, *alike], key=lambda row: row.trial.parameters)
-
-
-def _outlier(judge: Judged, poses: PoseSet, loss: str) -> list[str]:
-    """Names a pose that the others contradict, by its leverage in a least-squares fit."""
-    fit = judge.fit
+def _outlier(row: Judged, poses: PoseSet, loss: str) -> list[str]:
+    """Names a pose that the others contradict, by its leverage in the linear fit with priors."""
+    fit = row.fit
     if loss != "linear":  # leverage and F are those of least squares
-        fit = fit_scalar(fit.model, fit.data, fit.gain_functions, start=fit.theta)
+        trial = row.trial
+        assert trial.known is not None
+        fit = fit_with_prior(trial.model, fit.data, trial.gain_functions, trial.known)
+    posterior = fit.posterior
+    assert posterior is not None
     weighted = fit.residual_g * fit.data.weight
-    left_out = left_out_residuals(weighted, fit.jacobian)
-    found = worst_outlier(weighted[:, None], left_out[:, None], len(fit.theta))
+    # The prior as rows of their own: it holds the constants as poses would.
+    rows = np.concatenate(
+        [fit.jacobian @ posterior.prior.factor, posterior.scale * np.eye(len(fit.theta))]
+    )
+    padded = np.concatenate([weighted, np.zeros(len(fit.theta))])
+    left_out = left_out_residuals(padded, rows)[: len(weighted)]
+    found = worst_outlier(weighted[:, None], left_out[:, None], math.ceil(posterior.used))
     if found is None:
         return []
     worst = found.indices[0]

@@ -13,6 +13,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import ALIKE_DEG, PoseSet
 from triaxcal.readings.samples import GYRO, READING, Samples
 from triaxcal.readings.spool import SAMPLED
+from triaxcal.unit.priors import Priors
 from triaxcal.unit.recording import SAMPLES, RecordingLayout
 
 CONDITION_MAX = 100.0
@@ -199,51 +200,42 @@ def crowd_finding(groups: list[list[int]], poses: PoseSet) -> str:
     )
 
 
-def refuse_few(poses: PoseSet, orientations: int, needed: int) -> None:
-    """Refuse fewer orientations than the smallest model has constants."""
-    if orientations >= needed:
-        return
-    looked = f"{len(poses.poses)} pose{'s' * (len(poses.poses) != 1)}"
-    refused = "; ".join(f"pose {r.number}: {r.reason}" for r in poses.refused[:3])
-    raise RefusedError(
-        poses.source,
-        f"{looked} in {orientations} orientation{'s' * (orientations != 1)}"
-        + (f" ({refused})" if refused else ""),
-        expected=f"at least {needed} different orientations, 9 for all constants, 12 or more to "
-        "hold some out",
-        remedy="add poses that are not alike: six faces, then edges and corners"
-        + (
-            "; `triaxcal drift` shows one orientation over temperature"
-            if len(poses.poses) == 1
-            else ""
-        ),
-    )
+def open_finding(poses: PoseSet, radius: float, priors: Priors) -> tuple[str, int]:
+    """What poses in a plane, or of one direction, leave open, and how many dimensions they span.
 
+    "" where they lie all round.
 
-def refuse_plane(poses: PoseSet, radius: float) -> None:
-    """Refuse poses in a plane: a circle determines no sphere. `radius` is about that of 1 g."""
+    `radius` is about that of 1 g. A circle determines no sphere.
+    """
     centred = poses.readings - poses.readings.mean(axis=0)
-    _, singular, directions = np.linalg.svd(centred / radius / np.sqrt(len(centred)))
-    if singular[-1] >= _PLANE:
-        return
+    size = max(radius, float(np.median(np.linalg.norm(poses.readings, axis=1))))
+    _, singular, directions = np.linalg.svd(centred / size / np.sqrt(len(centred)))
+    spans = int((singular >= _PLANE).sum())
+    if spans == 3:
+        return "", spans
+    count = len(poses.poses)
+    looked = f"{count} pose{'s' * (count != 1)}"
+    bounded = f"bounded by [priors] bias_g = {priors.bias_g:g} g alone"
+    if spans < 2:
+        way = "all point one way and determine" if count > 1 else "determines"
+        text = f"{looked}: {way} one combination of bias and scale factor; the others are {bounded}"
+        return f"{text}; add poses that are not alike, six faces first", spans
     normal = AXES[int(np.abs(directions[-1]).argmax())]
-    raise RefusedError(
-        poses.source,
-        f"the {len(poses.poses)} poses lie near one plane (within "
-        f"{np.degrees(singular[-1]):.2g} deg, rms) and do not determine U0{normal}",
-        expected=f"at least {np.degrees(_PLANE):.2g} deg",
-        remedy=f"add poses with {normal} up and down, and some between",
+    angle = np.degrees(singular[-1]) if len(singular) == 3 else 0.0
+    text = (
+        f"the {looked} lie near one plane (within {angle:.2g} deg, rms) and do not determine "
+        f"U0{normal}: it is {bounded}; add poses with {normal} up and down, and some between"
     )
+    return text, spans
 
 
-def refuse_unseen(poses: PoseSet, condition: float, unseen: str) -> None:
-    """Refuse poses that do not determine a constant."""
-    if condition <= CONDITION_MAX:
-        return
-    raise RefusedError(
-        poses.source,
-        f"the {len(poses.poses)} poses do not determine {unseen} (condition number "
-        f"{condition:.3g})",
-        expected=f"a condition number of at most {CONDITION_MAX:g}",
-        remedy="add poses with each axis up and down, and some between",
-    )
+def refuse_no_numbers(poses: PoseSet) -> None:
+    """Refuse poses whose means are no numbers."""
+    for pose in poses.poses:
+        if not np.isfinite(pose.reading).all():
+            raise RefusedError(
+                f"{poses.source}, line {pose.line}",
+                f"pose {pose.number} has a reading that is no number",
+                expected="finite readings",
+                remedy="remove that pose",
+            )

@@ -1,23 +1,29 @@
-"""The calibration of a recording of poses, from the model that was chosen for it."""
+"""The calibration of a recording of poses, from the fit with priors and what goes into the C."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint
-from triaxcal.fitting.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
+from triaxcal.fitting.core.posterior import Posterior
+from triaxcal.fitting.core.recorded import (
+    LEFT_OUT_PART,
+    NO_TERMS_COVARIANCE,
+    NOISE_PART,
+    PRIOR_PART,
+    CovariancePart,
+    RecordingFit,
+    TermsCovariance,
+)
 from triaxcal.fitting.recorded.frame import CASE, case_rotation, turned_constants, turned_quadratic
-from triaxcal.fitting.recorded.temperatures import (
-    recording_range,
-)
-from triaxcal.fitting.recorded.trials import (
-    Judged,
-    PoseClimate,
-)
+from triaxcal.fitting.recorded.shares import constant_shares
+from triaxcal.fitting.recorded.temperatures import recording_range
+from triaxcal.fitting.recorded.terms import Delivered
+from triaxcal.fitting.recorded.trials import Judged, PoseClimate
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import RateTerm, Terms
 from triaxcal.model.thermal.shape import ThermalShape
@@ -27,61 +33,60 @@ from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import RecordingLayout
 
 ESTIMATOR = "|a| = g"
-_UNCHECKED = (
-    "NOT CHECKED: {count} constants fit any {count} poses exactly, so the residuals are 0 and show "
-    "nothing; the uncertainty of the constants is unknown; record more poses, in other orientations"
-)
 
 
 @dataclass(frozen=True)
 class Made:
-    """What a calibration is put together from."""
+    """What a calibration is put together from.
+
+    Attributes
+    ----------
+    rows : list of Judged
+        The table of candidates.
+    linear : Judged
+        The linear constants with priors: what the poses see.
+    by_orientation : int
+        How many of the held-out values, the first ones, are those of orientations.
+    """
 
     unit: UnitDescription
     layout: RecordingLayout
     poses: PoseSet
     climate: PoseClimate
     rows: list[Judged]
-    best: Judged
+    delivered: Delivered
+    linear: Judged
+    by_orientation: int
     why: str
     findings: list[str]
 
     def calibration(self) -> Calibration:
         """The calibration, in the frame of the layout."""
-        fit = self.best.fit
-        constants, slopes = fit.constants(), fit.constants_jacobian()
-        quadratic, patterns = fit.quadratic, fit.model.quadratic
+        own, rotation = self.delivered.own, None
+        constants, quadratic = own.fit.constants(), own.fit.quadratic
         findings = list(self.findings)
         if self.layout.frame == CASE:
-            force = force_from_voltage(fit.data.basis @ constants.T, self.poses.readings)
+            force = force_from_voltage(own.fit.data.basis @ constants.T, self.poses.readings)
             rotation, finding = case_rotation(self.poses.source, force)
             findings.append(finding)
             constants = turned_constants(constants, rotation)
             quadratic = turned_quadratic(quadratic, rotation)
-            patterns = np.array([turned_quadratic(pattern, rotation) for pattern in patterns])
-            turned = [turned_constants(slopes[..., k], rotation) for k in range(slopes.shape[-1])]
-            slopes = np.stack(turned, axis=-1)
-        rate = self._rate_term(constants) if self.best.trial.rate else None
-        known = NO_TERMS_COVARIANCE
-        if len(patterns):
-            count, pattern = len(patterns), patterns.reshape(-1, 18)
-            mixed = fit.covariance[:, -count:] @ pattern
-            own = pattern.T @ fit.covariance[-count:, -count:] @ pattern
-            known = TermsCovariance(own, slopes @ mixed)
-        if rate is not None:
-            known = TermsCovariance(rate_g2=self._rate_covariance(constants, slopes))
+        frame = _Frame(self.delivered, constants, rotation)
+        rate, rate_g2 = None, None
+        if own.trial.rate:
+            rate = self._rate_term(constants)
+            rate_g2 = frame.rate_covariance(own.trial.shape.basis(self.unit.t0_degc))
             findings.append(rate_in_words(rate))
-            constants, slopes = constants[:, :-1], slopes[:, :-1]
-        covariance = np.einsum("apk,kl,bql->apbq", slopes, fit.covariance, slopes)
-        if len(fit.residual_g) == len(fit.theta):
-            covariance = np.full_like(covariance, np.nan)
-            findings.insert(0, _UNCHECKED.format(count=len(fit.theta)))
+            constants = constants[:, :-1]
+        parts = frame.parts()
+        total = sum(part.covariance for part in parts)
         terms = Terms(quadratic if quadratic.any() else None, rate)
-        return self._calibration(constants, terms, covariance, known, findings)
+        result = self._recording(np.asarray(total), parts, rate_g2, findings)
+        return self._calibration(constants, terms, result)
 
     def _rate_term(self, constants: FloatArray) -> RateTerm:
         """The biases' last function, reading units at the largest rate, as an offset of a at T0."""
-        rates, shape = self.climate.rates, self.best.trial.shape
+        rates, shape = self.climate.rates, self.delivered.own.trial.shape
         assert rates is not None
         at_t0 = constants[:9, :-1] @ shape.basis(self.unit.t0_degc)
         per_rate = constants[9:, -1] / np.abs(rates).max()
@@ -90,51 +95,147 @@ class Made:
         low, high = 1.01 * min(float(rates.min()), 0.0), 1.01 * max(float(rates.max()), 0.0)
         return RateTerm(offset, (low, high))
 
-    def _rate_covariance(self, constants: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Covariance (3, 3) of the offset at the largest rate and T0, g^2."""
-        at_t0 = constants[:9, :-1] @ self.best.trial.shape.basis(self.unit.t0_degc)
-        offset = np.linalg.solve(at_t0.reshape(3, 3), slopes[9:, -1])
-        result: FloatArray = offset @ self.best.fit.covariance @ offset.T
-        return result
-
-    def _calibration(
+    def _recording(
         self,
-        constants: FloatArray,
-        terms: Terms,
         covariance: FloatArray,
-        known: TermsCovariance,
+        parts: tuple[CovariancePart, ...],
+        rate_g2: FloatArray | None,
         findings: list[str],
-    ) -> Calibration:
-        fit, shape = self.best.fit, self.best.trial.shape
-        dof = len(fit.residual_g) - len(fit.theta)
-        result = RecordingFit(
+    ) -> RecordingFit:
+        own, full = self.delivered.own, self.delivered.full.fit
+        posterior = full.posterior
+        assert posterior is not None
+        return RecordingFit(
             poses=self.poses,
             route=f"only |a| = g known; frame: {self.layout.frame}",
             covariance=covariance,
-            dof=dof,
-            rms_g=fit.rms_g,
-            rms_free_g=math.sqrt(float((fit.residual_g**2).sum()) / dof) if dof else math.nan,
-            held_out_g=self.best.held_out_g,
-            left_out_length_g=self.best.length_g(len(self.poses.poses)),
-            condition=fit.condition,
-            weakest=fit.unseen(),
-            residual_g=fit.residual_g,
+            dof=posterior.dof,
+            rms_g=own.fit.rms_g,
+            rms_free_g=posterior.scale,
+            held_out_g=own.held_out_g,
+            left_out_length_g=own.length_g(self.by_orientation),
+            condition=self.linear.fit.condition,
+            weakest=self.linear.fit.unseen(),
+            residual_g=own.fit.residual_g,
             findings=tuple(findings),
-            terms=known,
+            terms=_sum([part.terms for part in parts], rate_g2),
+            parts=parts,
+            noise_95_g=posterior.half_width,
+            expected_g=own.expected_g,
+            held_out_poses=self.by_orientation,
+            shares=constant_shares(self.delivered.full, self.unit.t0_degc, self.layout),
         )
-        freedom = f"{dof} degree{'s' * (dof != 1)} of freedom"
+
+    def _calibration(
+        self, constants: FloatArray, terms: Terms, result: RecordingFit
+    ) -> Calibration:
+        own = self.delivered.own
+        source = (
+            f"fit with priors: noise {result.rms_free_g * 1e3:.3g} mg a pose, "
+            f"{result.dof:.3g} degrees of freedom"
+        )
         return recorded_calibration(
             self.unit,
             self.layout,
-            (shape, constants),
+            (own.trial.shape, constants),
             result,
             self.climate.temps_degc,
             estimator=ESTIMATOR,
-            covariance_source=f"scatter of |a| - g over the poses, {freedom}",
-            candidates=tuple(r.candidate(ESTIMATOR, chosen=r is self.best) for r in self.rows),
+            covariance_source=source,
+            candidates=tuple(r.candidate(ESTIMATOR, chosen=r is own) for r in self.rows),
             selection_reason=self.why,
             terms=terms,
         )
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Errors of the full fit's theta as errors of constants and of Q, in the layout's frame.
+
+    Attributes
+    ----------
+    constants : array, shape (12, P)
+        The delivered ones, with the term in dT/dt.
+    rotation : array, shape (3, 3), or None
+    """
+
+    delivered: Delivered
+    constants: FloatArray
+    rotation: FloatArray | None
+
+    @property
+    def posterior(self) -> Posterior:
+        """Of the full fit."""
+        found = self.delivered.full.fit.posterior
+        assert found is not None
+        return found
+
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """Constants by theta, (12, P, parameters)."""
+        slopes = self.delivered.full.fit.constants_jacobian()
+        if self.rotation is None:
+            return slopes
+        turn = self.rotation
+        turned = [turned_constants(slopes[..., k], turn) for k in range(slopes.shape[-1])]
+        return np.stack(turned, axis=-1)
+
+    @cached_property
+    def patterns(self) -> FloatArray:
+        """Q by the last entries of theta, (q, 18)."""
+        patterns = self.delivered.full.fit.model.quadratic
+        if self.rotation is not None:
+            turned = [turned_quadratic(pattern, self.rotation) for pattern in patterns]
+            patterns = np.array(turned).reshape(-1, 3, 6)
+        return patterns.reshape(-1, 18)
+
+    def parts(self) -> tuple[CovariancePart, ...]:
+        """Scatter of the poses, the priors, and the terms that are left out."""
+        parts = [
+            self._part(NOISE_PART, self.posterior.noise_covariance),
+            self._part(PRIOR_PART, self.posterior.prior_covariance),
+        ]
+        if self.delivered.own is not self.delivered.full:
+            shift = self._shift()
+            parts.append(self._part(LEFT_OUT_PART, np.outer(shift, shift)))
+        return tuple(parts)
+
+    def _part(self, key: str, covariance: FloatArray) -> CovariancePart:
+        slopes = self.slopes
+        if self.delivered.own.trial.rate:
+            slopes = slopes[:, :-1]
+        of_constants = np.einsum("apk,kl,bql->apbq", slopes, covariance, slopes, optimize=True)
+        terms, count = NO_TERMS_COVARIANCE, len(self.patterns)
+        if count:
+            mixed = covariance[:, -count:] @ self.patterns
+            own = self.patterns.T @ covariance[-count:, -count:] @ self.patterns
+            terms = TermsCovariance(own, slopes @ mixed)
+        return CovariancePart(key, of_constants, terms)
+
+    def _shift(self) -> FloatArray:
+        """Delivered theta less that of the full fit, in the parameters of the full one."""
+        own, full = self.delivered.own.fit, self.delivered.full.fit
+        count = len(full.theta) - len(full.model.quadratic)
+        shift = -full.theta
+        shift[:count] += own.theta[:count]
+        Q = (own.quadratic - own.model.known).ravel()
+        shift[count:] += full.model.quadratic.reshape(-1, 18) @ Q
+        return shift
+
+    def rate_covariance(self, basis_t0: FloatArray) -> FloatArray:
+        """Covariance (3, 3) of the offset at the largest rate and T0, g^2."""
+        at_t0 = self.constants[:9, :-1] @ basis_t0
+        offset = np.linalg.solve(at_t0.reshape(3, 3), self.slopes[9:, -1])
+        result: FloatArray = offset @ self.posterior.covariance @ offset.T
+        return result
+
+
+def _sum(terms: list[TermsCovariance], rate_g2: FloatArray | None) -> TermsCovariance:
+    own = [t.quadratic for t in terms if t.quadratic is not None]
+    cross = [t.cross for t in terms if t.cross is not None]
+    if not own:
+        return TermsCovariance(rate_g2=rate_g2)
+    return TermsCovariance(np.sum(own, axis=0), np.sum(cross, axis=0), rate_g2)
 
 
 def recorded_calibration(

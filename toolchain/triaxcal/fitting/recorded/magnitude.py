@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from triaxcal.fitting.recorded.scalar import ScalarData, ScalarModel, residual_of, split
-from triaxcal.model.types import FloatArray
+from triaxcal.fitting.core.posterior import Posterior, fit_map
+from triaxcal.fitting.recorded.prior import Known
+from triaxcal.fitting.recorded.scalar import (
+    ScalarData,
+    ScalarModel,
+    constant_part,
+    residual_of,
+    split,
+)
+from triaxcal.model.types import BoolArray, FloatArray
 
+_NEAR = 3e-3
+"""Move of a scaled constant whose square, 1e-5 g, is what one step leaves."""
 _STEPS_MAX = 60
 _STEPS_NEAR = 12
 _SETTLED = 1e-13
@@ -33,6 +42,8 @@ class ScalarFit:
         Weighted, at the solution.
     residual_g : array, shape (n,)
         |a| - g, not weighted.
+    posterior : Posterior or None
+        Of a fit with priors.
     """
 
     model: ScalarModel
@@ -41,6 +52,7 @@ class ScalarFit:
     data: ScalarData
     jacobian: FloatArray
     residual_g: FloatArray
+    posterior: Posterior | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -90,6 +102,8 @@ class ScalarFit:
     @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of theta."""
+        if self.posterior is not None:
+            return self.posterior.covariance
         inverse = np.linalg.pinv(self.jacobian.T @ self.jacobian).astype(np.float64)
         result: FloatArray = self.variance_g2 * inverse
         return result
@@ -112,7 +126,7 @@ class ScalarFit:
         K, bias, _ = self.split(theta)
         scaled = np.concatenate([K.reshape(len(K), 9), bias], axis=1) * self.data.radius
         # The functions sum to the constant 1 with weight `ones`: the centre belongs to it.
-        ones = np.linalg.lstsq(self.data.basis, np.ones(len(self.data.basis)), rcond=None)[0]
+        ones = constant_part(self.data.basis)
         scaled[:, 9:] += ones[:, None] * self.data.centre
         result: FloatArray = scaled.T
         return result
@@ -122,9 +136,88 @@ class ScalarFit:
         """Q, shape (3, 6), 1/g."""
         return self.split(self.theta)[2]
 
+    def without(self, mask: BoolArray) -> Held | None:
+        """The fit without the poses of a mask (n,), by one step from this solution.
+
+        At the solution the poses that stay pull against those that go: with A the normal matrix of
+        those that stay, the solution moves by A^-1 J^T r of those that go. None where that is too
+        far for one step, and where it has no solution.
+        """
+        factor, ridge, weight = self._inner
+        own = self._slopes[mask]
+        normal = self._normal - own.T @ own
+        values, vectors = np.linalg.eigh(normal)
+        if values[0] <= 1e-12 * values[-1]:
+            return None
+        inverse = (vectors / values) @ vectors.T
+        move = factor @ (inverse @ (own.T @ (weight[mask] * self.residual_g[mask])))
+        if not np.abs(move).max() < _NEAR:
+            return None
+        condition = 0.0
+        if self.posterior is None:
+            scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-4 * len(mask)))
+            scaled = np.linalg.eigvalsh(scale[:, None] * normal * scale)
+            condition = float(np.sqrt(scaled[-1] / max(float(scaled[0]), 1e-300)))
+        spread: FloatArray = ridge * factor @ inverse @ factor.T
+        return Held(self, self.theta + move, spread, condition)
+
+    @property
+    def _inner(self) -> tuple[FloatArray, float, FloatArray]:
+        """Factor of theta that is solved in, what the prior adds there, and the weights."""
+        if self.posterior is None:
+            return np.eye(len(self.theta)), 0.0, self.data.weight
+        found = self.posterior
+        return found.prior.factor, found.scale**2, found.weight
+
+    @cached_property
+    def _slopes(self) -> FloatArray:
+        factor, _, weight = self._inner
+        result: FloatArray = (self.jacobian @ factor) * (weight / self.data.weight)[:, None]
+        return result
+
+    @cached_property
+    def _normal(self) -> FloatArray:
+        ridge = self._inner[1] * np.eye(self._slopes.shape[1])
+        result: FloatArray = self._slopes.T @ self._slopes + ridge
+        return result
+
+    def held(self) -> Held:
+        """These constants, to be tried on other poses."""
+        spread = np.zeros((len(self.theta),) * 2)
+        if self.posterior is not None:
+            spread = self.posterior.spread_covariance
+        return Held(self, self.theta, spread, self.condition)
+
+
+@dataclass(frozen=True)
+class Held:
+    """Constants that some poses were held out of, to be tried on them.
+
+    Attributes
+    ----------
+    of : ScalarFit
+        The fit that it belongs to.
+    theta : array
+    spread : array
+        Covariance of theta; of a fit with priors.
+    condition : float
+        Condition number of the scaled Jacobian; of a fit without.
+    """
+
+    of: ScalarFit
+    theta: FloatArray
+    spread: FloatArray
+    condition: float
+
     def errors_g(self, data: ScalarData) -> FloatArray:
         """|a| - g of other poses with these constants, shape (n,)."""
-        return residual_of(self.model, self.gain_functions, data, self.theta)[0]
+        return residual_of(self.of.model, self.of.gain_functions, data, self.theta)[0]
+
+    def expected_g(self, data: ScalarData) -> FloatArray:
+        """Standard deviation of |a| of other poses by these constants, (n,), noise apart."""
+        slopes = residual_of(self.of.model, self.of.gain_functions, data, self.theta)[1]
+        result: FloatArray = np.sqrt(((slopes @ self.spread) * slopes).sum(axis=1))
+        return result
 
 
 def fit_scalar(
@@ -161,6 +254,8 @@ def fit_scalar(
         theta = _gauss_newton(both, first)
         if theta is not None:
             return _fitted(model, gain_functions, data, theta)
+    from scipy.optimize import least_squares  # noqa: PLC0415
+
     # trf takes fewer poses than parameters: the minimum-norm step; the condition number shows it.
     solve = partial(
         least_squares,
@@ -177,6 +272,41 @@ def fit_scalar(
         scale = 3.0 * 1.4826 * float(np.median(np.abs(found.fun))) or 1e-9
         found = solve(found.x, loss="huber" if loss == "huber" else "cauchy", f_scale=scale)
     return _fitted(model, gain_functions, data, np.asarray(found.x, dtype=np.float64))
+
+
+def fit_with_prior(
+    model: ScalarModel,
+    data: ScalarData,
+    gain_functions: int,
+    known: Known,
+    *,
+    loss: str = "linear",
+    near: ScalarFit | None = None,
+) -> ScalarFit:
+    """The most probable constants of `model`, by all that is known beforehand.
+
+    `near` is a fit of more poses: its solution is the start, and its noise is taken.
+    """
+    prior = known.of(model, data, gain_functions)
+    start: FloatArray | None = None
+    scale: float | None = None
+    if near is not None and near.posterior is not None:
+        of = near.posterior
+        prior, scale = of.prior, of.scale
+        away = np.linalg.lstsq(prior.factor, near.theta - prior.mean, rcond=None)[0]
+        start = np.asarray(away, dtype=np.float64)
+    posterior = fit_map(
+        lambda theta: residual_of(model, gain_functions, data, theta),
+        prior,
+        data.weight,
+        known.noise,
+        values=data.values,
+        start=start,
+        scale=scale,
+        loss=loss,
+    )
+    found = _fitted(model, gain_functions, data, posterior.theta)
+    return replace(found, posterior=posterior)
 
 
 def _fitted(
@@ -202,7 +332,7 @@ def _gauss_newton(
 
 def _start(model: ScalarModel, data: ScalarData, gain_functions: int) -> FloatArray:
     P = data.basis.shape[1]
-    ones = np.linalg.lstsq(data.basis, np.ones(len(data.basis)), rcond=None)[0]
+    ones = constant_part(data.basis)
     gains = np.zeros((len(model.gain), gain_functions))
     diagonal = np.trace(model.gain, axis1=1, axis2=2) > 0.0
     gains[diagonal] = ones[:gain_functions] / data.gravity_g

@@ -17,7 +17,7 @@ singular value of the Jacobian means the same in counts and in m/s^2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -88,14 +88,14 @@ class ScalarModel:
 _NONE = np.zeros((0, 3, 6))
 _GAINS = np.array([_symmetric(i, j) for _, i, j in _NINE])
 _NAMES = tuple(name for name, _, _ in _NINE)
+SQUARES = np.array([_square(i) for i in range(3)])
+"""The square of each axis' own acceleration, (3, 3, 6)."""
 NINE = ScalarModel("linear, nine constants", _NAMES, _GAINS, _NONE)
 MODELS = (
     ScalarModel("bias and one scale factor", ("K",), np.eye(3)[None], _NONE),
     ScalarModel("bias and scale factors", _NAMES[:3], _GAINS[:3], _NONE),
     NINE,
-    ScalarModel(
-        "nine constants and squares", _NAMES, _GAINS, np.array([_square(i) for i in range(3)])
-    ),
+    ScalarModel("nine constants and squares", _NAMES, _GAINS, SQUARES),
     ScalarModel("nine constants and all quadratic terms", _NAMES, _GAINS, VISIBLE),
 )
 
@@ -111,7 +111,9 @@ class ScalarData:
     basis : array, shape (n, P)
         Functions of temperature at the poses.
     weight : array, shape (n,)
-        Square roots of the weights, rms 1.
+        Square roots of the weights, at most 1.
+    count : array, shape (n,)
+        For how many values a pose counts: less than one where several say one thing.
     gravity_g : float
     """
 
@@ -121,6 +123,7 @@ class ScalarData:
     gravity_g: float
     centre: FloatArray
     radius: float
+    count: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def select(self, kept: BoolArray) -> ScalarData:
         """Only the poses of a mask."""
@@ -131,13 +134,17 @@ class ScalarData:
             self.gravity_g,
             self.centre,
             self.radius,
+            self.count[kept] if len(self.count) else self.count,
         )
+
+    @property
+    def values(self) -> float | None:
+        """How many values there are, where `count` says it."""
+        return float(self.count.sum()) if len(self.count) else None
 
     def with_basis(self, basis: FloatArray) -> ScalarData:
         """The same poses with other functions of temperature."""
-        return ScalarData(
-            self.reading, basis, self.weight, self.gravity_g, self.centre, self.radius
-        )
+        return replace(self, basis=basis)
 
 
 def scalar_data(
@@ -159,11 +166,25 @@ def scalar_data(
     return ScalarData(
         reading=(readings - centre) / (spread * radius),
         basis=basis,
-        weight=weight / float(np.sqrt((weight**2).mean())),
+        weight=weight,
         gravity_g=gravity_g,
         centre=centre,
         radius=spread * radius,
     )
+
+
+def unscaled_data(
+    readings: FloatArray, basis: FloatArray, weight: FloatArray, gravity_g: float
+) -> ScalarData:
+    """The same about 0, by the readings' own length: for poses that determine no sphere."""
+    radius = float(np.median(np.linalg.norm(readings, axis=1)))
+    return ScalarData(readings / radius, basis, weight, gravity_g, np.zeros(3), radius)
+
+
+def constant_part(basis: FloatArray) -> FloatArray:
+    """Weights (P,) with which functions of temperature at the poses, (n, P), sum to 1."""
+    weights = np.linalg.lstsq(basis, np.ones(len(basis)), rcond=None)[0]
+    return np.asarray(weights, dtype=np.float64)
 
 
 def split(
@@ -190,19 +211,21 @@ def residual_of(
         N = np.linalg.inv(K_p[0]) / data.basis[:, :, None]
     else:
         N = np.linalg.inv(np.einsum("np,pij->nij", data.basis, K_p))
-    linear = np.einsum("nij,nj->ni", N, data.reading - data.basis @ bias_p)
+    linear = (N @ (data.reading - data.basis @ bias_p)[:, :, None])[:, :, 0]
     force = linear + products(linear) @ Q.T
     length = np.linalg.norm(force, axis=1)
     unit = force / length[:, None]
     through = np.broadcast_to(np.eye(3), (n, 3, 3))
     if Q.any():
-        through = through + np.einsum("ik,nkj->nij", Q, _product_slopes(linear))
-    row = np.einsum("ni,nij,njk->nk", unit, through, N)  # d|a| / d(U - U0)
-    by_gain = -np.einsum("nk,mkl,nl->nm", row, model.gain, linear)
+        through = through + Q @ _product_slopes(linear)
+    row = ((unit[:, None] @ through) @ N)[:, 0]  # d|a| / d(U - U0)
+    outer = (row[:, :, None] * linear[:, None, :]).reshape(n, 9)
+    by_gain = -outer @ model.gain.reshape(-1, 9).T
+    by_product = (unit[:, :, None] * products(linear)[:, None, :]).reshape(n, 18)
     columns = [
         (by_gain[:, :, None] * data.basis[:, None, :gain_functions]).reshape(n, -1),
         (-row[:, :, None] * data.basis[:, None, :]).reshape(n, -1),
-        np.einsum("ni,qik,nk->nq", unit, model.quadratic, products(linear)),
+        by_product @ model.quadratic.reshape(-1, 18).T,
     ]
     return length - data.gravity_g, np.concatenate(columns, axis=1)
 

@@ -1,14 +1,13 @@
 """Candidates of a recording: each fitted, each judged by poses that it has not seen.
 
-Left out in turn is every orientation with all its poses (two poses alike would give each other
-away), and every inner temperature where there are four and more. What is held out is scored by
-|a| - g. Every candidate is scored on the same poses; one whose constants the remaining poses leave
-open in any turn is not scored.
+The calibration is the fit with priors (`recorded.prior`). The candidates without them are a
+diagnosis: they show what the poses alone would say, and choose nothing.
 
-Where a linear candidate that all poses determine cannot be scored so (six faces: no orientation can
-be spared), single poses are held out instead, a weaker test, for poses alike stay in. Where even
-that is impossible nothing is held out, and the candidate with the most constants is taken: as with
-the tilter, what the data determine exactly.
+Held out in turn is every orientation with all its poses (two poses alike would give each other
+away), every inner temperature where there are four and more, and every half-cycle. What is held out
+is scored by |a| - g. A pose counts where the others determine it: where the linear fit of the rest
+expects an error below half the limit. Six faces determine none of each other; single poses are then
+held out, a weaker test, for poses alike stay in. Where even that leaves none, nothing is tested.
 """
 
 from __future__ import annotations
@@ -20,7 +19,8 @@ import numpy as np
 
 from triaxcal.fitting.core.calibration import Candidate
 from triaxcal.fitting.recorded.checks import CONDITION_MAX
-from triaxcal.fitting.recorded.magnitude import ScalarFit, fit_scalar
+from triaxcal.fitting.recorded.magnitude import Held, ScalarFit, fit_scalar, fit_with_prior
+from triaxcal.fitting.recorded.prior import Known
 from triaxcal.fitting.recorded.scalar import ScalarData, ScalarModel
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
@@ -48,12 +48,15 @@ class Trial:
         How many functions of `shape` the entries of K have; the biases have all.
     rate : bool
         Whether the biases also have a term in dT/dt.
+    known : Known or None
+        What is known beforehand; None for the poses alone.
     """
 
     model: ScalarModel
     shape: ThermalShape
     gain_functions: int
     rate: bool = False
+    known: Known | None = None
 
     @property
     def parameters(self) -> int:
@@ -67,6 +70,10 @@ class Trial:
         if not self.rate or rates is None:
             return functions
         return np.column_stack([functions, rates / np.abs(rates).max()])
+
+    def basis_at(self, temp_degc: float) -> FloatArray:
+        """The same at one temperature that stands still, (P,)."""
+        return np.append(self.shape.basis(temp_degc), np.zeros(int(self.rate)))
 
     @property
     def label(self) -> str:
@@ -98,6 +105,8 @@ class Judged:
         Whether all poses together determine it.
     errors_g : array or None
         |a| - g of everything held out, in the order of the turns.
+    expected_g : float or None
+        Rms of them that the fits with priors expect, with their noise.
     """
 
     trial: Trial
@@ -105,12 +114,18 @@ class Judged:
     held_out_g: float | None
     able: bool
     errors_g: FloatArray | None = None
+    expected_g: float | None = None
 
-    def length_g(self, poses: int) -> float | None:
-        """Rms |a| - g of the `poses` poses, each held out with its orientation: the first turns."""
-        if self.errors_g is None:
+    @property
+    def log_evidence(self) -> float:
+        """Of a fit with priors: ln of the probability of the poses."""
+        return -np.inf if self.fit.posterior is None else self.fit.posterior.log_evidence
+
+    def length_g(self, values: int) -> float | None:
+        """Rms |a| - g of the first `values` held-out values, those of orientations; None for 0."""
+        if self.errors_g is None or not values:
             return None
-        return float(np.sqrt(np.mean(self.errors_g[:poses] ** 2)))
+        return float(np.sqrt(np.mean(self.errors_g[:values] ** 2)))
 
     def candidate(self, estimator: str, *, chosen: bool) -> Candidate:
         """Row of the table."""
@@ -127,65 +142,107 @@ class Judged:
         )
 
 
-def folds(
-    orientations: Sequence[Sequence[int]], temperatures: Sequence[Sequence[int]], count: int
-) -> list[Turn]:
-    """Masks of what is held out in turn: orientations, then inner temperatures (rising).
-
-    More than `TURNS_MAX` orientations are held out in so many groups.
-    """
-    inner = temperatures[1:-1] if len(temperatures) >= 4 else ()
+def orientation_turns(orientations: Sequence[Sequence[int]], count: int) -> list[Turn]:
+    """Masks of what is held out in turn: orientations, more than `TURNS_MAX` in so many groups."""
+    if len(orientations) < 2:
+        return []
     turns = [[k for g in orientations[n::TURNS_MAX] for k in g] for n in range(TURNS_MAX)]
-    masks: list[Turn] = []
-    for group in (*(filter(None, turns) if len(orientations) > 1 else ()), *inner):
-        mask = np.zeros(count, dtype=np.bool_)
-        mask[list(group)] = True
-        masks.append((mask, mask))
-    return masks
+    return [_turn(group, count) for group in turns if group]
+
+
+def temperature_turns(temperatures: Sequence[Sequence[int]], count: int) -> list[Turn]:
+    """The same of inner temperatures (rising), where there are four and more."""
+    inner = temperatures[1:-1] if len(temperatures) >= 4 else ()
+    return [_turn(group, count) for group in inner]
+
+
+def _turn(group: Sequence[int], count: int) -> Turn:
+    mask = np.zeros(count, dtype=np.bool_)
+    mask[list(group)] = True
+    return mask, mask
 
 
 def judge(trial: Trial, data: ScalarData, poses: PoseClimate, left_out: Sequence[Turn]) -> Judged:
     """Fit a trial to all poses, and to what each turn leaves."""
-    own, loss = data.with_basis(trial.basis(poses.temps_degc, poses.rates)), poses.loss
-    fit = fit_scalar(trial.model, own, trial.gain_functions, loss)
-    if fit.condition > CONDITION_MAX or len(fit.residual_g) < trial.parameters:
+    own = data.with_basis(trial.basis(poses.temps_degc, poses.rates))
+    fit = _fit(trial, own, poses.loss)
+    if not _determined(trial, fit):
         return Judged(trial, fit, None, able=False)
-    errors = []
+    errors, expected = [], []
     for mask, judged in left_out:
-        part = fit_scalar(
-            trial.model, own.select(~mask), trial.gain_functions, loss, start=fit.theta
-        )
-        if part.condition > CONDITION_MAX or len(part.residual_g) < trial.parameters:
+        part = _held(trial, own, poses.loss, fit, mask)
+        if trial.known is None and (
+            part.condition > CONDITION_MAX or (~mask).sum() < trial.parameters
+        ):
             return Judged(trial, fit, None, able=True)
         errors.append(part.errors_g(own.select(judged)))
+        if fit.posterior is not None:
+            expected.append(part.expected_g(own.select(judged)))
     if not errors:
         return Judged(trial, fit, None, able=True)
     every = np.concatenate(errors)
-    return Judged(trial, fit, float(np.sqrt(np.mean(every**2))), able=True, errors_g=every)
+    rms, among = float(np.sqrt(np.mean(every**2))), None
+    if fit.posterior is not None:
+        variance = np.mean(np.concatenate(expected) ** 2) + fit.posterior.scale**2
+        among = float(np.sqrt(variance))
+    return Judged(trial, fit, rms, able=True, errors_g=every, expected_g=among)
 
 
-def unscored(rows: Sequence[Judged]) -> list[Judged]:
-    """Linear candidates at one temperature that are determined, but could not be scored."""
+def _fit(trial: Trial, data: ScalarData, loss: str, near: ScalarFit | None = None) -> ScalarFit:
+    if trial.known is not None:
+        return fit_with_prior(
+            trial.model, data, trial.gain_functions, trial.known, loss=loss, near=near
+        )
+    start = None if near is None else near.theta
+    return fit_scalar(trial.model, data, trial.gain_functions, loss, start=start)
+
+
+def _held(trial: Trial, data: ScalarData, loss: str, fit: ScalarFit, mask: BoolArray) -> Held:
+    """The fit without the poses of a mask: by one step, or by all of them."""
+    near = fit.without(mask)
+    return near if near is not None else _fit(trial, data.select(~mask), loss, fit).held()
+
+
+def _determined(trial: Trial, fit: ScalarFit) -> bool:
+    """Whether the poses alone determine the constants; with priors all are known."""
+    if trial.known is not None:
+        return True
+    return fit.condition <= CONDITION_MAX and len(fit.residual_g) >= trial.parameters
+
+
+def expected_errors(
+    trial: Trial, data: ScalarData, poses: PoseClimate, left_out: Sequence[Turn]
+) -> list[FloatArray]:
+    """Standard deviations of |a| that the rest expects of what each turn judges, without noise."""
+    own = data.with_basis(trial.basis(poses.temps_degc, poses.rates))
+    fit = _fit(trial, own, poses.loss)
     return [
-        row
-        for row in rows
-        if row.able
-        and row.held_out_g is None
-        and not len(row.trial.model.quadratic)
-        and row.trial.shape.parameters == 1
+        _held(trial, own, poses.loss, fit, mask).expected_g(own.select(judged))
+        for mask, judged in left_out
     ]
+
+
+def worth_judging(
+    left_out: Sequence[Turn], expected: Sequence[FloatArray], limit_g: FloatArray
+) -> list[Turn]:
+    """Turns with those poses alone whose expected error is below half their limit (n,)."""
+    kept = []
+    for (mask, judged), sd in zip(left_out, expected, strict=True):
+        good = judged.copy()
+        good[judged] = sd <= 0.5 * limit_g[judged]
+        if good.any():
+            kept.append((mask, good))
+    return kept
 
 
 def choose(rows: Sequence[Judged]) -> Judged:
     """The simplest candidate that no other beats on what was held out (`beats`).
 
-    Where linear candidates could not be scored, the one of them with the most constants.
+    Where nothing was held out, the one that the poses make most probable.
     """
-    if unscored(rows):
-        return max(unscored(rows), key=lambda row: row.trial.parameters)
-    scored = [row for row in rows if row.able and row.errors_g is not None]
+    scored = [row for row in rows if row.errors_g is not None]
     if not scored:
-        return max((row for row in rows if row.able), key=lambda row: row.trial.parameters)
+        return max(rows, key=lambda row: row.log_evidence)
     unbeaten = [
         row for row in scored if not any(beats(other.errors_g, row.errors_g) for other in scored)
     ]
@@ -227,24 +284,3 @@ def beats(errors: FloatArray | None, rival: FloatArray | None) -> bool:
     difference = (rival**2 - errors**2).ravel()
     sd = float(difference.std(ddof=1)) / np.sqrt(difference.size) if difference.size > 1 else 0.0
     return own < 0.5 * other or float(difference.mean()) > 2.0 * sd
-
-
-def reason(rows: Sequence[Judged], best: Judged, turns: str, values: int) -> str:
-    """Why this candidate, in words."""
-    label = best.trial.label
-    if best.held_out_g is None:
-        return (
-            f"{label}: the fit needs every pose, so none is held out and no candidate is compared; "
-            "record more poses, in other orientations"
-        )
-    scored = [row for row in rows if row.held_out_g is not None]
-    text = (
-        f"{label}: held-out error {_mg(best)} over {values} values ({turns} held out in turn), "
-        f"the simplest of {len(scored)} candidates; no other is significantly better"
-    )
-    top = min(scored, key=lambda row: row.held_out_g or 0.0)
-    return text if top is best else f"{text}; {_mg(top)} of {top.trial.label}"
-
-
-def _mg(row: Judged) -> str:
-    return f"{(row.held_out_g or 0.0) * 1e3:.3g} mg"

@@ -203,7 +203,7 @@ def _calibration(
         poses=poses,
         route="angles of a table known",
         covariance=covariance,
-        dof=dof,
+        dof=float(dof),
         rms_g=best.fitted_g,
         rms_free_g=math.sqrt(float((best.own_g**2).sum()) / dof),
         held_out_g=best.held_out_g,

@@ -143,6 +143,12 @@ class Passport:
         recording = self.delivery.calibration.recording
         return recording is None or recording.checked
 
+    @property
+    def tested(self) -> bool:
+        """Whether readings that the fit did not use could contradict it."""
+        recording = self.delivery.calibration.recording
+        return self.checked and (recording is None or recording.tested)
+
 
 def passport(delivery: Delivery, tools: Mapping[str, Any]) -> Passport:
     """Passport of a delivery; `tools` is the section of that name in verification.json."""

@@ -32,6 +32,7 @@ from triaxcal.report.words.numbers import (
     superscript,
     with_uncertainty,
 )
+from triaxcal.report.words.shares import ShareRow, share_rows
 from triaxcal.uncertainty.budget import Budget, Line
 
 _NEGLIGIBLE = 1e-9
@@ -67,6 +68,7 @@ def passport_html(p: Passport) -> bytes:
             _budget(p.component_budget, "A component", p.component_orientation),
             _budget(p.length_budget, "The length |a|", p.length_orientation),
         ],
+        "shares": [_share(s) for s in share_rows(p.delivery.calibration)],
         "candidates": _candidates(p),
         "selection_reason": p.delivery.calibration.selection_reason,
         "verification": _verification(p),
@@ -106,7 +108,7 @@ def _left_out(calibration: Calibration) -> list[tuple[str, str]]:
     if calibration.recording is None:
         return []
     rms = calibration.recording.left_out_length_g
-    words = "none: the fit needs every pose" if rms is None else f"|a| − g {g_in_words(rms)} rms"
+    words = "none: not tested" if rms is None else f"|a| − g {g_in_words(rms)} rms"
     return [("Held-out poses", words)]
 
 
@@ -166,6 +168,17 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def _share(row: ShareRow) -> dict[str, str]:
+    return {
+        "name": row.name,
+        "value": signed(row.value),
+        "sd": row.sd,
+        "prior_sd": row.prior_sd,
+        "data": row.data,
+        "prior": row.prior,
+    }
 
 
 def _largest(result: MethodResult) -> str:

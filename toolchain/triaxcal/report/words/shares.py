@@ -1,0 +1,63 @@
+"""How much poses and priors determine each constant, in short rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.recorded import ConstantShare
+
+_OWN_SQUARES = ("Qx.xx", "Qy.yy", "Qz.zz")
+
+
+@dataclass(frozen=True)
+class ShareRow:
+    """One row, in words."""
+
+    name: str
+    value: str
+    sd: str
+    prior_sd: str
+    data: str
+    prior: str
+
+
+def share_rows(calibration: Calibration) -> tuple[ShareRow, ...]:
+    """Scale factors, cross terms, biases and own squares; the other products in one row."""
+    recording = calibration.recording
+    if recording is None or not recording.shares:
+        return ()
+    products = [s for s in recording.shares if s.name[0] == "Q" and s.name not in _OWN_SQUARES]
+    rows = [_row(s) for s in recording.shares if s not in products]
+    if products:
+        worst, best = (pick(s.data for s in products) for pick in (min, max))
+        rows.append(
+            ShareRow(
+                f"{len(products)} other products",
+                f"up to {max(abs(s.value) for s in products) * 1e3:.2g} mg/g^2",
+                f"{max(s.sd for s in products) * 1e3:.2g} mg/g^2",
+                f"{max(s.prior_sd for s in products) * 1e3:.2g} mg/g^2",
+                f"{worst:.0%} to {best:.0%}",
+                f"{1.0 - best:.0%} to {1.0 - worst:.0%}",
+            )
+        )
+    return tuple(rows)
+
+
+def _row(share: ConstantShare) -> ShareRow:
+    scale, unit = (1e3, "mg/g^2") if share.name[0] == "Q" else (1.0, share.unit)
+    value, sd, prior_sd = (scale * v for v in (share.value, share.sd, share.prior_sd))
+    return ShareRow(
+        share.name,
+        f"{value:+.6g} {unit}",
+        f"{sd:.2g}",
+        f"{prior_sd:.2g}",
+        _percent(share.data),
+        _percent(1.0 - share.data),
+    )
+
+
+def _percent(share: float) -> str:
+    if 0.0 < share < 0.001:
+        return "< 0.1%"
+    return "> 99.9%" if 0.999 < share < 1.0 else f"{share:.1%}"
