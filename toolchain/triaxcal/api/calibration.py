@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +28,8 @@ from triaxcal.uncertainty.orientation import QUANTITIES
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from triaxcal.diagnosis import Diagnosis as Causes
+
 
 @dataclass(frozen=True, repr=False)
 class Diagnosis:
@@ -46,6 +48,20 @@ class Diagnosis:
     findings: tuple[str, ...]
     candidates: tuple[Candidate, ...]
     reason: str
+    _fitted: Fitted = field(compare=False)
+
+    @cached_property
+    def causes(self) -> Causes | None:
+        """Physical causes that could explain the readings, ranked as `diagnose` does.
+
+        None for a recording.
+        """
+        from triaxcal.diagnosis import diagnose  # noqa: PLC0415
+
+        done = self._fitted
+        if done.unit.recording is not None:
+            return None
+        return diagnose(done.unit, done.measurements)
 
     def __str__(self) -> str:
         return "\n".join([*self.findings, self.reason])
@@ -208,7 +224,7 @@ class Calibration(InTheField):
     def diagnosis(self) -> Diagnosis:
         """Findings about the readings, and the candidates of the fit."""
         found = self.fitted.calibration
-        return Diagnosis(found.findings, found.candidates, found.selection_reason)
+        return Diagnosis(found.findings, found.candidates, found.selection_reason, self.fitted)
 
     def plot(self) -> Figure:
         """Constants over temperature, their uncertainty, and the residuals at the dwells.

@@ -19,6 +19,7 @@ _EQUIVALENT = 0.5
 """Difference of log likelihood below which readings cannot tell two causes at all."""
 _FAR_BEHIND = 12.0
 """Log evidence behind the best, beyond which no dwell is asked for to tell a second cause."""
+_FEW = 3
 _SHOWN = 6
 """Amplitudes that are shown of a cause; more are those of a curve."""
 
@@ -80,7 +81,17 @@ class Suspect:
     @property
     def name(self) -> str:
         """Label and place."""
-        return f"{self.label}, {self.place}" if self.place else self.label
+        if not self.place:
+            return self.label
+        comma = "" if self.place.startswith("about ") else ","
+        return f"{self.label}{comma} {self.place}"
+
+    @property
+    def size(self) -> str:
+        """Its amplitudes in words, where there are few; "" of a cause without or with many."""
+        if not 0 < len(self.amplitudes) <= _FEW:
+            return ""
+        return f" ({', '.join(str(a) for a in self.amplitudes)})"
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,7 +127,7 @@ class Diagnosis:
         if not self.answer:
             return "no cause is more probable than a sound unit"
         best = self.answer[0]
-        text = f"most probably {best.name}: {best.change}, {best.remaining}"
+        text = f"most probably {best.name}{best.size}: {best.change}, {best.remaining}"
         others = [s.name for s in self.answer[1:]]
         if others:
             text += f"; the readings cannot tell it from {' or '.join(others)}"
@@ -130,7 +141,7 @@ class Diagnosis:
         head = ("ln odds", "held out", "in checks", "cause, and what undoing it means")
         cells = [(f"{odds:.1f}", left.held_out, left.checks, text) for odds, left, text in rows]
         lines = [*table(head, cells, left=(3,)), "", self.sentence]
-        if self.answer:
+        if self.answer and not self.answer[0].size:
             lines += [f"  {a}" for a in self.answer[0].amplitudes[:_SHOWN]]
         if self.request is not None:
             lines.append(self.request.between(self.suspects[0].name, self.suspects[1].name))

@@ -27,6 +27,8 @@ _FAR = 80.0
 """Log evidence behind the best beyond which a cause is not judged with care."""
 _HOPELESS = -9.5
 """Quick log evidence against a sound unit below which a cause is not judged with care."""
+_ODD = 8
+"""Dwells of which one may be wrong: the others stand out less."""
 _SEVERAL = 6
 """Dwells that may be wrong at once."""
 _BEHIND = 10.0
@@ -67,7 +69,9 @@ def rank(
     # What the sound unit takes for noise, tilts and curvature may be the mistake.
     curved = replace(Scales(), curvature=max(sound.scales.curvature, 3.0))
     screen = Screen(sound.system, (sound.scales, Scales(), curved))
-    known = Known(readings, sound.fit.theta, screen.standing_out(_SEVERAL), *nominal)
+    known = Known(
+        readings, sound.fit.theta, screen.odd_dwells(_ODD), screen.standing_out(_SEVERAL), *nominal
+    )
     screened = [(cause, _screened(cause, known, screen)) for cause in CAUSES]
     screened = [item for item in screened if item[1]]
     screened.sort(key=lambda item: -item[1][0].log_evidence)

@@ -14,7 +14,8 @@ from triaxcal.model.types import FloatArray
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     readings = known.readings
-    for k, row in enumerate(readings.rows):
+    for k in known.odd_dwells:
+        row = readings.rows[k]
         place = f"{readings.positions[k]} at {readings.temps_degc[k]:.4g} degC (row {row})"
         outputs = range(3) if readings.test[k] else [int(np.abs(readings.force[k]).argmax())]
         for i in outputs:

@@ -21,8 +21,8 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     if turn is None or np.linalg.det(turn) < 0.0:
         return
     degrees, axis = angle_and_axis(turn)
-    if degrees < LEAST_DEG:
-        return
+    if degrees < LEAST_DEG or np.abs(np.diag(turn)).min() > np.cos(np.radians(LEAST_DEG)):
+        return  # nearly none, or half a turn about an axis
     words = ", ".join(f"{v:+.2f}" for v in axis)
     yield Hypothesis(
         f"{degrees:.3g} deg about ({words})",

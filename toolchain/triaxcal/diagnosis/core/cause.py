@@ -122,6 +122,8 @@ class Known:
     readings : Readings
     theta : array
         Constants of the first fit.
+    odd_dwells : tuple of int
+        Dwells that stand out most, one by one.
     standing_out : tuple of (dwell, output)
         What stands out most, then what does when that is left out, and so on.
     sensitivity_v_per_g : array, shape (3,), or None
@@ -132,6 +134,7 @@ class Known:
 
     readings: Readings
     theta: FloatArray
+    odd_dwells: tuple[int, ...] = ()
     standing_out: tuple[tuple[int, int], ...] = ()
     sensitivity_v_per_g: FloatArray | None = None
     tolerance: float = 0.1

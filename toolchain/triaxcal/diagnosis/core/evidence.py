@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -222,24 +223,43 @@ class Screen:
 
     def standing_out(self, most: int) -> tuple[tuple[int, int], ...]:
         """Dwell and output that stand out most, then most when that is left out, and so on."""
-        _, root, projector, rest = self._parts[min(1, len(self._parts) - 1)]
-        inner = projector * root
-        Q, b = np.diag(root**2) - inner.T @ inner, root * rest
-        rows = self.system.rows
+        Q, b = self._information
         found: list[tuple[int, int]] = []
         for _ in range(most):
-            diagonal = np.maximum(np.diag(Q), 1e-12)
-            gain = np.where(self.system.used & (np.diag(Q) > 1e-6 * root**2), b**2 / diagonal, 0.0)
+            gain = self._gain(Q, b)
             r = int(gain.argmax())
             if gain[r] < _STANDS_OUT:
                 break
-            dwell, output = int(rows.dwell[r]), int(rows.output[r])
-            if output < 0:
-                output = int(np.abs(self.readings.force[dwell]).argmax())
-            found.append((dwell, output))
+            found.append(self._place(r))
             b = b - Q[:, r] * b[r] / Q[r, r]
             Q = Q - np.outer(Q[:, r], Q[r]) / Q[r, r]
         return tuple(found)
+
+    def odd_dwells(self, most: int) -> tuple[int, ...]:
+        """The dwells that stand out most, each compared with all others."""
+        order = np.argsort(-self._gain(*self._information))
+        dwells = dict.fromkeys(self._place(int(r))[0] for r in order[: 3 * most])
+        return tuple(dwells)[:most]
+
+    @cached_property
+    def _information(self) -> tuple[FloatArray, FloatArray]:
+        """Of a shift of each row: inverse variance, shape (n, n), and that times the shift."""
+        _, root, projector, rest = self._parts[min(1, len(self._parts) - 1)]
+        inner = projector * root
+        return np.diag(root**2) - inner.T @ inner, root * rest
+
+    def _gain(self, Q: FloatArray, b: FloatArray) -> FloatArray:
+        """Twice the log likelihood that a shift of each row gains."""
+        diagonal = np.diag(Q)
+        known = self.system.used & (diagonal > 1e-6 * np.diag(self._information[0]))
+        return np.where(known, b**2 / np.maximum(diagonal, 1e-12), 0.0)
+
+    def _place(self, row: int) -> tuple[int, int]:
+        """Dwell and output of a row; of a check dwell the output that feels most of the force."""
+        dwell, output = int(self.system.rows.dwell[row]), int(self.system.rows.output[row])
+        if output < 0:
+            output = int(np.abs(self.readings.force[dwell]).argmax())
+        return dwell, output
 
     def _additive(self, hypothesis: Hypothesis) -> list[float]:
         """Evidence of one whose amplitudes are taken as small, at each setting."""

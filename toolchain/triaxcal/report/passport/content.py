@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 
 from triaxcal.codegen.tryout import Residual
-from triaxcal.delivery.judgement import LimitCheck, held_out_checks, verdict_words
+from triaxcal.delivery.judgement import LimitCheck, held_out_checks, residual_checks, verdict_words
 from triaxcal.delivery.unit import Delivery
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import LENGTH, Uncertainty, uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
 from triaxcal.unit.thermal import near_t0
+
+_DOUBT = 0.5
+"""Of a limit: beyond it the passport says what would explain the readings."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,20 @@ class Passport:
     def held_out(self) -> tuple[LimitCheck, ...]:
         """Both limits against what was held out; none for a recording."""
         return held_out_checks(self.delivery)
+
+    @cached_property
+    def cause(self) -> str:
+        """What would explain the readings, where a dwell is beyond half of its limit; else ""."""
+        done = self.delivery
+        tested = (*residual_checks(done), *held_out_checks(done))
+        if done.calibration.recording is not None or not any(
+            t.largest_g > _DOUBT * t.limit_g for t in tested
+        ):
+            return ""
+        from triaxcal.diagnosis import diagnose  # noqa: PLC0415
+
+        found = diagnose(done.unit, done.measurements)
+        return found.sentence if found.doubtful else ""
 
     @property
     def checked(self) -> bool:

@@ -74,7 +74,7 @@ def passport_json(p: Passport) -> bytes:
             "constants_expanded_uncertainty": u.constants_u.tolist(),
             "acceleration_expanded_uncertainty_g": u.worst_over_temperature.tolist(),
         },
-        "warnings": list(u.warnings),
+        "warnings": [*u.warnings, *filter(None, [p.cause])],
         "files_sha256": {n: hashlib.sha256(c).hexdigest() for n, c in d.files.items()},
         "tools": dict(p.tools),
     }

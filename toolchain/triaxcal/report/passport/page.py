@@ -114,7 +114,7 @@ def _left_out(calibration: Calibration) -> list[tuple[str, str]]:
 
 def _findings(p: Passport) -> tuple[str, ...]:
     """What was found in the readings, for the top of the page."""
-    found = p.delivery.calibration.findings
+    found = [*p.delivery.calibration.findings, *filter(None, [p.cause])]
     return tuple(signed(f[0].upper() + f[1:].replace("degC", "°C")) for f in found)
 
 
