@@ -118,3 +118,18 @@ def test_the_other_mounting_gives_kio() -> None:
         pair.take(*ROWS[0], 0.0, 1.0)
     assert pair.rows == ()
     assert pair.undo() is None
+
+
+def test_standard_deviations_in_a_file_come_in_pairs_above_0(tmp_path: Path) -> None:
+    file = tmp_path / "pair.csv"
+
+    def told(head: str, more: str) -> str:
+        rows = [",".join(line.split()) + more for line in LINES]
+        file.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+        with pytest.raises(triaxcal.RefusedError) as refusal:
+            triaxcal.cross_coupling(file)
+        return str(refusal.value)
+
+    assert "column sd_a_g: the standard deviation of one" in told("theta_deg,a_g,b_g,sd_a_g", ",1")
+    head = "theta_deg,a_g,b_g,sd_a_g,sd_b_g"
+    assert "column sd_b_g: 0; expected a number above 0" in told(head, ",1e-7,0")

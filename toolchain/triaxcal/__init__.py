@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from triaxcal.api.series import SeriesResult, calibrate_series
     from triaxcal.api.studies import (
         MeasurementPlan,
-        Study,
         compare_history,
         find_poses,
         plan_measurements,
@@ -46,6 +45,7 @@ if TYPE_CHECKING:
         simulate_series,
         study_drift,
     )
+    from triaxcal.api.study import Study
     from triaxcal.api.table import TableGrid, study_angle_errors
     from triaxcal.api.unit import Unit, read_unit
     from triaxcal.api.verification import Verification, verify_unit
@@ -81,9 +81,10 @@ _MODULES = {
     "triaxcal.api.pair": ("LivePair", "cross_coupling"),
     "triaxcal.api.series": ("SeriesResult", "calibrate_series"),
     "triaxcal.api.studies": (
-        "MeasurementPlan", "Study", "compare_history", "find_poses",
+        "MeasurementPlan", "compare_history", "find_poses",
         "plan_measurements", "plan_motion", "simulate", "simulate_series", "study_drift",
     ),
+    "triaxcal.api.study": ("Study",),
     "triaxcal.api.table": ("TableGrid", "study_angle_errors"),
     "triaxcal.api.unit": ("Unit", "read_unit"),
     "triaxcal.api.verification": ("Verification", "verify_unit"),

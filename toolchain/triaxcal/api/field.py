@@ -17,7 +17,7 @@ from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 if TYPE_CHECKING:
-    from triaxcal.api.studies import Study
+    from triaxcal.api.study import Study
     from triaxcal.fitting.field.poses import FieldPoses
     from triaxcal.uncertainty.check import FieldCheck
     from triaxcal.uncertainty.updated import FieldUpdate
@@ -60,7 +60,7 @@ class InTheField:
             When the recording cannot be read, has no pose within the range or belongs to another
             serial number, or the calibration does not know its uncertainty.
         """
-        from triaxcal.api.studies import Study  # noqa: PLC0415
+        from triaxcal.api.study import Study  # noqa: PLC0415
         from triaxcal.delivery.check import integer_force_g  # noqa: PLC0415
         from triaxcal.fitting.field.poses import inside_range  # noqa: PLC0415
         from triaxcal.report.check import check_text  # noqa: PLC0415
@@ -106,7 +106,7 @@ class InTheField:
         RefusedError
             As `check`; when the poses contradict the calibration, or lower no uncertainty.
         """
-        from triaxcal.api.studies import Study  # noqa: PLC0415
+        from triaxcal.api.study import Study  # noqa: PLC0415
         from triaxcal.report.update import update_text  # noqa: PLC0415
 
         done, drift = self.fitted, (bias_drift_mg, scale_drift_ppm, axes_drift_micro_rad)

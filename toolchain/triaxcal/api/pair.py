@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from triaxcal.api.studies import Study
+from triaxcal.api.study import Study
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.pair.checks import odd_reading
 from triaxcal.fitting.pair.cross_coupling import PairFit, fit_pair

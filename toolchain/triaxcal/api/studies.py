@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, TypeVar
 
+from triaxcal.api.study import Study
 from triaxcal.api.unit import Unit
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
@@ -26,37 +26,6 @@ from triaxcal.simulation.series import write_series
 from triaxcal.simulation.unit import write_simulated_unit
 from triaxcal.uncertainty.history import Change, changes, repeatability
 from triaxcal.unit.recording import RecordingLayout
-
-T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Study(Generic[T]):
-    """A result, with its text and picture.
-
-    Attributes
-    ----------
-    result : object
-        Its class is that of the function's return type.
-    summary : str
-        The text that the command line prints.
-    """
-
-    result: T
-    summary: str
-    _draw: Callable[[], bytes] | None = None
-
-    def picture(self) -> bytes:
-        """The picture, as SVG.
-
-        Raises
-        ------
-        RefusedError
-            Where the study has none.
-        """
-        if self._draw is None:
-            raise RefusedError("picture", "this study has no picture")
-        return self._draw()
 
 
 def find_poses(unit: Unit) -> Study[PoseSet]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from triaxcal.api.studies import Study
+from triaxcal.api.study import Study
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.table.anglecurves import AngleErrors, Hysteresis, angle_errors, hysteresis
 from triaxcal.fitting.table.oriented import (

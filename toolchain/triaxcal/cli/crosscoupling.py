@@ -128,6 +128,8 @@ def _numbers(text: str) -> list[float]:
 
 def _typed() -> Iterator[str]:
     with click.open_file("-") as stream:
+        if stream.isatty():
+            click.echo("theta_deg a_g b_g, a line for each position; undo; Ctrl-D ends", err=True)
         yield from stream
 
 

@@ -44,7 +44,15 @@ def read_pair(path: Path) -> PairReadings:
         When the file cannot be read, lacks a column, or holds something else than numbers.
     """
     file = RecordingFile(path, FileLayout("recording", COLUMNS))
-    stated = all(name in file.source.names for name in SD_COLUMNS)
+    there = [name for name in SD_COLUMNS if name in file.source.names]
+    if len(there) == 1:
+        raise RefusedError(
+            f"{path}, column {there[0]}",
+            "the standard deviation of one accelerometer alone",
+            expected=" and ".join(SD_COLUMNS),
+            remedy="add the other column, or remove this one",
+        )
+    stated = bool(there)
     names = (*COLUMNS, *SD_COLUMNS) if stated else COLUMNS
     parts = []
     for block in file.blocks([file.index(name, name) for name in names]):
