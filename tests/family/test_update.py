@@ -138,7 +138,7 @@ def test_a_larger_drift_is_allowed_for_where_it_is_stated(
     path = recorded(tmp_path, directions(6))
     with pytest.raises(RefusedError, match="contradict"):
         cal.update(path, bias_drift_mg=0.05, scale_drift_ppm=50, axes_drift_micro_rad=20)
-    assert cal.update(path, bias_drift_mg=2.0).result.share[7] > 0.9
+    assert cal.update(path, bias_drift_mg=2.0).result.share[7] > 0.8
     with pytest.raises(RefusedError, match="bias_drift_mg: found 0; expected a number above 0"):
         cal.update(path, bias_drift_mg=0)
 

@@ -108,7 +108,7 @@ def update_by_poses(
         share=share,
         chi_square=found.chi_square,
         error_before_g=new.error_g,
-        error_after_g=state.length(posterior.theta, poses)[0] - gravity_g,
+        error_after_g=state.length(state.delivered(posterior.theta), poses)[0] - gravity_g,
     )
     record = Update(
         source.parents,

@@ -70,7 +70,8 @@ def updated_calibration(
     state, posterior = solved
     old, P = made.calibration, state.functions
     theta, covariance = posterior.theta, posterior.spread_covariance
-    constants, Q = state.curves(theta), state.quadratic(theta)
+    constants = state.curves(theta)
+    Q = None if old.terms.quadratic_per_g is None else state.quadratic(theta)
     full = covariance[: 12 * P, : 12 * P].reshape(12, P, 12, P)
     thermal, t0 = old.shape.model(constants), old.thermal.t0_degc
     basis = old.shape.basis(t0)

@@ -63,7 +63,8 @@ class State:
     ----------
     calibration : Calibration
     theta : array, shape (12 P,) or (12 P + 18,)
-        With Q row by row where the poses of the calibration determined it.
+        With Q row by row where its covariance is known. A calibration that leaves Q out has it
+        at 0: it is uncertain, and correlated with the constants, all the same.
     """
 
     calibration: Calibration
@@ -82,6 +83,14 @@ class State:
         """Q, shape (3, 6), or None."""
         rest = theta[12 * self.functions :]
         return rest.reshape(3, 6) if len(rest) else self.calibration.terms.quadratic_per_g
+
+    def delivered(self, theta: FloatArray) -> FloatArray:
+        """Theta as the C computes it: without Q where the calibration had none."""
+        if self.calibration.terms.quadratic_per_g is not None:
+            return theta
+        result = theta.copy()
+        result[12 * self.functions :] = 0.0
+        return result
 
     def length(self, theta: FloatArray, poses: FieldPoses) -> tuple[FloatArray, FloatArray]:
         """|a| at poses, (n,), in g, and its derivative by theta, (n, parameters)."""
@@ -110,7 +119,7 @@ def state_of(calibration: Calibration) -> State:
     curves = np.linalg.lstsq(shape.basis(temps), values, rcond=None)[0].T
     recording, Q = calibration.recording, calibration.terms.quadratic_per_g
     known = recording is not None and recording.terms.quadratic is not None
-    rest = Q.ravel() if known and Q is not None else np.zeros(0)
+    rest = np.zeros(18 if known else 0) if Q is None or not known else Q.ravel()
     return State(calibration, np.concatenate([curves.ravel(), rest]))
 
 
