@@ -15,6 +15,7 @@ from pathlib import Path
 import click
 
 from triaxcal.cli.main import SECTIONS, main
+from triaxcal.diagnosis.causes.registry import CAUSES
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.reference import reference_markdown
@@ -91,6 +92,11 @@ def _named(entries: Iterable[object]) -> str:
     return _table(("name", "in reports", "what it is"), rows)
 
 
+def _causes() -> str:
+    rows = ((e.label, e.doc, e.apart) for e in CAUSES)
+    return _table(("cause", "what it is", "what would tell it from what looks the same"), rows)
+
+
 TABLES: dict[str, Callable[..., str]] = {
     "keys": _keys,
     "formats": _formats,
@@ -99,6 +105,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "functions": lambda: _named(THERMAL_FUNCTIONS),
     "sources": _sources,
     "commands": _commands,
+    "causes": _causes,
 }
 
 

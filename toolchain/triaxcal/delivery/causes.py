@@ -30,7 +30,7 @@ def with_cause(
 
     try:
         found = diagnose(unit, measurements)
-    except np.linalg.LinAlgError:
+    except (RefusedError, np.linalg.LinAlgError):
         return refusal
     if not found.doubtful:
         return refusal

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.base.screentext import table
 from triaxcal.diagnosis.core.evidence import Judged
 from triaxcal.diagnosis.core.readings import Readings, readings_of
 from triaxcal.diagnosis.nextdwell import Request, next_dwell
 from triaxcal.diagnosis.ranking import Ranked, rank
 from triaxcal.diagnosis.remaining import Remaining, remaining
+from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.description import UnitDescription
 
@@ -155,7 +157,20 @@ def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
 
     Every cause is a small model with its own parameters; they compete by their evidence, in which
     each pays for its parameters and for the number of its places.
+
+    Raises
+    ------
+    RefusedError
+        When a test position is missing altogether.
     """
+    missing = [p for p in TEST_POSITIONS if p not in {d.position for d in measurements.dwells}]
+    if missing:
+        raise RefusedError(
+            measurements.source,
+            f"no dwell in {', '.join(missing)}",
+            expected="TP1 to TP6",
+            remedy="measure what is missing",
+        )
     readings = readings_of(unit, measurements)
     sound, ranked = rank(readings)
     base = sound.fit.log_evidence
