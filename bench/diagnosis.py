@@ -11,6 +11,7 @@ import sys
 import time
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,9 @@ def cell(fault: str, size: str, temps: int, checks: bool, units: int) -> str:
     started = time.process_time()
     for seed in range(units):
         size_g = float(np.exp(np.random.default_rng(seed).uniform(np.log(low), np.log(high))))
-        more = HARSH if fault == "none" else {}
+        more: dict[str, Any] = dict(HARSH) if fault == "none" else {}
+        if fault == "gain":
+            more["more"] = "[sensor]\nnominal_v_per_g = [0.5, 0.5, 0.5]\nnominal_tolerance = 0.05\n"
         unit, measurements, _ = simulated(fault, size_g, seed, temps, checks=checks, **more)
         answer = [s.cause for s in diagnose(unit, measurements).answer] or ["none"]
         true = CAUSE_OF.get(fault, "unknown")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.screentext import table
 from triaxcal.diagnosis.core.evidence import Judged
@@ -19,6 +21,8 @@ MARGIN = 3.0
 """Log evidence within which causes are one answer: odds of 20 to 1."""
 _EQUIVALENT = 0.5
 """Difference of log likelihood below which readings cannot tell two causes at all."""
+_PLACES = 8.0
+"""Log evidence that numbers of places can differ by."""
 _FAR_BEHIND = 12.0
 """Log evidence behind the best, beyond which no dwell is asked for to tell a second cause."""
 _FEW = 3
@@ -172,7 +176,8 @@ def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
             remedy="measure what is missing",
         )
     readings = readings_of(unit, measurements)
-    sound, ranked = rank(readings)
+    nominal = None if unit.nominal_v_per_g is None else np.array(unit.nominal_v_per_g)
+    sound, ranked = rank(readings, (nominal, unit.nominal_tolerance))
     base = sound.fit.log_evidence
     suspects = [_suspect(r, j, readings, base) for r in ranked for j in r.places]
     suspects.sort(key=lambda s: -s.log_evidence)
@@ -192,7 +197,9 @@ def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
 
 
 def _equivalent(one: Judged, other: Judged) -> bool:
-    return abs(one.log_likelihood - other.log_likelihood) < _EQUIVALENT
+    """Whether only the number of places and the like differ between two."""
+    near = abs(one.log_evidence - other.log_evidence) < _PLACES
+    return near and abs(one.log_likelihood - other.log_likelihood) < _EQUIVALENT
 
 
 def _shown(suspects: list[Suspect]) -> tuple[Suspect, ...]:

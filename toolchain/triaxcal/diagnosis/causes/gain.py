@@ -10,7 +10,8 @@ from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, unchanged
 from triaxcal.model.positions import AXES
 
 _FACTORS = (0.25, 0.5, 2.0, 4.0, 1e-3, 1e3)
-_LARGEST = 40.0
+_LARGEST = 13.0
+"""Log odds that one output's sensitivity can give: a data sheet may be of another type."""
 
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
@@ -22,18 +23,17 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
         shifted = off - np.log(factor) / known.tolerance
         for outputs in ((0, 1, 2), (0,), (1,), (2,)):
             some = list(outputs)
-            gained = 0.5 * float(np.sum(off[some] ** 2 - shifted[some] ** 2))
+            each = 0.5 * (off[some] ** 2 - shifted[some] ** 2)
+            gained = float(np.minimum(each, _LARGEST).sum())
             if gained < 0.0:
                 continue
             names = "all outputs" if len(some) == 3 else f"output {AXES[some[0]]}"
             yield Hypothesis(
                 f"{names}, {factor:g} times the nominal sensitivity",
                 unchanged,
-                change=f"with a full scale of 1/{factor:g}"
-                if factor > 1
-                else f"with a full scale of {1 / factor:g} times",
+                change=f"with a full scale {1 / factor:g} times the stated one",
                 places=4.0 * len(_FACTORS),
-                log_prior=min(gained, _LARGEST),
+                log_prior=gained,
             )
 
 
