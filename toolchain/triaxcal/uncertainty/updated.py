@@ -134,8 +134,8 @@ def _recording(
     dof: int,
 ) -> RecordingFit:
     state, posterior = solved
-    old, singular = made.calibration.recording, posterior.at.singular
-    held_out, _ = found.left_out
+    singular = posterior.at.singular
+    held_out, expected = found.left_out
     findings = [*made.poses.findings]
     if made.unseen:
         findings.append(
@@ -152,10 +152,12 @@ def _recording(
         dof=min(dof, 10**6) + len(made.poses),
         rms_g=float(np.sqrt(np.mean(made.error_after_g**2))),
         rms_free_g=float(np.sqrt(np.mean(own_sd_g**2))),
-        held_out_g=None if old is None else old.held_out_g,
+        held_out_g=float(np.sqrt(np.mean(held_out**2))),
         left_out_length_g=float(np.sqrt(np.mean(held_out**2))),
         condition=math.sqrt((1.0 + high**2) / (1.0 + low**2)),
         weakest=", ".join(made.unseen),
         residual_g=made.error_after_g,
         findings=tuple(findings),
+        expected_g=float(np.sqrt(np.mean(expected**2))),
+        held_out_poses=len(made.poses),
     )
