@@ -91,15 +91,20 @@ def _judged(trial: TableTrial, poses: TablePoses) -> TableRow | None:
 def _against_the_rest(
     trial: TableTrial, poses: TablePoses, found: list[WrongRow]
 ) -> list[WrongRow]:
-    """The wrong rows with their errors in the fit of those that are right."""
-    if len(found) < 2:
-        return found
+    """The wrong rows with their errors in a fit of those that are right.
+
+    What a candidate with priors says of a row held out is of first order, and a gross row is not.
+    """
     kept = np.ones(len(poses.readings), dtype=np.bool_)
     kept[[row.pose for row in found]] = False
+    dof = 3 * int(kept.sum()) - trial.parameters
+    if not found or dof < 1:
+        return found
     fit = trial.fit(poses.select(kept))
     error = fit.force_g(poses) - poses.force
-    others = found[-1].others_g
-    rows = [WrongRow(row.pose, (), error[row.pose], others) for row in found]
+    others = float(np.sqrt((error[kept] ** 2).sum() / dof))
+    alone = len(found) == 1
+    rows = [WrongRow(r.pose, r.rivals if alone else (), error[r.pose], others) for r in found]
     return sorted(rows, key=lambda row: -float(np.linalg.norm(row.error_g)))
 
 
