@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     )
     from triaxcal.api.imufirmware import ImuFirmware, firmware_imu
     from triaxcal.api.pair import LivePair, cross_coupling
-    from triaxcal.api.series import SeriesResult, calibrate_series
+    from triaxcal.api.series import SeriesResult, calibrate_series, learn_priors
     from triaxcal.api.studies import (
         MeasurementPlan,
         compare_history,
@@ -63,9 +63,9 @@ __all__ = [
     "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "SeriesResult", "Study",
     "TableGrid", "Unit", "UsageError", "Verdict", "Verification", "__version__", "calibrate_series",
     "compare_history", "cross_coupling", "deliver", "diagnose", "find_poses", "firmware",
-    "firmware_imu", "fit", "fit_imu", "key_schema", "load", "load_imu", "plan_measurements",
-    "plan_motion", "read_imu", "read_unit", "simulate", "simulate_series", "study_angle_errors",
-    "study_drift", "update", "verify_unit", "write_first_file",
+    "firmware_imu", "fit", "fit_imu", "key_schema", "learn_priors", "load", "load_imu",
+    "plan_measurements", "plan_motion", "read_imu", "read_unit", "simulate", "simulate_series",
+    "study_angle_errors", "study_drift", "update", "verify_unit", "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
@@ -79,7 +79,7 @@ _MODULES = {
     ),
     "triaxcal.api.imufirmware": ("ImuFirmware", "firmware_imu"),
     "triaxcal.api.pair": ("LivePair", "cross_coupling"),
-    "triaxcal.api.series": ("SeriesResult", "calibrate_series"),
+    "triaxcal.api.series": ("SeriesResult", "calibrate_series", "learn_priors"),
     "triaxcal.api.studies": (
         "MeasurementPlan", "compare_history", "find_poses",
         "plan_measurements", "plan_motion", "simulate", "simulate_series", "study_drift",

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import renew
@@ -20,6 +21,10 @@ from triaxcal.report.files import SOMETIMES
 from triaxcal.report.series.page import PAGE_FILE, series_files
 from triaxcal.report.series.summary import series_summary
 from triaxcal.report.series.unit import make_unit
+from triaxcal.unit.description import read_unit
+
+if TYPE_CHECKING:
+    from triaxcal.fitting.recorded.learned import LearnedPriors
 
 
 @dataclass(frozen=True)
@@ -90,6 +95,51 @@ def calibrate_series(
     page = target / PAGE_FILE
     text = series_summary(series, len(work.done), seconds, width, str(page))
     return SeriesResult(page, dict(series.refused), work.total, text)
+
+
+def learn_priors(
+    units: Sequence[str | Path], *, skipped: Callable[[str, str], None] = lambda *_: None
+) -> LearnedPriors:
+    """Scales of cross terms, scale factors and squares of a type of sensor, from a series of it.
+
+    Parameters
+    ----------
+    units : paths
+        Folders of units with recordings of poses.
+    skipped : callable
+        Called with the folder and the reason where a unit is not used.
+
+    Returns
+    -------
+    LearnedPriors
+        `toml` is the section [priors] for unit.toml.
+
+    Raises
+    ------
+    RefusedError
+        When fewer than two units can be used.
+    """
+    from triaxcal.fitting.recorded.learned import UnitPoses, learn  # noqa: PLC0415
+
+    found = []
+    for path in sorted(dict.fromkeys(map(Path, units))):
+        try:
+            unit = read_unit(path)
+            layout = unit.recording
+            if layout is None or layout.faces or layout.angles is not None:
+                skipped(str(path), "no recording of poses of which only |a| = g is known")
+                continue
+            found.append(UnitPoses.of(unit, layout, path))
+        except RefusedError as refusal:
+            skipped(str(path), str(refusal))
+    if len(found) < 2:
+        raise RefusedError(
+            "learn_priors",
+            f"{len(found)} unit{'s' * (len(found) != 1)} with usable poses",
+            expected="two and more of one type of sensor",
+            remedy="name the folders of a series",
+        )
+    return learn(found)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+import triaxcal
 from triaxcal import SeriesResult, calibrate_series
 from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Outcome
@@ -25,7 +26,9 @@ from triaxcal.cli.options import UnitFolder, build_option, command, example, say
 
 @command(
     epilog=example(
-        "triaxcal batch units/* --build build/spring", "triaxcal batch AT-SIM AT-CHERNIAK"
+        "triaxcal batch units/* --build build/spring",
+        "triaxcal batch AT-SIM AT-CHERNIAK",
+        "triaxcal batch units/* --learn-priors",
     )
 )
 @click.argument("units", nargs=-1, required=True, type=UnitFolder(files=True))
@@ -36,11 +39,30 @@ from triaxcal.cli.options import UnitFolder, build_option, command, example, say
     help="Number of processes; one for each core by default.",
 )
 @click.option("--scheduler", help="Address of a Dask scheduler, as tcp://host:8786.")
-def batch(units: tuple[Path, ...], build: Path, jobs: int | None, scheduler: str | None) -> None:
+@click.option(
+    "--learn-priors",
+    is_flag=True,
+    help="Print the [priors] that recordings of poses of one type of sensor show; calibrate none.",
+)
+def batch(
+    units: tuple[Path, ...],
+    build: Path,
+    jobs: int | None,
+    scheduler: str | None,
+    *,
+    learn_priors: bool,
+) -> None:
     """Calibrate many units; unchanged ones are not repeated.
 
     UNITS are the folders of the units, as units/*. The series gets a page of its own.
     """
+    if learn_priors:
+        found = triaxcal.learn_priors(
+            units,
+            skipped=lambda path, why: click.echo(f"{path}: {why}; skipped", err=True),
+        )
+        say(found.toml)
+        return
     if scheduler is not None and jobs is not None:
         raise click.UsageError("--jobs is for this machine; a cluster has its own workers")
     work = plan_work(units, build)

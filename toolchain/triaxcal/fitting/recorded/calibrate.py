@@ -19,8 +19,8 @@ from triaxcal.fitting.recorded.checks import (
     refuse_wrong_unit,
 )
 from triaxcal.fitting.recorded.made import Made
-from triaxcal.fitting.recorded.magnitude import fit_with_prior
-from triaxcal.fitting.recorded.prior import LINEAR, Known, reading_of_zero
+from triaxcal.fitting.recorded.magnitude import ScalarFit, fit_with_prior
+from triaxcal.fitting.recorded.prior import FULL, LINEAR, Known, reading_of_zero
 from triaxcal.fitting.recorded.rate import half_cycle_turns, pose_rates
 from triaxcal.fitting.recorded.scalar import (
     MODELS,
@@ -115,15 +115,8 @@ def calibrate_poses(
         carry what unit.toml asks for.
     """
     poses = find_poses(samples, layout)
-    found = _prepared(unit, layout, samples, poses)
-    halves = half_cycle_turns(found.temps)
-    rates = pose_rates(samples, poses, layout) if halves else None
-    climate = PoseClimate(found.temps, rates, unit.loss)
-    shapes = thermal_shapes(unit, found.temps, found.temperatures)
-    base = Trial(_with(quadratic, LINEAR), shapes[0], 1, known=found.known)
-    turns = _turns(unit, found, climate, base, halves if rates is not None else [])
-    thermal = _thermal_rows(found, climate, shapes, base, turns)
-    best = choose(without_idle_rates(thermal, Turns.values(turns.halves)))
+    found, climate, turns, thermal, best = _linear(unit, layout, samples, poses, quadratic)
+    base = thermal[0].trial
     rows = [best] + [
         judge(replace(best.trial, model=_with(quadratic, model)), found.data, climate, turns.all)
         for model in models_of(unit)[1:]
@@ -149,6 +142,45 @@ def calibrate_poses(
         findings,
     )
     return measurements, made.calibration()
+
+
+def _linear(
+    unit: UnitDescription,
+    layout: RecordingLayout,
+    samples: Samples,
+    poses: PoseSet,
+    quadratic: FloatArray,
+) -> tuple[Prepared, PoseClimate, Turns, list[Judged], Judged]:
+    """The poses made ready, what is held out, and the linear constants by each thermal function.
+
+    The last is the row whose thermal function is taken.
+    """
+    found = _prepared(unit, layout, samples, poses)
+    halves = half_cycle_turns(found.temps)
+    rates = pose_rates(samples, poses, layout) if halves else None
+    climate = PoseClimate(found.temps, rates, unit.loss)
+    shapes = thermal_shapes(unit, found.temps, found.temperatures)
+    base = Trial(_with(quadratic, LINEAR), shapes[0], 1, known=found.known)
+    turns = _turns(unit, found, climate, base, halves if rates is not None else [])
+    thermal = _thermal_rows(found, climate, shapes, base, turns)
+    best = choose(without_idle_rates(thermal, Turns.values(turns.halves)))
+    return found, climate, turns, thermal, best
+
+
+def fit_of_all_terms(
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples
+) -> tuple[Known, ScalarFit]:
+    """What is known beforehand, and the fit with all terms, of a recording of poses.
+
+    Raises
+    ------
+    RefusedError
+        As `calibrate_poses`.
+    """
+    poses = find_poses(samples, layout)
+    found, climate, _, _, best = _linear(unit, layout, samples, poses, np.zeros((3, 6)))
+    row = judge(replace(best.trial, model=FULL), found.data, climate, [])
+    return found.known, row.fit
 
 
 def _prepared(
