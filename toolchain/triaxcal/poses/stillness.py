@@ -30,6 +30,8 @@ from triaxcal.readings.table import TIME
 
 SHORTEST_S = 0.5
 """Shorter moments are part of a turn: a hand that reverses stands still as long."""
+_FEWEST = 10
+"""Samples of a pose: fewer are alike by chance."""
 CONTRAST = 2.5
 """Motion about a pose, of the rms motion in it: about the largest of some hundred normal values."""
 SPREAD = math.radians(3.0)
@@ -82,7 +84,7 @@ def find_stillness(
     cells = Cells(samples, shortest_s)
     shown, runs = Spool(2), []
     for first, search in _chunks(cells, least_motion):
-        needed = math.ceil(shortest_s / (cells.size * samples.step_s))
+        needed = math.ceil(max(shortest_s / samples.step_s, _FEWEST) / cells.size)
         found = search.joined(search.stretches(needed, one_g), needed, one_g)
         settling = math.ceil(_SETTLING_S / (cells.size * samples.step_s))
         trimmed = search.trimmed(found, partial(_guard, needed=needed, settling=settling)) + first
