@@ -19,6 +19,8 @@ from triaxcal.fitting.recorded.faces import face_measurements
 from triaxcal.fitting.recorded.temperatures import temperature_findings
 from triaxcal.fitting.table.calibrate import calibrate_table
 from triaxcal.fitting.tilter.calibrate import calibrate
+from triaxcal.poses.stated import refuse_wrong_unit
+from triaxcal.poses.steps import Steps
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.readings.samples import READING, TEMP, Samples, read_samples
 from triaxcal.unit.adc import Adc
@@ -85,6 +87,9 @@ def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Sample
         bits = fitting[0]
         half = 2 ** (bits - 1)
         return Adc(bits, lsb * half, -half, half - 1)
+    # Readings in another unit than stated need no wider converter.
+    rows = np.concatenate(samples.table.spool.stretches())
+    refuse_wrong_unit(samples.source, samples.cut(rows, READING), layout, Steps.of(samples))
     largest = float(np.abs(extremes).max())
     index = next(
         first + int(np.argmax(size))

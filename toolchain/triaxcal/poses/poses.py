@@ -11,6 +11,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.means import mean_of
 from triaxcal.poses.refusals import no_poses
+from triaxcal.poses.stated import refuse_wrong_unit
 from triaxcal.poses.steady import Steady, reading_of_1_g
 from triaxcal.poses.steps import Steps
 from triaxcal.poses.stillness import SHORTEST_S, Stillness, duration_s, find_stillness
@@ -151,17 +152,26 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     Raises
     ------
     RefusedError
-        When there is none; names the longest still stretch and what to change.
+        When there is none (names the longest still stretch and what to change), and for readings
+        in another unit than stated.
     """
+    steps = Steps.of(samples)
+    found = _found(samples, layout, steps)
+    refuse_wrong_unit(found.source, found.readings, layout, steps)
+    return found
+
+
+def _found(samples: Samples, layout: RecordingLayout, steps: Steps) -> PoseSet:
     if layout.rows == POSES:
         return PoseSet(samples.source, _row_poses(samples), (), None, samples.findings)
     if layout.rows == SECTIONS or layout.faces:
-        return _section_poses(samples, layout)
-    one_g, steps = reading_of_1_g(samples, layout), Steps.of(samples)
+        return _section_poses(samples, layout, steps)
+    one_g = reading_of_1_g(samples, layout)
     shortest_s = min(layout.still_s, SHORTEST_S)
     stillness = find_stillness(samples, shortest_s, one_g, steps.motion)
-    steady = Steady(samples, layout, one_g)
     candidates = [_pose(samples, run, n, one_g) for n, run in enumerate(stillness.runs, start=1)]
+    coarse = steps.coarse(np.array([_scatter(p) for p in candidates]).reshape(-1, 3))
+    steady = Steady(samples, layout, one_g, coarse)
     poses, refused = _sorted_out(
         (pose, steady.reason(run, _scatter(pose)))
         for pose, run in zip(candidates, stillness.runs, strict=True)
@@ -218,7 +228,7 @@ def _sections(samples: Samples, layout: RecordingLayout) -> Iterator[tuple[Pose,
     Without a label it is what lies between poses; with `faces` only their labels count.
     """
     one_g = reading_of_1_g(samples, layout)
-    steady = Steady(samples, layout, one_g)
+    steady = Steady(samples, layout, one_g, np.zeros(3, dtype=np.bool_))
     number = 0
     for run in samples.runs():
         label = samples.label(run[0])
@@ -235,7 +245,7 @@ def _sections(samples: Samples, layout: RecordingLayout) -> Iterator[tuple[Pose,
         yield pose, reason
 
 
-def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
+def _section_poses(samples: Samples, layout: RecordingLayout, steps: Steps) -> PoseSet:
     poses, refused = _sorted_out(_sections(samples, layout))
     if not poses:
         first = f": pose {refused[0].number}: {refused[0].reason}" if refused else ""
@@ -249,7 +259,7 @@ def _section_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
         )
     one_g = reading_of_1_g(samples, layout)
     found = PoseSet(samples.source, poses, refused, None, samples.findings, one_g)
-    return _with_steps(found, Steps.of(samples), layout)
+    return _with_steps(found, steps, layout)
 
 
 def _with_steps(found: PoseSet, steps: Steps, layout: RecordingLayout) -> PoseSet:
@@ -293,12 +303,11 @@ def orientation_groups(directions: FloatArray, angle_deg: float = ALIKE_DEG) -> 
 
     Not chained: a hundred poses all round must not become one orientation.
     """
-    near = directions @ directions.T >= np.cos(np.radians(angle_deg))
-    left = np.ones(len(directions), dtype=np.bool_)
+    cosine, left = np.cos(np.radians(angle_deg)), np.arange(len(directions))
     groups: list[list[int]] = []
-    for first in range(len(directions)):
-        if left[first]:
-            group = np.flatnonzero(near[first] & left)
-            left[group] = False
-            groups.append(group.tolist())
+    while len(left):
+        near = directions[left] @ directions[left[0]] >= cosine
+        near[0] = True
+        groups.append(left[near].tolist())
+        left = left[~near]
     return groups

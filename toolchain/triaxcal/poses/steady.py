@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.model.positions import AXES
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.poses.stillness import duration_s
 from triaxcal.readings.samples import READING, Samples
 from triaxcal.unit.recording import RecordingLayout
@@ -32,10 +32,16 @@ def reading_of_1_g(samples: Samples, layout: RecordingLayout) -> float:
 
 
 class Steady:
-    """Judges the stretches of one recording by what all of its readings span."""
+    """Judges the stretches of one recording by what all of its readings span.
 
-    def __init__(self, samples: Samples, layout: RecordingLayout, one_g: float) -> None:
+    Readings of an axis in `coarse` steps, (3,), stay at one value without being clipped.
+    """
+
+    def __init__(
+        self, samples: Samples, layout: RecordingLayout, one_g: float, coarse: BoolArray
+    ) -> None:
         self._samples, self._layout, self._one_g = samples, layout, one_g
+        self._coarse = coarse
         self._low, self._high = samples.extremes(READING)
 
     def reason(self, run: tuple[int, int], scatter: FloatArray) -> str:
@@ -59,7 +65,7 @@ class Steady:
 
     def _clipped(self, scatter: FloatArray, first: FloatArray) -> str:
         for axis in range(3):
-            moves = self._low[axis] < self._high[axis]
+            moves = self._low[axis] < self._high[axis] and not self._coarse[axis]
             stuck = moves and scatter[axis] == 0.0 and (np.delete(scatter, axis) > 0.0).any()
             if stuck and first[axis] in (self._low[axis], self._high[axis]):
                 return (

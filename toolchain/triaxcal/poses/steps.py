@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.readings.samples import READING, Samples
 from triaxcal.unit.recording import RecordingLayout
 
@@ -38,20 +38,31 @@ class Steps:
     Attributes
     ----------
     size : array, shape (3,)
+    whole : bool
+        Whether all readings are whole numbers.
     """
 
     size: FloatArray
+    whole: bool = False
 
     @staticmethod
     def of(samples: Samples) -> Steps:
         """Steps of the readings of a recording."""
         readings = samples.cut(np.concatenate(samples.table.spool.stretches()), READING)
-        return Steps(np.array([_step(column) for column in readings.T.copy()]))
+        whole = bool((readings == np.rint(readings)).all())
+        return Steps(np.array([_step(column) for column in readings.T.copy()]), whole)
 
     @property
     def motion(self) -> float:
         """Change of a mean that a reading on the edge between two codes shows without moving."""
         return 0.5 * float(np.sqrt(np.mean(self.size**2)))
+
+    def coarse(self, scatter: FloatArray) -> BoolArray:
+        """Axes, (3,), on which most poses show less noise than half a step; of scatter (n, 3)."""
+        if not len(scatter):
+            return np.zeros(3, dtype=np.bool_)
+        result: BoolArray = np.median(scatter, axis=0) < 0.5 * self.size
+        return result
 
     def sd_of_mean(self, scatter: FloatArray) -> FloatArray:
         """What rounding leaves in the mean of each pose, (n, 3), from their scatter, (n, 3).

@@ -38,7 +38,7 @@ SPREAD = math.radians(3.0)
 """Sway within a pose, rms: the mean is then too short by 0.14 %, which its uncertainty has."""
 _EVEN = 1.5
 """Rms motion of a stretch, of its mean motion; 1.09 for normal noise in three axes."""
-_LEVELS = 2.0**0.5
+_LEVELS = 2.0**0.25
 CHUNK = 1 << 18
 """Cells that are searched at once; a chunk ends where it moves most."""
 _GUARD = 1

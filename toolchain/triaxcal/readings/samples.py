@@ -16,7 +16,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.readings.table import LABEL, ROW, TIME, Quantity, ReadTable, read_table, signed
 from triaxcal.readings.units import to_degc, to_radians
 from triaxcal.unit.recording import SAMPLES, RecordingLayout
-from triaxcal.unit.recordingfile import ISO
+from triaxcal.unit.recordingfile import ISO, TIME_UNITS
 from triaxcal.unit.thermometer import TemperatureSensor
 
 READING, GYRO, TEMP, ANGLES = "reading", "gyro", "temp_degc", "angles_rad"
@@ -169,7 +169,10 @@ def _slow_clock(samples: Samples, layout: RecordingLayout) -> tuple[str, ...]:
     if samples.step_s < _SLOW_S or not layout.time or ISO in layout.time_unit:
         return ()
     unit = f'time_unit = "{", ".join(layout.time_unit)}"'
-    return (f"{unit} gives a sample every {samples.step_s:.4g} s: correct it if that is wrong",)
+    scale = TIME_UNITS[layout.time_unit[0]]
+    near = [u for u, s in TIME_UNITS.items() if s < scale and s / scale * samples.step_s < _SLOW_S]
+    like = f', as time_unit = "{near[0]}"' if near and len(layout.time) == 1 else ""
+    return (f"{unit} gives a sample every {samples.step_s:.4g} s: correct it if wrong{like}",)
 
 
 def _gaps(samples: Samples) -> tuple[str, ...]:

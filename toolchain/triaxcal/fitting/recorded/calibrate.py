@@ -16,7 +16,6 @@ from triaxcal.fitting.recorded.checks import (
     open_finding,
     refuse_left_handed,
     refuse_no_numbers,
-    refuse_wrong_unit,
 )
 from triaxcal.fitting.recorded.made import Made
 from triaxcal.fitting.recorded.magnitude import ScalarFit, fit_with_prior
@@ -188,7 +187,6 @@ def _prepared(
 ) -> Prepared:
     findings = [*poses.findings]
     refuse_no_numbers(poses)
-    refuse_wrong_unit(poses.source, poses.readings, layout)
     recorded = poses.temps_degc
     temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
     ones = np.ones(len(temps))

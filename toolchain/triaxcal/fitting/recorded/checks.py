@@ -26,9 +26,6 @@ _HANDED_MIN = 0.35
 """Correlation of the movement with the gyro that can decide: logs turned by hand have about 0.5."""
 _MOVING_MIN = 50
 """Samples of movement that can decide."""
-_COUNTS_MIN = 50.0
-"""Length of 1 g in counts: a code of a 50th of 1 g, 20 mg, is coarser than any sensor."""
-_SIZES = {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3}
 _HANDED_UNKNOWN = (
     "note: |a| is the same with left-handed axes and with all signs reversed, so neither is "
     "detected here: an axis that points up must read more than its bias, and x, y, z must be "
@@ -38,47 +35,6 @@ _SIGN_UNKNOWN = (
     "note: the axes agree with the gyro, but three reversed signs are not detected here: an axis "
     "that points up must read more than its bias"
 )
-
-
-def refuse_wrong_unit(source: str, readings: FloatArray, layout: RecordingLayout) -> None:
-    """Refuse readings whose length is not near 1 g in the unit that is stated.
-
-    The median over the poses: biases and scale errors stay far within a factor of two.
-    """
-    one_g = layout.reading_of_1_g
-    length = float(np.median(np.linalg.norm(readings, axis=1)))
-    if one_g is None:
-        _refuse_no_counts(source, layout, length)
-        return
-    if 0.5 * one_g <= length <= 2.0 * one_g:
-        return
-    near = [u for u, size in _SIZES.items() if 0.7 * size <= length <= 1.4 * size]
-    remedy = (
-        f'{near[0]} taken for {layout.acceleration_unit}? then acceleration_unit = "{near[0]}"'
-        if near
-        else 'if these are raw codes, acceleration_unit = "count"'
-    )
-    raise RefusedError(
-        source,
-        f"the poses' readings are about {length:.4g} {layout.acceleration_unit} long",
-        expected=f"about {one_g:g} at rest",
-        remedy=remedy,
-    )
-
-
-def _refuse_no_counts(source: str, layout: RecordingLayout, length: float) -> None:
-    """Refuse counts that are so small that they are none: a code would be a big step."""
-    if layout.acceleration_unit != "count" or length > _COUNTS_MIN:
-        return
-    near = [u for u, size in _SIZES.items() if 0.7 * size <= length <= 1.4 * size]
-    raise RefusedError(
-        source,
-        f"the poses' readings are about {length:.4g} counts long",
-        expected=f"more than {_COUNTS_MIN:g}: the firmware computes from whole counts",
-        remedy=f'{near[0]} taken for counts? then acceleration_unit = "{near[0]}"'
-        if near
-        else "give the unit of the readings, acceleration_unit",
-    )
 
 
 def turned_columns(layout: RecordingLayout, order: Sequence[int], turned: Sequence[bool]) -> str:

@@ -6,9 +6,10 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import did_you_mean, shown
-from triaxcal.fitting.recorded.checks import refuse_wrong_unit
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.thermal.shape import GROUP_GAP_DEGC
+from triaxcal.poses.stated import refuse_wrong_unit
+from triaxcal.poses.steps import Steps
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.readings.samples import READING, TEMP, Samples
 from triaxcal.readings.table import ROW
@@ -38,7 +39,7 @@ def face_measurements(
     faces = [(layout.faces[label], run) for label, run in labelled if label in layout.faces]
     _refuse_missing(unit, layout, samples)
     means = np.array([samples.mean(READING, *run) for _, run in faces])
-    refuse_wrong_unit(samples.source, means, layout)
+    refuse_wrong_unit(samples.source, means, layout, Steps.of(samples))
     one_g = float(np.median(np.linalg.norm(means - means.mean(axis=0), axis=1)))
     for _, run in faces:
         _refuse_moving(samples, run, one_g)

@@ -11,7 +11,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
 from triaxcal.fitting.recorded.calibrate import BEYOND_1_G, pose_dwells
-from triaxcal.fitting.recorded.checks import CONDITION_MAX, refuse_wrong_unit
+from triaxcal.fitting.recorded.checks import CONDITION_MAX
 from triaxcal.fitting.recorded.made import recorded_calibration
 from triaxcal.fitting.recorded.temperatures import (
     temperature_findings,
@@ -67,7 +67,6 @@ def calibrate_table(
     """
     poses = find_poses(samples, layout)
     readings, table = poses.readings, np.array([p.angles_rad for p in poses.poses])
-    refuse_wrong_unit(poses.source, readings, layout)
     refuse_few_poses(poses)
     refuse_degrees(poses.source, angles, readings, table, unit.gravity_g)
     refuse_open(poses, gravity_direction(angles.kind, table))

@@ -1,0 +1,259 @@
+"""Still stretches of logs that hands made: which are found, how well their means are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from family_cases import COLUMNS, directions, write_unit
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.model.types import FloatArray
+from triaxcal.poses.poses import PoseSet, find_poses, orientation_groups
+from triaxcal.poses.steps import Steps
+from triaxcal.readings.samples import read_samples
+from triaxcal.unit.description import read_unit
+
+RATE_HZ = 100.0
+UNITS = 'acceleration = ["ax", "ay", "az"]\nacceleration_unit = "g"\ntime = "t"'
+
+
+def band(
+    random: np.random.Generator, count: int, low_hz: float, high_hz: float, rms: float
+) -> FloatArray:
+    """Noise between two frequencies, (count, 3)."""
+    spectrum = random.standard_normal((count // 2 + 1, 3)) + 1j * random.standard_normal(
+        (count // 2 + 1, 3)
+    )
+    frequency = np.fft.rfftfreq(count, 1.0 / RATE_HZ)
+    spectrum[(frequency < low_hz) | (frequency > high_hz)] = 0.0
+    noise = np.fft.irfft(spectrum, count, axis=0)
+    result: FloatArray = noise * (rms / noise.std())
+    return result
+
+
+def turn(start: FloatArray, end: FloatArray, deg_per_s: float) -> FloatArray:
+    """Directions of gravity while the unit turns from one pose to the next at a steady rate."""
+    angle = float(np.arccos(np.clip(start @ end, -1.0, 1.0)))
+    across = end - (start @ end) * start
+    across /= np.linalg.norm(across)
+    part = np.linspace(0.0, angle, max(round(np.degrees(angle) / deg_per_s * RATE_HZ), 10))
+    result: FloatArray = np.cos(part)[:, None] * start + np.sin(part)[:, None] * across
+    return result
+
+
+def hand_held(
+    holds_s: FloatArray, deg_per_s: float, tremor_g: float, sway_deg: float, seed: int
+) -> tuple[FloatArray, list[tuple[int, int]]]:
+    """Time and readings in g, and the stretches that are held still."""
+    random = np.random.default_rng(seed)
+    poses = random.standard_normal((len(holds_s), 3))
+    poses /= np.linalg.norm(poses, axis=1, keepdims=True)
+    parts, still, count = [], [], 0
+    for k, (pose, hold_s) in enumerate(zip(poses, holds_s, strict=True)):
+        held = round(hold_s * RATE_HZ)
+        still.append((count, count + held))
+        parts.append(np.tile(pose, (held, 1)))
+        if k + 1 < len(poses):
+            parts.append(turn(pose, poses[k + 1], deg_per_s))
+        count = sum(map(len, parts))
+    force = np.concatenate(parts)
+    sway = band(random, count, 0.15, 1.2, np.radians(sway_deg))
+    force = force + np.cross(sway, force)
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    force += band(random, count, 8.0, 12.0, tremor_g) + 0.003 * random.standard_normal((count, 3))
+    return np.column_stack([np.arange(count) / RATE_HZ, force]), still
+
+
+def found_in(folder: Path) -> PoseSet:
+    unit = read_unit(folder)
+    assert unit.recording is not None
+    return find_poses(read_samples(folder, unit.recording, unit.temperature_sensor), unit.recording)
+
+
+def matched(poses: PoseSet, still: list[tuple[int, int]]) -> list[float]:
+    """Share of each still stretch that its pose has; every pose must lie in one, but for a fifth.
+
+    Line 2 is the first row.
+    """
+    shares = [0.0] * len(still)
+    for pose in poses.poses:
+        start, stop = pose.line - 2, pose.line - 2 + pose.count
+        inside = [max(0, min(stop, e) - max(start, s)) for s, e in still]
+        best = int(np.argmax(inside))
+        assert inside[best] >= 0.8 * (stop - start), f"pose {pose.number} moves"
+        shares[best] += inside[best] / (still[best][1] - still[best][0])
+    return shares
+
+
+@pytest.mark.parametrize(
+    ("holds_s", "deg_per_s", "tremor_g", "sway_deg"),
+    [
+        ((2.0, 5.0), 60.0, 0.02, 0.6),
+        ((0.7, 2.0), 60.0, 0.02, 0.4),
+        ((1.0, 3.0), 90.0, 0.03, 1.2),
+        ((2.0, 4.0), 12.0, 0.01, 0.2),
+    ],
+    ids=["as usual", "short", "shaky", "slow turns"],
+)
+def test_poses_of_a_hand_are_found_and_no_others(
+    tmp_path: Path,
+    holds_s: tuple[float, float],
+    deg_per_s: float,
+    tremor_g: float,
+    sway_deg: float,
+) -> None:
+    for seed in range(3):
+        holds = np.random.default_rng(seed).uniform(*holds_s, 12)
+        rows, still = hand_held(holds, deg_per_s, tremor_g, sway_deg, seed)
+        poses = found_in(write_unit(tmp_path / f"U{seed}", rows, UNITS))
+        shares = matched(poses, still)
+        assert min(shares) > 0.5
+        assert len(poses.poses) == 12
+
+
+def test_poses_on_a_table_and_in_a_hand_each_have_their_own_stillness(tmp_path: Path) -> None:
+    """One level for both would either cut the poses of the hand or take turns into the others."""
+    table, still = hand_held(np.full(6, 3.0), 60.0, 1e-6, 1e-6, 1)
+    hand, moving = hand_held(np.full(6, 3.0), 60.0, 0.03, 1.2, 2)
+    hand[:, 0] += table[-1, 0] + 1.0 / RATE_HZ
+    path = turn(table[-1, 1:] / np.linalg.norm(table[-1, 1:]), hand[0, 1:], 60.0)
+    between = np.column_stack([np.zeros(len(path)), path])
+    rows = np.concatenate([table, between, hand])
+    rows[:, 0] = np.arange(len(rows)) / RATE_HZ
+    first = len(table) + len(between)
+    poses = found_in(write_unit(tmp_path / "U", rows, UNITS))
+    shares = matched(poses, still + [(s + first, e + first) for s, e in moving])
+    assert len(poses.poses) == 12
+    assert min(shares) > 0.6
+    sd, weights = poses.length_sd, poses.weights
+    assert sd is not None
+    assert weights is not None
+    assert np.median(sd[6:]) > 3.0 * np.median(sd[:6])
+    assert np.median(weights[6:]) < 0.3 * np.median(weights[:6])
+
+
+def test_a_knock_does_not_cut_a_pose(tmp_path: Path) -> None:
+    rows, _ = hand_held(np.full(8, 4.0), 60.0, 1e-6, 1e-6, 3)
+    for start in (150, 1000):
+        rows[start : start + 10, 1] += 0.2 * np.sin(np.linspace(0.0, 2.0 * np.pi, 10))
+    assert len(found_in(write_unit(tmp_path / "U", rows, UNITS)).poses) == 8
+
+
+def test_the_uncertainty_of_a_mean_covers_its_error(tmp_path: Path) -> None:
+    """Correlated noise: 0.2 s of an autoregression, of which independent samples know nothing."""
+    random = np.random.default_rng(4)
+    poses, ratios = directions(14), []
+    for seed in range(6):
+        noise = 0.01 * random.standard_normal((14 * 400, 3))
+        for k in range(1, len(noise)):
+            noise[k] += 0.9 * noise[k - 1]
+        rows = noise + np.repeat(poses, 400, axis=0)
+        folder = write_unit(
+            tmp_path / f"U{seed}", np.column_stack([np.arange(len(rows)) / RATE_HZ, rows]), UNITS
+        )
+        for pose in found_in(folder).poses:
+            assert pose.sd_mean is not None
+            truth = poses[(pose.line - 2 + pose.count // 2) // 400]
+            ratios += ((pose.reading - truth) / pose.sd_mean).tolist()
+    # Eight parts of a pose: Student's t with 7 degrees of freedom has a variance of 7 / 5, and
+    # neighbouring parts are still a little alike.
+    assert len(ratios) > 200
+    assert 0.7 < float(np.mean(np.square(ratios))) < 2.2
+
+
+# ---- steps of the readings ----
+
+
+def test_steps_coarser_than_noise_are_told_with_what_they_leave(tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+    rows, still = hand_held(np.full(16, 3.0), 60.0, 1e-6, 1e-6, 5)
+    truth = np.array([rows[s + 5 : e - 5, 1:].mean(axis=0) for s, e in still])
+    rows[:, 1:] += 0.001 * random.standard_normal((len(rows), 3))
+    rows[:, 1:] = np.rint(rows[:, 1:] / 0.02) * 0.02
+    poses = found_in(write_unit(tmp_path / "U", rows, UNITS))
+    assert min(matched(poses, still)) > 0.6
+    assert len(poses.poses) == 16
+    (told,) = poses.findings
+    assert told.startswith("the readings have steps of 0.02 g (20 mg), coarser than their noise")
+    error = poses.readings - truth
+    sd = np.array([p.sd_mean for p in poses.poses])
+    # 48 values: their rms is within a fifth of its expectation in two cases of three.
+    assert 0.6 < float(np.sqrt(np.mean((error / sd) ** 2))) < 1.5
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.2, 0.4, 0.8])
+def test_what_rounding_leaves_in_a_mean(noise: float) -> None:
+    """Against means of rounded readings, the truth anywhere between two codes."""
+    random = np.random.default_rng(6)
+    truth = random.uniform(0.0, 1.0, (1500, 1))
+    rounded = np.rint(truth + noise * random.standard_normal((1500, 2000)))
+    error = float(np.sqrt(np.mean((rounded.mean(axis=1) - truth[:, 0]) ** 2)))
+    scatter = np.repeat(rounded.std(axis=1)[:, None], 3, axis=1)
+    stated = Steps(np.array([1.0, 0.0, 0.0])).sd_of_mean(scatter)
+    assert not stated[:, 1:].any()
+    sampled = noise / np.sqrt(2000.0)
+    assert np.hypot(stated[0, 0], sampled) == pytest.approx(error, rel=0.15, abs=0.003)
+
+
+# ---- units ----
+
+
+@pytest.mark.parametrize("unit", ["m/s^2", "g", "mg"])
+@pytest.mark.parametrize(("step", "middle", "told"), [
+    (16.0, 32768.0, "all are multiples of 16: codes with 4 empty bits at the right, as 12 bits"),
+    (1.0, 0.0, "all are whole numbers"),
+])  # fmt: skip
+def test_codes_under_the_name_of_a_unit_are_called_counts(
+    tmp_path: Path, unit: str, step: float, middle: float, told: str
+) -> None:
+    rows, _ = hand_held(np.full(10, 2.0), 60.0, 0.01, 0.3, 7)
+    rows[:, 1:] = np.rint(16384.0 / step * rows[:, 1:]) * step + middle
+    with pytest.raises(RefusedError) as refused:
+        found_in(write_unit(tmp_path / "U", rows, UNITS.replace('"g"', f'"{unit}"')))
+    assert told in str(refused.value)
+    assert refused.value.remedy == 'these are counts: acceleration_unit = "count"'
+
+
+def test_milligrams_under_the_name_of_g_are_named(tmp_path: Path) -> None:
+    rows, _ = hand_held(np.full(10, 2.0), 60.0, 0.01, 0.3, 8)
+    rows[:, 1:] *= 1000.0
+    with pytest.raises(RefusedError, match='then acceleration_unit = "mg"'):
+        found_in(write_unit(tmp_path / "U", rows, UNITS))
+
+
+# ---- recordings that are none of poses ----
+
+
+def test_a_log_that_moves_all_the_time_is_refused(tmp_path: Path) -> None:
+    random = np.random.default_rng(9)
+    force = np.array([0.0, 0.0, 1.0]) + np.cumsum(band(random, 6000, 0.1, 1.0, 0.05), axis=0)
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    rows = np.column_stack([np.arange(6000) / RATE_HZ, force + band(random, 6000, 0.5, 6.0, 0.05)])
+    with pytest.raises(RefusedError) as refused:
+        found_in(write_unit(tmp_path / "U", rows, UNITS))
+    assert refused.value.found.startswith("no pose found: ")
+    assert "poses of at least 0.5 s, held much more still than the turns" in str(refused.value)
+
+
+def test_one_pose_alone_is_one_pose(tmp_path: Path) -> None:
+    noise = 0.003 * np.random.default_rng(10).standard_normal((1000, 3))
+    rows = np.column_stack([np.arange(1000) / RATE_HZ, np.array([0.1, -0.2, 0.97]) + noise])
+    (pose,) = found_in(write_unit(tmp_path / "U", rows, UNITS)).poses
+    assert pose.count == 1000
+    assert found_in(write_unit(tmp_path / "V", rows * [1, 16384, 16384, 16384], UNITS.replace(
+        '"g"', '"count"'))).poses[0].count == 1000  # fmt: skip
+
+
+def test_one_row_is_no_pose(tmp_path: Path) -> None:
+    rows = np.array([[0.0, 0.1, -0.2, 9.7]])
+    with pytest.raises(RefusedError, match="no pose found"):
+        found_in(write_unit(tmp_path / "U", rows, COLUMNS))
+
+
+def test_many_orientations_are_grouped_without_a_table_of_all_pairs() -> None:
+    """A hundred thousand rows: all pairs would take 80 GB."""
+    poses = np.repeat(directions(20), 5000, axis=0)
+    groups = orientation_groups(poses)
+    assert [len(g) for g in groups] == [5000] * 20
