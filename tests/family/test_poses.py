@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from family_cases import COLUMNS, directions, write_unit
+from family_cases import COLUMNS, U0, K, directions, write_unit
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.fitting.route import calibrate_recording
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet, find_poses, orientation_groups
 from triaxcal.poses.steps import Steps
@@ -257,3 +259,116 @@ def test_many_orientations_are_grouped_without_a_table_of_all_pairs() -> None:
     poses = np.repeat(directions(20), 5000, axis=0)
     groups = orientation_groups(poses)
     assert [len(g) for g in groups] == [5000] * 20
+
+
+# ---- known directions ----
+
+DIRECTED = (
+    'rows = "poses"\nacceleration = ["ax", "ay", "az"]\nacceleration_unit = "m/s^2"\n'
+    'direction = ["dx", "dy", "dz"]'
+)
+
+
+def test_unit_vectors_are_known_directions(tmp_path: Path) -> None:
+    """All twelve constants come back, also K that is not symmetric: |a| = g alone has nine."""
+    force = directions(20)
+    noise = 1e-4 * np.random.default_rng(11).standard_normal((20, 3))
+    rows = np.column_stack([force @ K.T + U0 + noise, force])
+    folder = write_unit(tmp_path / "U", rows, DIRECTED, header="ax,ay,az,dx,dy,dz")
+    unit = read_unit(folder)
+    assert unit.recording is not None
+    constants = calibrate_recording(unit, unit.recording, folder)[2].thermal.constants_at(20.0)
+    # 20 poses of 1e-4 m/s^2: three axes share them, four standard errors.
+    assert np.abs(constants[:9].reshape(3, 3) - K).max() < 4.0 * 1e-4 / np.sqrt(20.0 / 3.0)
+    assert np.abs(constants[9:] - U0).max() < 4.0 * 1e-4 / np.sqrt(20.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda rows, keys: (rows * [1, 1, 1, 2, 2, 2], keys), "a direction 2 long; expected unit"),
+        (
+            lambda rows, keys: (rows, keys.replace('rows = "poses"', 'time = "ax"')),
+            "directions with rows of samples",
+        ),
+        (
+            lambda rows, keys: (rows, keys + '\npitch = "dx"'),
+            "given together with angles; expected one of them",
+        ),
+    ],
+    ids=["no unit vectors", "samples", "angles besides"],
+)
+def test_directions_that_say_nothing_are_refused(
+    tmp_path: Path, change: Callable[[FloatArray, str], tuple[FloatArray, str]], told: str
+) -> None:
+    force = directions(12)
+    rows, keys = change(np.column_stack([force @ K.T + U0, force]), DIRECTED)
+    folder = write_unit(tmp_path / "U", rows, keys, header="ax,ay,az,dx,dy,dz")
+    with pytest.raises(RefusedError, match=told):
+        found_in(folder)
+
+
+# ---- several files ----
+
+
+def two_files(folder: Path, file: str, second: Callable[[FloatArray], FloatArray]) -> Path:
+    """Six poses each; the clock of the second starts anew."""
+    for name, seed in (("a.csv", 12), ("b.csv", 13)):
+        rows, _ = hand_held(np.full(6, 2.5), 60.0, 0.005, 0.2, seed)
+        rows = second(rows) if name == "b.csv" else rows
+        write_unit(folder, rows, UNITS)
+        (folder / "log.csv").rename(folder / name)
+    toml = (folder / "unit.toml").read_text().replace('file = "log.csv"', f"file = {file}")
+    (folder / "unit.toml").write_text(toml)
+    return folder
+
+
+@pytest.mark.parametrize("file", ['["a.csv", "b.csv"]', '"?.csv"'], ids=["list", "pattern"])
+def test_two_files_are_one_recording(tmp_path: Path, file: str) -> None:
+    poses = found_in(two_files(tmp_path / "U", file, lambda rows: rows))
+    assert [pose.file for pose in poses.poses] == ["a.csv"] * 6 + ["b.csv"] * 6
+    assert poses.findings[0].startswith("2 files as one recording; no pose extends from one into")
+    # Six poses 2.5 s long, none across the joint; lines are those of each file.
+    assert max(pose.duration_s for pose in poses.poses) <= 2.5
+    assert poses.poses[6].line < 12
+    starts = [pose.start_s for pose in poses.poses]
+    assert starts == sorted(starts)
+    rows, _ = hand_held(np.full(6, 2.5), 60.0, 0.005, 0.2, 13)
+    alone = found_in(write_unit(tmp_path / "V", rows, UNITS))
+    np.testing.assert_allclose(poses.readings[6:], alone.readings, rtol=0, atol=0.002)
+
+
+def test_no_pose_extends_over_a_joint_even_of_one_orientation(tmp_path: Path) -> None:
+    """The second file goes on where the first ends, as a logger does that splits its files."""
+    folder = two_files(tmp_path / "U", '["a.csv", "b.csv"]', lambda rows: rows)
+    text = (folder / "a.csv").read_text().splitlines()
+    (folder / "b.csv").write_text("\n".join([text[0], *text[-100:]]) + "\n")
+    (folder / "a.csv").write_text("\n".join(text[:-100]) + "\n")
+    poses = found_in(folder).poses
+    assert [pose.file for pose in poses] == ["a.csv"] * 6 + ["b.csv"]
+
+
+def test_sections_of_one_label_in_two_files_are_two(tmp_path: Path) -> None:
+    folder = tmp_path / "U"
+    for name, labels in (("a.csv", "xyz"), ("b.csv", "zwv")):
+        lines = ["pose,ax,ay,az"]
+        for k, label in enumerate(labels):
+            force = directions(6)[k + 3 * (name == "b.csv")]
+            lines += [f"{label},{x:.4f},{y:.4f},{z:.4f}" for x, y, z in [force * 9.8] * 20]
+        keys = COLUMNS.replace('\ntime = "t"', "") + '\nrows = "sections"\nsection = "pose"'
+        write_unit(folder, "\n".join(lines), keys)
+        (folder / "log.csv").rename(folder / name)
+    toml = (folder / "unit.toml").read_text().replace('"log.csv"', '["a.csv", "b.csv"]')
+    (folder / "unit.toml").write_text(toml)
+    poses = found_in(folder).poses
+    assert [(p.file, p.label) for p in poses] == [
+        *(("a.csv", label) for label in "xyz"),
+        *(("b.csv", label) for label in "zwv"),
+    ]
+    np.testing.assert_allclose([p.reading for p in poses], directions(6) * 9.8, atol=1e-4)
+
+
+def test_files_of_different_rates_are_refused(tmp_path: Path) -> None:
+    folder = two_files(tmp_path / "U", '["a.csv", "b.csv"]', lambda rows: rows * [1000, 1, 1, 1])
+    with pytest.raises(RefusedError, match=r"b.csv: a row every 10 s, but every 0.01 s in a.csv"):
+        found_in(folder)

@@ -11,16 +11,17 @@ from triaxcal.base.errors import refused_by_system
 from triaxcal.readings.measurements import MEASUREMENTS_FILE
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.folder import UNIT_FILE
+from triaxcal.unit.recordingfile import files_in
 
 
 def inputs_sha256(folder: Path, unit: UnitDescription | None = None) -> str:
     """Hash of the unit's two files, the same wherever the folder lies."""
-    recorded = MEASUREMENTS_FILE
+    recorded: tuple[Path, ...] = (folder / MEASUREMENTS_FILE,)
     if unit is not None and unit.recording is not None:
-        recorded = unit.recording.file
+        recorded = files_in(folder, unit.recording.file)
     pair = () if unit is None or unit.pair is None else (folder / unit.pair.cross_coupling,)
     return files_sha256(
-        (folder / UNIT_FILE, folder / recorded, *pair),
+        (folder / UNIT_FILE, *recorded, *pair),
         "put it there, or correct its name in unit.toml",
     )
 

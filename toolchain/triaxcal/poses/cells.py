@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from triaxcal.model.types import BoolArray, FloatArray
-from triaxcal.readings.samples import GAP, READING, Samples
+from triaxcal.readings.samples import READING, Samples
 from triaxcal.readings.spool import Spool
-from triaxcal.readings.table import LABEL, TIME
+from triaxcal.readings.table import GAP, LABEL, TIME
 
 HALF = 4
 """Cells of half a window: means over it are compared with those over the next."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import FloatArray
+from triaxcal.poses.directions import pose_angles
 from triaxcal.poses.means import mean_of
 from triaxcal.poses.refusals import no_poses
 from triaxcal.poses.stated import refuse_wrong_unit
@@ -55,6 +57,8 @@ class Pose:
         Standard deviation of the samples.
     drift : array, shape (3,), or None
         Mean of the second half less that of the first.
+    file : str
+        Of several files, the one in which `line` is; "" of one.
     """
 
     number: int
@@ -70,6 +74,7 @@ class Pose:
     covariance: FloatArray | None = None
     scatter: FloatArray | None = None
     drift: FloatArray | None = None
+    file: str = ""
 
 
 @dataclass(frozen=True)
@@ -163,7 +168,9 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
 
 def _found(samples: Samples, layout: RecordingLayout, steps: Steps) -> PoseSet:
     if layout.rows == POSES:
-        return PoseSet(samples.source, _row_poses(samples), (), None, samples.findings)
+        poses = _row_poses(samples, layout)
+        one_g = reading_of_1_g(samples, layout)
+        return PoseSet(samples.source, poses, (), None, samples.findings, one_g)
     if layout.rows == SECTIONS or layout.faces:
         return _section_poses(samples, layout, steps)
     one_g = reading_of_1_g(samples, layout)
@@ -201,10 +208,10 @@ def _sorted_out(
     return tuple(poses), tuple(refused)
 
 
-def _row_poses(samples: Samples) -> tuple[Pose, ...]:
+def _row_poses(samples: Samples, layout: RecordingLayout) -> tuple[Pose, ...]:
     rows, times, readings = (samples.part(name) for name in (ROW, TIME, READING))
     temps = samples.part(TEMP) if TEMP in samples else None
-    angles = samples.part(ANGLES) if ANGLES in samples else None
+    angles = pose_angles(samples, layout, 0, len(samples)) if ANGLES in samples else None
     return tuple(
         Pose(
             number=k + 1,
@@ -217,6 +224,7 @@ def _row_poses(samples: Samples) -> tuple[Pose, ...]:
             temp_degc=None if temps is None else float(temps[k]),
             label=samples.label(k),
             angles_rad=None if angles is None else angles[k],
+            file=Path(samples.file(k)).name,
         )
         for k in range(len(samples))
     )
@@ -238,7 +246,7 @@ def _sections(samples: Samples, layout: RecordingLayout) -> Iterator[tuple[Pose,
         pose = _pose(samples, run, number, one_g)
         reason = steady.moves(_scatter(pose))
         if ANGLES in samples:
-            angles = samples.part(ANGLES, *run)
+            angles = pose_angles(samples, layout, *run)
             pose = replace(pose, angles_rad=angles[0])
             if np.ptp(angles, axis=0).max() > _SAME_RAD:
                 reason = "its angles change within the section"
@@ -295,6 +303,7 @@ def _pose(samples: Samples, run: tuple[int, int], number: int, one_g: float) -> 
         covariance=mean.covariance,
         scatter=mean.scatter,
         drift=mean.drift,
+        file=Path(samples.file(start)).name,
     )
 
 

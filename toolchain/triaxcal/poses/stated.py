@@ -46,8 +46,8 @@ def refuse_wrong_unit(
         remedy = 'if these are raw codes, acceleration_unit = "count"'
     raise RefusedError(
         source,
-        f"the readings at rest are about {length:.4g} {layout.acceleration_unit} long{codes}",
-        expected=f"about {one_g:g}",
+        f"the readings are about {length:.4g} {layout.acceleration_unit} long{codes}",
+        expected=f"about {one_g:g} at rest",
         remedy=remedy,
     )
 
@@ -73,7 +73,7 @@ def _refuse_no_counts(source: str, layout: RecordingLayout, length: float, near:
         return
     raise RefusedError(
         source,
-        f"the readings at rest are about {length:.4g} counts long",
+        f"the readings are about {length:.4g} counts long",
         expected=f"more than {_COUNTS_MIN:g}: the firmware computes from whole counts",
         remedy=f'{near[0]} taken for counts? then acceleration_unit = "{near[0]}"'
         if near

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,16 +13,15 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
-from triaxcal.readings.table import LABEL, ROW, TIME, Quantity, ReadTable, read_table, signed
+from triaxcal.readings.joined import joined
+from triaxcal.readings.table import GAP, LABEL, ROW, TIME, Quantity, ReadTable, read_table, signed
 from triaxcal.readings.units import to_degc, to_radians
 from triaxcal.unit.recording import SAMPLES, RecordingLayout
-from triaxcal.unit.recordingfile import ISO, TIME_UNITS
+from triaxcal.unit.recordingfile import ISO, TIME_UNITS, files_in
 from triaxcal.unit.thermometer import TemperatureSensor
 
 READING, GYRO, TEMP, ANGLES = "reading", "gyro", "temp_degc", "angles_rad"
 _WIDE = frozenset({READING, GYRO, ANGLES})
-GAP = 5.0
-"""Of the median step: a longer step is a gap, and no pose reaches across it."""
 _SLOW_S = 1.0
 """Between samples: slower than any logger of poses, and milliseconds taken for seconds look so."""
 
@@ -33,7 +32,7 @@ class Samples:
 
     Columns are asked for by name: `TIME` (s, from the first sample), `ROW` of the file, `READING`
     (x, y, z in the unit of the layout), `GYRO` (any unit: it only shows stillness and handedness),
-    `TEMP` (degC), `ANGLES` (in the order of `ANGLE_NAMES`) and `LABEL`.
+    `TEMP` (degC), `ANGLES` (in the order of `ANGLE_NAMES`, or the directions) and `LABEL`.
 
     Attributes
     ----------
@@ -83,7 +82,13 @@ class Samples:
 
     def place(self, index: int) -> str:
         """File and line (or row) of a sample, for messages."""
-        return f"{self.source}, {self.table.row_word} {self.one(ROW, index):.0f}"
+        file = self.file(index) or self.source
+        return f"{file}, {self.table.row_word} {self.one(ROW, index):.0f}"
+
+    def file(self, index: int) -> str:
+        """File of a sample, of several; "" where there is one."""
+        starts = [start for start, _ in self.table.parts]
+        return self.table.parts[bisect_right(starts, index) - 1][1] if starts else ""
 
     def extremes(self, name: str) -> FloatArray:
         """Lowest and highest values of all samples, shape (2, columns)."""
@@ -113,14 +118,15 @@ class Samples:
         return bisect_left(range(len(self)), time_s, key=lambda k: self.one(TIME, k))
 
     def runs(self) -> list[tuple[int, int]]:
-        """Start and stop, stop excluded, of each stretch of samples with one label."""
-        starts = [0]
+        """Start and stop, stop excluded, of each stretch of samples with one label in one file."""
+        starts = [0, *(start for start, _ in self.table.parts[1:])]
         before = self.one(LABEL, 0)
         for first, rows in self.pieces():
             codes = self.cut(rows, LABEL)
             changes = np.flatnonzero(np.diff(codes, prepend=before))
             starts += (first + changes).tolist()
             before = codes[-1]
+        starts = sorted(set(starts))
         return list(zip(starts, [*starts[1:], len(self)], strict=True))
 
 
@@ -144,8 +150,10 @@ def read_samples(
         degc = to_degc(layout.temperature_unit, sensor)
         quantities.append(Quantity(TEMP, "temperature", (layout.temperature,), degc))
     if layout.angles is not None:
-        radians = to_radians(layout.angles.unit)
-        quantities.append(Quantity(ANGLES, "the angles", layout.angles.columns, radians))
+        key, convert = "the angles", to_radians(layout.angles.unit)
+        if layout.direction is not None:
+            key, convert = "direction", to_radians("rad")  # as they are: `pose_angles` turns them
+        quantities.append(Quantity(ANGLES, key, layout.angles.columns, convert))
     label = None if layout.section is None else ("section", layout.section)
     clock = layout.clock
     if layout.rows == SAMPLES and not layout.faces:
@@ -153,11 +161,20 @@ def read_samples(
         absent = RefusedError(place, "missing", expected="a time column, or sample_rate_hz")
         clock = replace(clock, absent=absent)
     ordered = layout.rows == SAMPLES
-    path = folder / layout.file if given is None else Path("readings")
-    table = read_table(path, layout.written, clock, quantities, label, ordered=ordered, given=given)
+    paths = files_in(folder, layout.file) if given is None else (Path("readings"),)
+
+    def read(path: Path) -> ReadTable:
+        table = read_table(
+            path, layout.written, clock, quantities, label, ordered=ordered, given=given
+        )
+        if len(paths) > 1:
+            table.spool.to_file()
+        return table
+
+    table = joined([read(path) for path in paths]) if len(paths) > 1 else read(paths[0])
     samples = Samples(table, table.median_step(), table.findings)
     if TEMP in samples:
-        _refuse_implausible(samples, layout)
+        _refuse_implausible(samples)
     if not (ordered and table.clocked):
         return samples
     return Samples(
@@ -180,7 +197,11 @@ def _gaps(samples: Samples) -> tuple[str, ...]:
     before = 0.0
     for first, rows in samples.pieces():
         steps = np.diff(samples.cut(rows, TIME), prepend=before)
-        gaps = np.flatnonzero(steps > GAP * samples.step_s)
+        gap = steps > GAP * samples.step_s
+        joints = np.array([start for start, _ in samples.table.parts], dtype=np.int64) - first
+        gap[joints[(joints >= 0) & (joints < len(gap))]] = False
+        steps = np.where(gap, steps, 0.0)
+        gaps = np.flatnonzero(gap)
         count += len(gaps)
         if len(gaps) and steps.max() > longest:
             longest, after = float(steps.max()), first + int(steps.argmax())
@@ -192,12 +213,12 @@ def _gaps(samples: Samples) -> tuple[str, ...]:
     return (f"{found}; no pose extends across a gap",)
 
 
-def _refuse_implausible(samples: Samples, layout: RecordingLayout) -> None:
+def _refuse_implausible(samples: Samples) -> None:
     low, high = PLAUSIBLE_DEGC
     coldest, warmest = samples.extremes(TEMP)[:, 0]
     if not (low <= coldest and warmest <= high):
         raise RefusedError(
-            layout.file,
+            samples.source,
             f"temperatures of {coldest:.4g} to {warmest:.4g} degC",
             expected=f"{low:g} to {high:g} degC",
             remedy="check temperature and temperature_unit in [recording]",

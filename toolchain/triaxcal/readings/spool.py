@@ -56,6 +56,10 @@ class Spool:
             ) from error
         self._count += len(rows)
 
+    def to_file(self) -> None:
+        """Keep the rows in the file even if they are few: one spool of many."""
+        self._file.rollover()
+
     def rows(self, start: int, stop: int) -> FloatArray:
         """Rows from `start` to `stop`, stop excluded, shape (n, columns)."""
         stop = min(stop, self._count)

@@ -23,6 +23,8 @@ from triaxcal.readings.spool import Spool
 from triaxcal.unit.recordingfile import ISO, ClockLayout, Column, FileLayout, SignedColumn
 
 TIME, ROW, LABEL = "time_s", "row", "label"
+GAP = 5.0
+"""Of the median step: a longer step is a gap, and no pose reaches across it."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,8 @@ class ReadTable:
     left_out : int
         Rows left out, but for those that repeat the row before in everything.
     findings : tuple of str
+    parts : tuple of (int, str)
+        First row and file of each part, of several files; empty for one.
     """
 
     source: str
@@ -91,6 +95,7 @@ class ReadTable:
     high: FloatArray
     left_out: int
     findings: tuple[str, ...]
+    parts: tuple[tuple[int, str], ...] = ()
 
     def __len__(self) -> int:
         return len(self.spool)

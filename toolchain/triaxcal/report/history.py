@@ -53,7 +53,9 @@ def read_history(
         if last.calibration.update is not None:
             found.append(last)
     if len(found) < 2:
-        recorded = MEASUREMENTS_FILE if unit.recording is None else unit.recording.file
+        recorded = MEASUREMENTS_FILE
+        if unit.recording is not None:
+            recorded = ", ".join(unit.recording.file)
         raise RefusedError(
             str(folder / HISTORY_FOLDER),
             "no earlier measurements",
@@ -79,7 +81,7 @@ def _earlier(path: Path, folder: Path, unit: UnitDescription) -> Calibrated:
         return calibrated(path, unit, path.stem, day_of(path.stem), stated_pair(unit, folder))
     from triaxcal.fitting.route import calibrate_recording  # noqa: PLC0415
 
-    layout = replace(unit.recording, file=f"{HISTORY_FOLDER}/{path.name}")
+    layout = replace(unit.recording, file=(f"{HISTORY_FOLDER}/{path.name}",))
     made, measurements, calibration = calibrate_recording(unit, layout, folder)
     return Calibrated(path.stem, day_of(path.stem), measurements, calibration, made)
 

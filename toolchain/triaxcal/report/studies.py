@@ -23,7 +23,7 @@ def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
     rows = [
         [
             f"{p.number}",
-            str(p.line),
+            f"{p.file} {p.line}".strip(),
             f"{p.start_s:.1f}",
             f"{p.duration_s:.1f}",
             *(f"{v:.6g}" for v in p.reading),

@@ -20,7 +20,7 @@ from triaxcal.unit.presets import PRESETS
 from triaxcal.unit.recordingfile import (
     COLUMN,
     COLUMNS,
-    FILE,
+    FILES,
     SIGNED_COLUMNS,
     STAMPS,
     TEMPERATURE_UNITS,
@@ -88,14 +88,15 @@ class _RecordedFile:
     Attributes
     ----------
     file
-        File of the recording, in the unit's folder or below it.
+        File of the recording, in the unit's folder or below it; a list, or a pattern as "day*.csv",
+        is one recording in several files.
     preset
         Layout of a published recording; other keys override it.
     rows
         What a row is. "sections": a sample, and each stretch with one label is a pose.
     """
 
-    file: str = setting(FILE)
+    file: tuple[str, ...] = setting(FILES)
     preset: str | None = setting(word(tuple(PRESETS)), None)
     rows: str = setting(word((SAMPLES, POSES, SECTIONS)), SAMPLES)
 
@@ -132,6 +133,9 @@ class RecordingLayout(WrittenFile, _RecordedFile):
         Labels in the column `section`, and the axis that points up in each.
     angle_unit
         Unit of the angles.
+    direction
+        Upward direction of each pose on x, y, z, unit vectors, with `rows = "poses"` or
+        "sections"; in place of angles.
     still_s
         Shortest pose.
     frame
@@ -175,6 +179,7 @@ class RecordingLayout(WrittenFile, _RecordedFile):
     angle_unit: str | None = setting(
         word(("deg", "rad")), None, words="required with angles", example='"deg"'
     )
+    direction: tuple[Column, ...] | None = setting(COLUMNS, None, example='["dx", "dy", "dz"]')
     still_s: float = setting(number(1e-3, 1e5), STILL_S, "s")
     frame: str = setting(word(("sensor", "case")), "sensor")
     pitch: Column | None = setting(COLUMN, None)
@@ -204,7 +209,9 @@ class RecordingLayout(WrittenFile, _RecordedFile):
 
     @property
     def angles(self) -> Angles | None:
-        """Angles of the rows, None without them."""
+        """Angles of the rows, None without them; directions are turned into aircraft angles."""
+        if self.direction is not None:
+            return Angles(AIRCRAFT, self.direction, "deg")
         for kind_of_angles, names in ANGLE_NAMES.items():
             columns = tuple(c for c in (getattr(self, name) for name in names) if c is not None)
             if columns:
@@ -262,6 +269,15 @@ def recording_layout(values: Values) -> RecordingLayout | None:
 
 def _check_angles(values: Values, layout: RecordingLayout) -> None:
     kinds = [k for k, names in ANGLE_NAMES.items() if any(name in values for name in names)]
+    if "direction" in values:
+        if kinds or layout.faces:
+            raise RefusedError(
+                values.where("direction"),
+                "given together with " + ("faces" if layout.faces else "angles"),
+                expected="one of them: each says how a pose lies",
+            )
+        _refuse_samples(values, layout, "direction")
+        return
     if not kinds:
         return
     if len(kinds) == 2:
@@ -277,9 +293,14 @@ def _check_angles(values: Values, layout: RecordingLayout) -> None:
     ):
         if name not in values:
             raise values.missing(name, expected)
+    _refuse_samples(values, layout, names[0])
+
+
+def _refuse_samples(values: Values, layout: RecordingLayout, name: str) -> None:
     if layout.rows == SAMPLES:
+        what = "directions" if name == "direction" else "angles"
         raise RefusedError(
-            values.where(names[0]),
-            "angles with rows of samples",
+            values.where(name),
+            f"{what} with rows of samples",
             expected='rows = "poses", one row a pose, or "sections"',
         )

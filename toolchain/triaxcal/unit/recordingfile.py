@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
@@ -43,6 +44,19 @@ def is_in_folder(name: object) -> bool:
     )
 
 
+def files_in(folder: Path, names: Sequence[str]) -> tuple[Path, ...]:
+    """Files of those names, in their order; what a pattern stands for, by name.
+
+    A pattern that no file fits, and a file that is absent, stay as they are: reading them tells so.
+    """
+    found: list[Path] = []
+    for name in names:
+        path = folder / name
+        fitting = [] if path.exists() or not set("*?") & set(name) else sorted(folder.glob(name))
+        found += [f for f in fitting or [path] if f not in found]
+    return tuple(found)
+
+
 def _column(value: object) -> Column:
     named = isinstance(value, str) and value != ""
     numbered = isinstance(value, int) and not isinstance(value, bool) and value >= 1
@@ -72,6 +86,14 @@ FILE: Kind[str] = checked(
     {"type": "string"},
     '"recording.csv"',
     "copy it there",
+)
+_FILES = listed(FILE, range(1, 1001), "", different=True)
+FILES: Kind[tuple[str, ...]] = Kind(
+    "a file in the unit's folder, or a list of different files there, * standing for any text",
+    lambda value: _FILES.parse(value if isinstance(value, list) else [value]),
+    {"anyOf": [FILE.schema, _FILES.schema]},
+    "copy it there",
+    example='"recording.csv"',
 )
 _SCHEMA = {"anyOf": [{"type": "string", "minLength": 1}, {"type": "integer"}]}
 COLUMN = Kind("the name of a column, or its number from 1", _column, _SCHEMA, example='"column"')

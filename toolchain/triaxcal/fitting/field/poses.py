@@ -93,10 +93,11 @@ def field_poses(
     if layout is None:
         return _of_dwells(unit, recorded)
     # Only |a| is judged: the file needs no angles.
-    no_angles = dict.fromkeys(("pitch", "roll", "yaw", "zenith", "tool_face", "azimuth"))
+    names = ("pitch", "roll", "yaw", "zenith", "tool_face", "azimuth", "direction")
+    no_angles = dict.fromkeys(names)
     layout = replace(layout, **no_angles, angle_unit=None)  # type: ignore[arg-type]
     if isinstance(recorded, Path):
-        layout = replace(layout, file=recorded.name)
+        layout = replace(layout, file=(recorded.name,))
         refuse_other_serial(recorded, layout.written, unit.serial)
         samples = read_samples(recorded.parent, layout, unit.temperature_sensor)
     else:
