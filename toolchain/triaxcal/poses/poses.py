@@ -151,8 +151,10 @@ class PoseSet:
         return result
 
 
-def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
+def find_poses(samples: Samples, layout: RecordingLayout, *, any_unit: bool = False) -> PoseSet:
     """Poses of samples: one a row, one a section or labelled face, or found by stillness.
+
+    `any_unit` takes readings in another unit than stated as they are.
 
     Raises
     ------
@@ -162,7 +164,8 @@ def find_poses(samples: Samples, layout: RecordingLayout) -> PoseSet:
     """
     steps = Steps.of(samples)
     found = _found(samples, layout, steps)
-    refuse_wrong_unit(found.source, found.readings, layout, steps)
+    if not any_unit:
+        refuse_wrong_unit(found.source, found.readings, layout, steps)
     return found
 
 

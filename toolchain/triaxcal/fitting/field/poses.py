@@ -104,7 +104,7 @@ def field_poses(
         samples = read_samples(Path(), layout, unit.temperature_sensor, recorded)
     signs = np.array([-1.0 if name.startswith("-") else 1.0 for name in calibration.inputs])
     scale = _scale(unit, calibration, layout) * (signs if len(signs) else np.ones(3))
-    return _of_poses(unit, find_poses(samples, layout), scale)
+    return _of_poses(unit, find_poses(samples, layout, any_unit=True), scale)
 
 
 def _of_poses(unit: UnitDescription, found: PoseSet, scale: FloatArray) -> FieldPoses:
