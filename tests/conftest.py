@@ -49,6 +49,7 @@ LONG = {
     "rig/test_session.py",
     "targets/test_targets.py",
     "test_batch.py",
+    "test_diagnosis_faults.py",
     "test_imu_delivery_thermal.py",
     "test_dynamic_calibrate.py",
     "test_dynamic_equations.py",

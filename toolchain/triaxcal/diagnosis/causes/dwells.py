@@ -43,8 +43,8 @@ def _shifted(some: tuple[tuple[int, int], ...]) -> Undo:
 
 ENTRY = Cause(
     name="dwells",
-    label="several wrong dwells",
-    doc="Some dwells were disturbed, each in its own way.",
+    label="several dwells that stand out",
+    doc="Some dwells differ from the others, each in its own way: a symptom, and no cause yet.",
     hypotheses=_hypotheses,
     apart="the same dwells again",
     rank=11,
