@@ -64,8 +64,8 @@ def test_intervals_hold_the_truth_and_the_error_falls(count: int, tmp_path: Path
         before.append(rms_mg(old, gain, bias))
         after.append(rms_mg(new, gain, bias))
     coverage = np.mean(inside)
-    # 9 x 200 values, those of a unit correlated: a standard error of about 0.01. The intervals allow
-    # for own-axis squares, which these units do not have: more than 95 % of them hold.
+    # 9 x 200 values, those of a unit correlated: a standard error of about 0.01. The intervals
+    # allow for own-axis squares, which these units do not have: more than 95 % of them hold.
     assert 0.93 < coverage < 0.99
     ratio = np.sqrt(np.mean(np.square(after)) / np.mean(np.square(before)))
     assert ratio < {2: 0.8, 4: 0.5, 6: 0.25}[count]
