@@ -12,6 +12,7 @@ from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.report.pictures.line_plot import COLOURS, Line, Panel, line_plot
 
+_OF_ANGLES = (COLOURS[3], "#6b6b6b")
 _STEEP = 20.0
 """Times the median: a panel is cut there, for an angle that stops to exist has no end."""
 
@@ -42,7 +43,10 @@ def angle_errors_picture(found: AngleErrors, names: Sequence[str], swept: int) -
     force = [Line(AXES[i], COLOURS[i], x, found.force_error_g[:, i] * 1e3) for i in range(3)]
     panels = [Panel("error of a component, mg", label, force)]
     words = [name.replace("_", " ") for name in names]
-    panels.append(_panel("error of the angles, arcsec", label, words, x, found.angle_error_arcsec))
+    errors = found.angle_error_arcsec
+    panels.append(
+        _panel("error of the angles, arcsec", label, words, x, errors, colours=_OF_ANGLES)
+    )
     for k, name in enumerate(words):
         for title, values in (
             (f"{name}: arcsec for 1 mg of bias", found.per_offset),
@@ -53,11 +57,19 @@ def angle_errors_picture(found: AngleErrors, names: Sequence[str], swept: int) -
 
 
 def _panel(
-    title: str, label: str, names: Sequence[str], x: FloatArray, values: FloatArray
+    title: str,
+    label: str,
+    names: Sequence[str],
+    x: FloatArray,
+    values: FloatArray,
+    *,
+    colours: Sequence[str] = COLOURS,
 ) -> Panel:
-    """Lines of values (n, m); where they run away the panel is cut."""
+    """Lines of values (n, m). A line ends where its angle stops to exist, or runs away."""
     seen = np.abs(values[np.isfinite(values) & (values != 0.0)])
     edge = min(float(seen.max()), _STEEP * float(np.median(seen))) if len(seen) else 1.0
-    kept = np.clip(np.nan_to_num(values), -edge, edge)
-    lines = [Line(name, COLOURS[i], x, kept[:, i]) for i, name in enumerate(names)]
+    lines = []
+    for i, name in enumerate(names):
+        kept = np.abs(values[:, i]) <= edge
+        lines.append(Line(name, colours[i], x[kept], values[kept, i]))
     return Panel(title, label, lines, (), (-1.1 * edge, 1.1 * edge))
