@@ -189,11 +189,11 @@ def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
     ]
     if best.log_evidence <= 0.0:
         answer = []
-    second = suspects[1] if len(suspects) > 1 else None
+    shown = _shown(suspects)
     request = None
-    if answer and second is not None and (second.log_evidence > best.log_evidence - _FAR_BEHIND):
-        request = next_dwell(readings, best.judged, second.judged)
-    return Diagnosis(_shown(suspects), tuple(answer), remaining(readings), request)
+    if answer and len(shown) > 1 and shown[1].log_evidence > best.log_evidence - _FAR_BEHIND:
+        request = next_dwell(readings, best.judged, shown[1].judged)
+    return Diagnosis(shown, tuple(answer), remaining(readings), request)
 
 
 def _equivalent(one: Judged, other: Judged) -> bool:
