@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,143 +12,22 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.directions import pose_angles
 from triaxcal.poses.means import mean_of
+from triaxcal.poses.poseset import Pose, PoseSet, RefusedPose
 from triaxcal.poses.refusals import no_poses
 from triaxcal.poses.stated import refuse_wrong_unit
 from triaxcal.poses.steady import Steady, reading_of_1_g
 from triaxcal.poses.steps import Steps
-from triaxcal.poses.stillness import SHORTEST_S, Stillness, duration_s, find_stillness
+from triaxcal.poses.stillness import SHORTEST_S, duration_s, find_stillness
 from triaxcal.readings.samples import ANGLES, READING, TEMP, Samples
 from triaxcal.readings.table import ROW, TIME
 from triaxcal.unit.recording import POSES, SECTIONS, RecordingLayout
 
+__all__ = ["ALIKE_DEG", "Pose", "PoseSet", "RefusedPose", "find_poses", "orientation_groups"]
+
 _SAME_RAD = 1e-6
 """Angles of one pose are written alike in all its rows."""
-SD_FLOOR_G = 1e-4
-"""Standard deviation of a pose that no length of it removes."""
 ALIKE_DEG = 5.0
 """Poses nearer than this to each other are one orientation."""
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Mean readings of one pose.
-
-    Attributes
-    ----------
-    number : int
-        Among all stretches at rest that were examined, from 1.
-    line : int
-        Line of its first sample.
-    start_s, duration_s : float
-    reading : array, shape (3,)
-        In the unit of the layout.
-    sd_mean : array, shape (3,), or None
-        Standard deviation of `reading`: noise, sway and drift, and the steps of the readings; None
-        where rows are poses.
-    count : int
-        Samples.
-    temp_degc : float or None
-    label : str
-        Of its section; "" without.
-    angles_rad : array, shape (2 or 3,), or None
-    covariance : array, shape (3, 3), or None
-        Of `reading`; `sd_mean` is the root of its diagonal.
-    scatter : array, shape (3,), or None
-        Standard deviation of the samples.
-    drift : array, shape (3,), or None
-        Mean of the second half less that of the first.
-    file : str
-        Of several files, the one in which `line` is; "" of one.
-    """
-
-    number: int
-    line: int
-    start_s: float
-    duration_s: float
-    reading: FloatArray
-    sd_mean: FloatArray | None
-    count: int
-    temp_degc: float | None
-    label: str
-    angles_rad: FloatArray | None
-    covariance: FloatArray | None = None
-    scatter: FloatArray | None = None
-    drift: FloatArray | None = None
-    file: str = ""
-
-
-@dataclass(frozen=True)
-class RefusedPose:
-    """A still stretch that is no pose, and why."""
-
-    number: int
-    line: int
-    start_s: float
-    duration_s: float
-    reason: str
-
-
-@dataclass(frozen=True)
-class PoseSet:
-    """Poses of one recording.
-
-    Attributes
-    ----------
-    source : str
-    poses : tuple of Pose
-    refused : tuple of RefusedPose
-    stillness : Stillness or None
-        None where rows are poses, or sections say where they are.
-    findings : tuple of str
-    reading_of_1_g : float
-        About; in the unit of the layout.
-    """
-
-    source: str
-    poses: tuple[Pose, ...]
-    refused: tuple[RefusedPose, ...]
-    stillness: Stillness | None
-    findings: tuple[str, ...]
-    reading_of_1_g: float = 1.0
-
-    @property
-    def readings(self) -> FloatArray:
-        """Shape (poses, 3)."""
-        return np.array([p.reading for p in self.poses]).reshape(-1, 3)
-
-    @property
-    def temps_degc(self) -> FloatArray | None:
-        """Shape (poses,); None when the recording has no temperature."""
-        temps = [p.temp_degc for p in self.poses if p.temp_degc is not None]
-        return np.array(temps) if len(temps) == len(self.poses) and temps else None
-
-    @property
-    def length_sd(self) -> FloatArray | None:
-        """Standard deviation along the reading of each pose, (poses,); None where rows are poses.
-
-        Along the reading less the middle of all: their zero may lie anywhere.
-        """
-        found = [p.covariance for p in self.poses if p.covariance is not None]
-        if len(found) != len(self.poses):
-            return None
-        readings = self.readings
-        spread = readings - (readings.max(axis=0) + readings.min(axis=0)) / 2.0
-        lengths = np.linalg.norm(spread, axis=1)
-        along = spread if lengths.min() > 0.1 * self.reading_of_1_g else readings
-        along = along / np.linalg.norm(along, axis=1, keepdims=True)
-        result: FloatArray = np.sqrt(np.einsum("pi,pij,pj->p", along, np.array(found), along))
-        return result
-
-    @property
-    def weights(self) -> FloatArray | None:
-        """Weight of each pose by its own uncertainty, 1 for the best; None where rows are poses."""
-        sd = self.length_sd
-        if sd is None:
-            return None
-        floor = SD_FLOOR_G * self.reading_of_1_g
-        variance = sd**2 + floor**2
-        result: FloatArray = variance.min() / variance
-        return result
 
 
 def find_poses(samples: Samples, layout: RecordingLayout, *, any_unit: bool = False) -> PoseSet:
