@@ -12,7 +12,6 @@ from triaxcal.fitting.core.calibration import (
     Calibration,
     CalibrationPoint,
     CheckResult,
-    OwnSquares,
     Selection,
 )
 from triaxcal.fitting.core.grouping import (
@@ -22,6 +21,7 @@ from triaxcal.fitting.core.grouping import (
     group_dwells,
     grouped_readings,
 )
+from triaxcal.fitting.core.judged import OwnSquares
 from triaxcal.fitting.core.recorded import PairTerms
 from triaxcal.fitting.tilter.contradiction import contradiction
 from triaxcal.fitting.tilter.curves import (
@@ -42,6 +42,7 @@ from triaxcal.fitting.tilter.heldout import check_errors, held_out_test
 from triaxcal.fitting.tilter.mounting import turned_notes
 from triaxcal.fitting.tilter.outputs import refuse_mistaken_units, refuse_silent_outputs
 from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions
+from triaxcal.fitting.tilter.range import working_range
 from triaxcal.fitting.tilter.resolution import code_notes
 from triaxcal.fitting.tilter.runs import repeatability, run_notes
 from triaxcal.fitting.tilter.selection import PREFERENCE, select
@@ -57,14 +58,11 @@ from triaxcal.fitting.tilter.temperatures import refuse_unbelievable_temperature
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS
-from triaxcal.model.thermal.shape import EDGE_DEGC, ThermalShape
+from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.gravity import gravity_notes
-
-_STEP_DEGC = 0.1
-"""A working range taken from the calibrated temperatures is rounded outward to this."""
 
 
 def calibrate(
@@ -111,7 +109,7 @@ def _fit(
     terms: Terms,
 ) -> Calibration:
     """Curves and estimator of groups whose readings are those of a linear unit."""
-    range_degc = _working_range(unit, groups)
+    range_degc = working_range(unit, groups)
     readings = grouped_readings(groups, unit.adc.volts_per_code)
     estimators = PREFERENCE if unit.estimator == "auto" else (unit.estimator,)
     operators = [
@@ -282,31 +280,3 @@ def _refuse_singular(source: str, groups: tuple[TemperatureGroup, ...], gravity_
         voltage = np.array([d.voltage_v for d in group.dwells])
         where = f"{source}, rows {', '.join(str(d.row) for d in group.dwells)}"
         refuse_ill_conditioned(where, group.temp_degc, constants_of(operator, voltage))
-
-
-def _working_range(
-    unit: UnitDescription, groups: tuple[TemperatureGroup, ...]
-) -> tuple[float, float]:
-    """Range of the description, or that of the dwells at its ends, in steps of 0.1 degC.
-
-    The range spans every fitted dwell, so that none of them is clamped by the firmware, but ends
-    at most `EDGE_DEGC` from the outer groups' temperatures. One temperature alone is +-`EDGE_DEGC`.
-    """
-    low, high = groups[0].temp_degc, groups[-1].temp_degc
-    if unit.range_degc is None:
-        if len(groups) == 1:
-            return low - EDGE_DEGC, high + EDGE_DEGC
-        coldest = max(low - EDGE_DEGC, min(d.temp_degc for d in groups[0].measured))
-        hottest = min(high + EDGE_DEGC, max(d.temp_degc for d in groups[-1].measured))
-        # The 1e-6 forgives the rounding of decimal temperatures: 0.3 / 0.1 is 2.9999999999999996.
-        steps = math.floor(coldest / _STEP_DEGC + 1e-6), math.ceil(hottest / _STEP_DEGC - 1e-6)
-        return round(steps[0] * _STEP_DEGC, 1), round(steps[1] * _STEP_DEGC, 1)
-    if unit.range_degc[0] < low - EDGE_DEGC or unit.range_degc[1] > high + EDGE_DEGC:
-        raise RefusedError(
-            f"{unit.source}, [thermal] range_degc",
-            f"{unit.range_degc[0]:g} to {unit.range_degc[1]:g} degC",
-            expected=f"within {EDGE_DEGC:g} degC of the calibrated temperatures, "
-            f"{low:.6g} to {high:.6g} degC",
-            remedy="narrow the range, or measure further out: curves are not extrapolated",
-        )
-    return unit.range_degc

@@ -25,8 +25,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.fitting.core.calibration import HeldOutDwell, HeldOutTest
 from triaxcal.fitting.core.grouping import GroupedReadings, TemperatureGroup
+from triaxcal.fitting.core.judged import HeldOutDwell, HeldOutTest
 from triaxcal.fitting.tilter.curves import TilterData, fit_curves
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import Terms

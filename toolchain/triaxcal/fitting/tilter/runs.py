@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fitting.core.calibration import RunRepeatability
 from triaxcal.fitting.core.grouping import TemperatureGroup
+from triaxcal.fitting.core.judged import RunRepeatability
 from triaxcal.fitting.tilter.estimators import constants_of, estimator_operators
 from triaxcal.model.curves import ThermalModel
 from triaxcal.model.metrological import unpack_constants, voltage_from_force

@@ -32,8 +32,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from triaxcal.fitting.core.calibration import Calibration, OwnSquares
+from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.grouping import TemperatureGroup
+from triaxcal.fitting.core.judged import OwnSquares
 from triaxcal.fitting.core.outliers import fisher_tail
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.terms import Terms, products
