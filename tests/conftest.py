@@ -40,6 +40,7 @@ LONG = {
     "family/test_table_forms.py",
     "family/test_table_terms.py",
     "family/test_tables.py",
+    "family/test_terms_in_c.py",
     "family/test_unchecked.py",
     "family/test_update.py",
     "rig/test_cli_rig.py",

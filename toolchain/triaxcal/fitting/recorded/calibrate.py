@@ -8,30 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.outliers import left_out_residuals, worst_outlier
-from triaxcal.fitting.recorded.checks import (
-    crowd_finding,
-    open_finding,
-    refuse_left_handed,
-    refuse_no_numbers,
-)
 from triaxcal.fitting.recorded.made import Made
-from triaxcal.fitting.recorded.magnitude import ScalarFit, fit_with_prior
-from triaxcal.fitting.recorded.prior import FULL, LINEAR, Known, reading_of_zero
+from triaxcal.fitting.recorded.magnitude import fit_with_prior
+from triaxcal.fitting.recorded.prepared import Prepared, prepare
+from triaxcal.fitting.recorded.prior import FULL, LINEAR, Known
 from triaxcal.fitting.recorded.rate import half_cycle_turns, pose_rates
 from triaxcal.fitting.recorded.scalar import (
     MODELS,
-    ScalarData,
     ScalarModel,
-    scalar_data,
-    unscaled_data,
 )
+from triaxcal.fitting.recorded.solution import ScalarFit
 from triaxcal.fitting.recorded.temperatures import (
     gain_functions,
-    temperature_findings,
-    temperature_groups,
     thermal_shapes,
 )
 from triaxcal.fitting.recorded.terms import choose_terms, models_of
@@ -51,29 +41,13 @@ from triaxcal.fitting.recorded.trials import (
 )
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.poses import PoseSet, find_poses, orientation_groups
+from triaxcal.poses.poses import PoseSet, find_poses
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.readings.samples import Samples
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import RecordingLayout
 
 BEYOND_1_G = "quadratic terms are measured at 1 g; above it they grow with the square, unchecked"
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """Scaled poses, their temperatures, what is known beforehand, and what has been found.
-
-    `one_way` says that all poses point alike.
-    """
-
-    data: ScalarData
-    temps: FloatArray
-    known: Known
-    orientations: list[list[int]]
-    temperatures: list[list[int]]
-    findings: list[str]
-    one_way: bool
 
 
 @dataclass(frozen=True)
@@ -154,7 +128,7 @@ def _linear(
 
     The last is the row whose thermal function is taken.
     """
-    found = _prepared(unit, layout, samples, poses)
+    found = prepare(unit, layout, samples, poses)
     halves = half_cycle_turns(found.temps)
     rates = pose_rates(samples, poses, layout) if halves else None
     climate = PoseClimate(found.temps, rates, unit.loss)
@@ -180,67 +154,6 @@ def fit_of_all_terms(
     found, climate, _, _, best = _linear(unit, layout, samples, poses, np.zeros((3, 6)))
     row = judge(replace(best.trial, model=FULL), found.data, climate, [])
     return found.known, row.fit
-
-
-def _prepared(
-    unit: UnitDescription, layout: RecordingLayout, samples: Samples, poses: PoseSet
-) -> Prepared:
-    findings = [*poses.findings]
-    refuse_no_numbers(poses)
-    recorded = poses.temps_degc
-    temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
-    ones = np.ones(len(temps))
-    rough = scalar_data(poses.readings, ones[:, None], ones, unit.gravity_g)
-    left_open, spans = open_finding(poses, rough.radius, unit.priors)
-    if left_open:
-        findings.append(left_open)
-        rough = unscaled_data(poses.readings, ones[:, None], ones, unit.gravity_g)
-    axes = refuse_left_handed(samples, layout, rough.centre)
-    orientations, temperatures = orientation_groups(_directions(rough)), temperature_groups(temps)
-    crowd = crowd_finding(orientations, poses)
-    if crowd:
-        findings.append(crowd)
-    findings += temperature_findings(unit, recorded)
-    findings.append(axes)
-    count = ones.copy()
-    for group in _cells(orientations, temps):
-        count[group] = 1.0 / len(group)
-    zero = reading_of_zero(unit.priors, rough, all_round=not left_open)
-    known = Known(unit.priors, layout.reading_of_1_g, zero)
-    data = replace(rough, weight=np.sqrt(count * _own_weights(poses, known)), count=count)
-    return Prepared(data, temps, known, orientations, temperatures, findings, spans < 2)
-
-
-def _own_weights(poses: PoseSet, known: Known) -> FloatArray:
-    """Weights of the poses by their own scatter, beside the noise that all have, at most 1."""
-    sd = poses.length_sd
-    if sd is None:
-        return np.ones(len(poses.poses))
-    variance = known.noise.median**2 + np.minimum(sd / poses.reading_of_1_g, 1.0) ** 2
-    if not np.isfinite(variance).all():
-        k = int(np.flatnonzero(~np.isfinite(variance))[0])
-        raise RefusedError(
-            f"{poses.source}, line {poses.poses[k].line}",
-            f"the scatter of pose {poses.poses[k].number}, its weight, is no number",
-            expected="a finite scatter",
-            remedy="remove that pose",
-        )
-    result: FloatArray = variance.min() / variance
-    return result
-
-
-def _directions(data: ScalarData) -> FloatArray:
-    unit: FloatArray = data.reading / np.linalg.norm(data.reading, axis=1, keepdims=True)
-    return unit
-
-
-def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
-    """Poses alike in orientation and temperature: they say one thing, and count as one."""
-    return [
-        [group[k] for k in cell]
-        for group in orientations
-        for cell in temperature_groups(temps[group])
-    ]
 
 
 def _with(quadratic: FloatArray, model: ScalarModel) -> ScalarModel:

@@ -17,8 +17,8 @@ import numpy as np
 
 from triaxcal.fitting.core.noise import Linearised, noise_of
 from triaxcal.fitting.recorded.calibrate import fit_of_all_terms
-from triaxcal.fitting.recorded.magnitude import ScalarFit
 from triaxcal.fitting.recorded.prior import Known
+from triaxcal.fitting.recorded.solution import ScalarFit
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.samples import read_samples
 from triaxcal.unit.description import UnitDescription

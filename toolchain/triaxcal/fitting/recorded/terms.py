@@ -22,9 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fitting.recorded.magnitude import ScalarFit
 from triaxcal.fitting.recorded.prior import FULL, LINEAR, OWN_SQUARES, WIDE
 from triaxcal.fitting.recorded.scalar import ScalarModel
+from triaxcal.fitting.recorded.solution import ScalarFit
 from triaxcal.fitting.recorded.trials import Judged
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray

@@ -19,9 +19,10 @@ import numpy as np
 
 from triaxcal.fitting.core.calibration import Candidate
 from triaxcal.fitting.recorded.checks import CONDITION_MAX
-from triaxcal.fitting.recorded.magnitude import Held, ScalarFit, fit_scalar, fit_with_prior
+from triaxcal.fitting.recorded.magnitude import fit_scalar, fit_with_prior
 from triaxcal.fitting.recorded.prior import Known
 from triaxcal.fitting.recorded.scalar import ScalarData, ScalarModel
+from triaxcal.fitting.recorded.solution import Held, ScalarFit
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
 

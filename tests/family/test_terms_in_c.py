@@ -1,0 +1,114 @@
+"""Which terms go into the C of a recording: by held-out poses, or as [firmware] says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from family_cases import directions, write_unit
+from test_recordings import calibrated
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.delivery.fitted import fit_folder
+from triaxcal.fitting.route import refuse_poses_beyond_limits
+from triaxcal.model.metrological import force_from_voltage
+from triaxcal.model.terms import products
+from triaxcal.model.types import FloatArray
+from triaxcal.uncertainty.evaluate import uncertainty
+from triaxcal.uncertainty.orientation import DIRECTIONS
+from triaxcal.unit.description import read_unit
+
+ROWS = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "g"'
+OWN = np.array([4e-3, -5e-3, 3e-3])
+SCALE, BIAS = np.array([1.003, 0.996, 1.001]), np.array([0.02, -0.03, 0.01])
+
+
+def readings(own: FloatArray, count: int = 30, sd: float = 3e-4) -> FloatArray:
+    Q = np.zeros((3, 6))
+    Q[np.arange(3), np.arange(3)] = own
+    force = directions(count, seed=5)
+    linear = force
+    for _ in range(20):
+        linear = force - products(linear) @ Q.T
+    noise = sd * np.random.default_rng(5).standard_normal((count, 3))
+    result: FloatArray = linear * SCALE + BIAS + noise
+    return result
+
+
+def unit(tmp_path: Path, own: FloatArray, more: str = "") -> Path:
+    return write_unit(tmp_path / "U", readings(own), ROWS, header="a,b,c", more=more)
+
+
+def test_squares_that_matter_are_in_the_c_and_near_the_truth(tmp_path: Path) -> None:
+    calibration = calibrated(unit(tmp_path, OWN))
+    Q = calibration.terms.quadratic_per_g
+    assert Q is not None
+    assert " are in the C: largest effect " in calibration.selection_reason
+    shares = {s.name: s for s in (calibration.recording.shares if calibration.recording else ())}
+    found = np.array([shares[f"Q{a}.{a}{a}"].value for a in "xyz"])
+    sd = np.array([shares[f"Q{a}.{a}{a}"].sd for a in "xyz"])
+    assert np.abs((found - OWN) / sd).max() < 4.0
+    assert all(shares[f"Q{a}.{a}{a}"].data > 0.9 for a in "xyz")
+
+
+def test_no_squares_are_left_out_with_the_numbers_of_the_rule(tmp_path: Path) -> None:
+    calibration = calibrated(unit(tmp_path, np.zeros(3)))
+    assert calibration.terms.quadratic_per_g is None
+    told = calibration.selection_reason
+    assert "left out of the C: largest effect " in told
+    assert "where the standard uncertainty is " in told
+    assert "two standard errors: 26%" in told  # of 30 values
+
+
+@pytest.mark.parametrize("terms", ["linear", "own-squares", "quadratic"])
+def test_a_series_states_its_terms(tmp_path: Path, terms: str) -> None:
+    calibration = calibrated(unit(tmp_path, OWN, f'[firmware]\nterms = "{terms}"\n'))
+    Q = calibration.terms.quadratic_per_g
+    if terms == "linear":
+        assert Q is None
+        return
+    assert Q is not None
+    own = Q[np.arange(3), np.arange(3)].copy()
+    assert (own != 0.0).all()
+    Q = Q.copy()
+    Q[np.arange(3), np.arange(3)] = 0.0
+    assert Q.any() == (terms == "quadratic")
+
+
+def test_terms_that_are_left_out_stand_in_the_uncertainty(tmp_path: Path) -> None:
+    folder = unit(tmp_path, OWN, '[firmware]\nterms = "linear"\n')
+    done = fit_folder(read_unit(folder), folder)
+    found = uncertainty(done.unit, done.measurements, done.calibration, None, np.array([20.0]))
+    left_out = next(s for s in found.sources if s.key == "left_out_terms")
+    linear = DIRECTIONS
+    Q = np.zeros((3, 6))
+    Q[np.arange(3), np.arange(3)] = OWN
+    for _ in range(20):
+        linear = DIRECTIONS - products(linear) @ Q.T
+    seen = linear * SCALE + BIAS
+    constants = done.calibration.thermal.constants_at(20.0)[None]
+    error = float(np.abs(force_from_voltage(constants, seen) - DIRECTIONS).max())
+    # What the linear constants miss is the squares; the noise of the poses adds some of 1 mg.
+    assert left_out.sd == pytest.approx(error, abs=1.2e-3)
+    assert (
+        np.abs(force_from_voltage(constants, seen) - DIRECTIONS) < found.force_u[0, :, :3]
+    ).all()
+
+
+def test_terms_that_are_not_fitted_cannot_be_stated(tmp_path: Path) -> None:
+    more = '[fit]\nterms = "linear"\n[firmware]\nterms = "quadratic"\n'
+    with pytest.raises(RefusedError, match=r"\[firmware\] terms: \"quadratic\" with \[fit\] terms"):
+        calibrated(unit(tmp_path, OWN, more))
+
+
+def test_a_held_out_error_beyond_the_limit_is_refused(tmp_path: Path) -> None:
+    folder = unit(tmp_path, np.zeros(3))
+    done = fit_folder(read_unit(folder), folder)
+    recording = done.calibration.recording
+    assert recording is not None
+    refuse_poses_beyond_limits(done.unit, done.calibration)
+    worse = replace(recording, left_out_length_g=0.021)
+    with pytest.raises(RefusedError, match="21 mg rms at held-out poses; the fit's residual is"):
+        refuse_poses_beyond_limits(done.unit, replace(done.calibration, recording=worse))

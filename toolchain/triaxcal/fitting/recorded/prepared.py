@@ -1,0 +1,107 @@
+"""Poses made ready for the fit: scaled, weighed, grouped, and what they cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.fitting.recorded.checks import (
+    crowd_finding,
+    open_finding,
+    refuse_left_handed,
+    refuse_no_numbers,
+)
+from triaxcal.fitting.recorded.prior import Known, reading_of_zero
+from triaxcal.fitting.recorded.scalar import ScalarData, scalar_data, unscaled_data
+from triaxcal.fitting.recorded.temperatures import temperature_findings, temperature_groups
+from triaxcal.model.types import FloatArray
+from triaxcal.poses.poses import PoseSet, orientation_groups
+from triaxcal.readings.samples import Samples
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.recording import RecordingLayout
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Scaled poses, their temperatures, what is known beforehand, and what has been found.
+
+    `one_way` says that all poses point alike.
+    """
+
+    data: ScalarData
+    temps: FloatArray
+    known: Known
+    orientations: list[list[int]]
+    temperatures: list[list[int]]
+    findings: list[str]
+    one_way: bool
+
+
+def prepare(
+    unit: UnitDescription, layout: RecordingLayout, samples: Samples, poses: PoseSet
+) -> Prepared:
+    """Scale the poses, weigh them, and say what they cannot tell.
+
+    Raises
+    ------
+    RefusedError
+        For left-handed axes, and what is no number.
+    """
+    findings = [*poses.findings]
+    refuse_no_numbers(poses)
+    recorded = poses.temps_degc
+    temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
+    ones = np.ones(len(temps))
+    rough = scalar_data(poses.readings, ones[:, None], ones, unit.gravity_g)
+    left_open, spans = open_finding(poses, rough.radius, unit.priors)
+    if left_open:
+        findings.append(left_open)
+        rough = unscaled_data(poses.readings, ones[:, None], ones, unit.gravity_g)
+    axes = refuse_left_handed(samples, layout, rough.centre)
+    orientations, temperatures = orientation_groups(_directions(rough)), temperature_groups(temps)
+    crowd = crowd_finding(orientations, poses)
+    if crowd:
+        findings.append(crowd)
+    findings += temperature_findings(unit, recorded)
+    findings.append(axes)
+    count = ones.copy()
+    for group in _cells(orientations, temps):
+        count[group] = 1.0 / len(group)
+    zero = reading_of_zero(unit.priors, rough, all_round=not left_open)
+    known = Known(unit.priors, layout.reading_of_1_g, zero)
+    data = replace(rough, weight=np.sqrt(count * _own_weights(poses, known)), count=count)
+    return Prepared(data, temps, known, orientations, temperatures, findings, spans < 2)
+
+
+def _own_weights(poses: PoseSet, known: Known) -> FloatArray:
+    """Weights of the poses by their own scatter, beside the noise that all have, at most 1."""
+    sd = poses.length_sd
+    if sd is None:
+        return np.ones(len(poses.poses))
+    variance = known.noise.median**2 + np.minimum(sd / poses.reading_of_1_g, 1.0) ** 2
+    if not np.isfinite(variance).all():
+        k = int(np.flatnonzero(~np.isfinite(variance))[0])
+        raise RefusedError(
+            f"{poses.source}, line {poses.poses[k].line}",
+            f"the scatter of pose {poses.poses[k].number}, its weight, is no number",
+            expected="a finite scatter",
+            remedy="remove that pose",
+        )
+    result: FloatArray = variance.min() / variance
+    return result
+
+
+def _directions(data: ScalarData) -> FloatArray:
+    unit: FloatArray = data.reading / np.linalg.norm(data.reading, axis=1, keepdims=True)
+    return unit
+
+
+def _cells(orientations: list[list[int]], temps: FloatArray) -> list[list[int]]:
+    """Poses alike in orientation and temperature: they say one thing, and count as one."""
+    return [
+        [group[k] for k in cell]
+        for group in orientations
+        for cell in temperature_groups(temps[group])
+    ]
