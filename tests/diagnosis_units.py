@@ -311,6 +311,12 @@ def fault_curve(bench: Bench, size: float) -> None:
         row["extra"] = row["extra"] + bend * np.exp(-0.5 * ((row["true"] - at) / 8) ** 2)
 
 
+def fault_other_squares(bench: Bench, size: float) -> None:
+    k = direction(bench, size)
+    for row in bench.rows:
+        row["extra"] = row["extra"] + k * row["force"][[1, 2, 0]] ** 2
+
+
 FAULTS: dict[str, Fault] = {
     name.removeprefix("fault_"): value
     for name, value in list(globals().items())
@@ -341,12 +347,6 @@ def unlisted_gain_step(bench: Bench, size: float) -> None:
     for row in bench.rows:
         if len(bench.temps) - 2 <= row["block"] < len(bench.temps):
             row["extra"] = row["extra"] + np.eye(3)[axis] * size * row["force"][axis]
-
-
-def unlisted_cross_square(bench: Bench, size: float) -> None:
-    k = direction(bench, size)
-    for row in bench.rows:
-        row["extra"] = row["extra"] + k * row["force"][[1, 2, 0]] ** 2
 
 
 def unlisted_one_gain(bench: Bench, size: float) -> None:
