@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import polygamma
 
-from triaxcal.fitting.core.noise import NoisePrior, trigamma
+from triaxcal.fitting.core.noise import Linearised, NoisePrior, trigamma
 from triaxcal.fitting.core.posterior import Posterior, Prior, fit_map
 from triaxcal.model.types import FloatArray
 
@@ -33,7 +33,22 @@ def problem(rows: int, seed: int = 0) -> tuple[FloatArray, FloatArray, Prior]:
     return design, design @ truth + 1e-3 * random.standard_normal(rows), prior
 
 
-@pytest.mark.parametrize("rows", [2, 4, 30])
+@pytest.mark.parametrize("rows", [2, 4, 5, 6, 30])
+def test_the_probability_of_the_data_is_that_of_their_normal_distribution(rows: int) -> None:
+    """One row more than constants among them: that is where a triangle begins to differ."""
+    design, values, prior = problem(rows)
+    B, y = design @ prior.factor, design @ prior.mean - values
+    nodes = np.log([3e-4, 1e-3, 1e-2])
+    found = Linearised.about(B, y, float(rows)).log_likelihood(nodes)
+    for of, node in zip(found, nodes, strict=True):
+        covariance = B @ B.T + np.exp(2.0 * node) * np.eye(rows)
+        sign, determinant = np.linalg.slogdet(covariance)
+        assert sign == 1.0
+        wanted = -0.5 * (determinant + y @ np.linalg.solve(covariance, y))
+        assert of == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("rows", [2, 4, 5, 6, 30])
 def test_a_linear_problem_has_the_closed_form(rows: int) -> None:
     design, values, prior = problem(rows)
     found = linear(design, values, prior, scale=1e-3)

@@ -68,7 +68,7 @@ class Linearised:
         """Through the triangle of [B y], so that many rows cost one pass."""
         k = B.shape[1]
         R: FloatArray = np.column_stack([B, y])
-        if len(R) > k + 1:
+        if len(R) > k:
             R = np.asarray(np.linalg.qr(R, mode="r"), dtype=np.float64)
         top = R[:k, :k]
         left, singular, right = np.linalg.svd(top)
