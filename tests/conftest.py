@@ -26,6 +26,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 LONG = {
     "family/test_check.py",
+    "family/test_cross_coupling.py",
     "family/test_files.py",
     "family/test_formats.py",
     "family/test_learned.py",
@@ -51,7 +52,6 @@ LONG = {
     "targets/test_targets.py",
     "test_batch.py",
     "test_diagnosis_faults.py",
-    "test_imu_delivery_thermal.py",
     "test_dynamic_calibrate.py",
     "test_dynamic_equations.py",
     "test_dynamic_plan.py",
@@ -59,6 +59,7 @@ LONG = {
     "test_exact.py",
     "test_first_hour.py",
     "test_imu_delivery.py",
+    "test_imu_delivery_thermal.py",
     "test_uncertainty.py",
     "test_uncertainty_coverage.py",
 }

@@ -52,6 +52,9 @@ def assert_same(one: Calibration, other: Calibration) -> None:
                 np.testing.assert_array_equal(p.covariance, q.covariance)
         elif field.name == "parameter_covariance":
             np.testing.assert_array_equal(a, b)
+        elif field.name == "squares":
+            for name in ("per_g", "sd_per_g"):
+                np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
         elif field.name != "check_dwells":
             assert a == b, field.name
 
