@@ -12,7 +12,7 @@ import pytest
 import triaxcal
 from fit_cases import TABLE_TEMPS, TABLES, cubic_truth, readings, unit, with_checks
 from triaxcal.delivery.fitted import Fitted
-from triaxcal.delivery.judgement import Verdict, judge
+from triaxcal.delivery.judgement import Verdict, judge, limits_that_apply
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.thermal import ThermalChoice
@@ -52,6 +52,7 @@ def test_a_lost_sign_is_refused(temps, lost):
     assert verdict(data).words == "passed"
     found = verdict(with_temperature(data, lost, -lost))
     assert not found.passed
+    assert found.words == "refused"
     assert found.refusal.expected == "at most 1 mg (limits.over_range_g)"
     assert "held out, by" in found.refusal.found
 
@@ -139,6 +140,20 @@ def test_what_nothing_tests_is_said():
         "held out at T0: not tested",
         "held out over the range: not tested",
     ]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (19.5, 20.5, ("at T0",)),
+        (18.0, 22.0, ("at T0",)),
+        (-40.0, 70.0, ("at T0", "over the range")),
+        (10.0, 23.0, ("at T0", "over the range")),
+        (30.0, 70.0, ("over the range",)),
+    ],
+)
+def test_a_limit_counts_where_a_temperature_of_the_range_has_it(low, high, expected):
+    assert limits_that_apply(unit(), (low, high)) == expected
 
 
 def test_checks_between_three_temperatures_test_them():

@@ -121,15 +121,26 @@ def judge(fitted: Fitted) -> Verdict:
             replace(r, largest_g=r.largest_g + u) for r, u in zip(residuals, found, strict=True)
         )
     chosen = next((c for c in calibration.candidates if c.chosen), None)
-    shown = all(t.held for t in tested if t.what == UNCERTAINTY)
+    needed = limits_that_apply(fitted.unit, calibration.range_degc)
+    against = [t for t in tested if t.what == UNCERTAINTY and t.where in needed]
+    words = verdict_words(calibration, checked=checked, shown=all(t.held for t in against))
     return Verdict(
         refusal is None,
         refusal,
         tested,
         None if chosen is None else chosen.held_out_g,
         checked,
-        verdict_words(calibration, checked=checked, shown=shown),
+        words if refusal is None else "refused",
     )
+
+
+def limits_that_apply(unit: UnitDescription, range_degc: tuple[float, float]) -> tuple[str, ...]:
+    """Of both limits, those that hold at any temperature of the working range."""
+    low, high = range_degc
+    nearest = min(max(unit.t0_degc, low), high)
+    at_t0 = near_t0(nearest, unit.t0_degc)
+    others = not (near_t0(low, unit.t0_degc) and near_t0(high, unit.t0_degc))
+    return (*([AT_T0] if at_t0 else []), *([OVER_RANGE] if others else []))
 
 
 def verdict_words(calibration: Calibration, *, checked: bool, shown: bool) -> str:

@@ -236,8 +236,9 @@ def _too_simple(
         f"{residual}, with {calibration.shape.label}",
         expected=limit,
         remedy=(
-            "the thermal function does not follow the unit: choose a better one in [thermal], "
-            "or measure at more temperatures"
+            "noise, placement or a thermal function that does not follow the unit: measure that "
+            "dwell again, for longer, or choose another function in [thermal], or measure at more "
+            "temperatures"
         ),
     )
 

@@ -208,8 +208,7 @@ def _reason(rows: list[_Row], best: _Row, folds: int, checks: int, temperatures:
     if top is best:
         return f"{own}, the smallest of {len(rows)} candidates"
     resolution = _resolution(values)
-    excess = best.held_out_g / top.held_out_g - 1.0 if top.held_out_g else 0.0
-    assert excess <= resolution
+    assert best.held_out_g <= (top.held_out_g or 0.0) * (1.0 + resolution)
     return (
         f"{own}, the simplest of {len(rows)} candidates within one standard error "
         f"({100.0 * resolution:.1f} %) of the best, {_micro(top)} of {top.title}"

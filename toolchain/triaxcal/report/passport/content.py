@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from triaxcal.codegen.tryout import Residual
-from triaxcal.delivery.judgement import LimitCheck, held_out_checks, residual_checks, verdict_words
+from triaxcal.delivery.judgement import (
+    LimitCheck,
+    held_out_checks,
+    limits_that_apply,
+    residual_checks,
+    verdict_words,
+)
 from triaxcal.delivery.unit import Delivery
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.device_sources import Device
@@ -120,9 +126,10 @@ class Passport:
 
     @property
     def unchecked(self) -> tuple[str, ...]:
-        """Limits without a dwell in the working range to check them."""
+        """Limits that hold in the working range, without a dwell to check them."""
         checked = {a.where for a in self.acceptance}
-        return tuple(where for where in ("at T0", "over the range") if where not in checked)
+        needed = limits_that_apply(self.delivery.unit, self.delivery.calibration.range_degc)
+        return tuple(where for where in needed if where not in checked)
 
     @property
     def shown(self) -> bool:
