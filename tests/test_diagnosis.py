@@ -13,6 +13,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
 from triaxcal.delivery.fitted import fit_folder, refuse_beyond_limits
 from triaxcal.diagnosis import diagnose
+from triaxcal.diagnosis.answer import MARGIN
 from triaxcal.diagnosis.causes.registry import CAUSES
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Parameter
 from triaxcal.readings.measurements import MeasurementSet, write_measurements
@@ -34,6 +35,41 @@ def test_an_exact_class_is_one_answer_with_what_would_tell() -> None:
     assert "cannot tell it from" in found.sentence
     assert found.request is not None
     assert found.request.distance > 10
+
+
+def test_undone_squares_leave_in_the_checks_what_a_sound_unit_does() -> None:
+    """The force in a check position is the one that the mended unit shows."""
+    unit, measurements, bench = simulated("own_square", 10e-3, 2)
+    best = diagnose(unit, measurements).answer[0]
+    assert best.cause == "own_square"
+    assert best.remaining.checks_g < 3.0 * bench.sd
+
+
+def test_what_tells_is_said_for_each_of_the_answer() -> None:
+    unit, measurements, _ = simulated("hysteresis", 3e-3, 2)
+    found = diagnose(unit, measurements)
+    assert len({s.apart for s in found.answer}) > 1
+    for suspect in found.answer:
+        assert found.sentence.count(suspect.apart) == 1
+
+
+def test_a_cause_that_is_hardly_more_probable_is_no_verdict() -> None:
+    """Within odds of 20 to 1 a sound unit is a part of the answer."""
+    unit, measurements, _ = simulated("hysteresis", 3e-3, 2)
+    found = diagnose(unit, measurements)
+    weak = replace(found, answer=(replace(found.answer[0], log_evidence=MARGIN - 0.1),))
+    assert found.doubtful
+    assert "sound unit" not in found.sentence
+    assert not weak.doubtful
+    assert weak.sentence.startswith("perhaps hysteresis")
+    assert "or a sound unit" in weak.sentence or "from a sound unit" in weak.sentence
+
+
+def test_of_a_sound_unit_no_refuted_cause_is_listed() -> None:
+    unit, measurements, _ = simulated("none", 0.0, 3)
+    first, *table = str(diagnose(unit, measurements)).splitlines()
+    assert first == "no cause is more probable than a sound unit"
+    assert [line.split()[0] for line in table[2:]] == ["0.0"]
 
 
 def test_a_cause_of_ones_own_competes() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.screentext import table
-from triaxcal.diagnosis.core.evidence import Judged
+from triaxcal.diagnosis.core.evidence import Judged, standing_force
 from triaxcal.diagnosis.core.readings import Readings, readings_of
 from triaxcal.diagnosis.nextdwell import Request, next_dwell
 from triaxcal.diagnosis.ranking import Ranked, rank
@@ -25,6 +25,8 @@ _PLACES = 8.0
 """Log evidence that numbers of places can differ by."""
 _FAR_BEHIND = 12.0
 """Log evidence behind the best, beyond which no dwell is asked for to tell a second cause."""
+UNKNOWN = "unknown"
+"""The cause that stands for what is not in the list."""
 _FEW = 3
 _SHOWN = 6
 """Amplitudes that are shown of a cause; more are those of a curve."""
@@ -111,6 +113,7 @@ class Diagnosis:
     answer : tuple of Suspect
         Those that the readings do not tell from the best; empty where a sound unit is more probable
         than any cause.
+        A sound unit is a part of it where the best is within `MARGIN` of it.
     sound : Remaining
         Held-out errors of the readings as they are.
     request : Request or None
@@ -124,8 +127,8 @@ class Diagnosis:
 
     @property
     def doubtful(self) -> bool:
-        """Whether a cause is more probable than a sound unit."""
-        return bool(self.answer)
+        """Whether the readings tell a cause from a sound unit: odds of 20 to 1 and more."""
+        return bool(self.answer) and self.answer[0].log_evidence > MARGIN
 
     @property
     def sentence(self) -> str:
@@ -133,25 +136,43 @@ class Diagnosis:
         if not self.answer:
             return "no cause is more probable than a sound unit"
         best = self.answer[0]
-        text = f"most probably {best.name}{best.size}: {best.change}, {best.remaining}"
+        text = f"{'most probably' if self.doubtful else 'perhaps'} {self._best_in_words}"
         others = [s.name for s in self.answer[1:]]
+        if not self.doubtful:
+            others.append("a sound unit")
         if others:
             text += f"; the readings cannot tell it from {' or '.join(others)}"
-            text += f" (what would: {best.apart})"
+            data = dict.fromkeys(s.apart for s in (best, *self.answer[1:]))
+            text += f" (what would: {'; '.join(data)})"
         return text
 
+    @property
+    def _best_in_words(self) -> str:
+        """The best cause, and what it leaves where that is not what there was before."""
+        best = self.answer[0]
+        if best.cause == UNKNOWN:
+            return "something that is not in the list of causes"
+        text = f"{best.name}{best.size}: {best.change}"
+        return text if str(best.remaining) == str(self.sound) else f"{text}, {best.remaining}"
+
     def __str__(self) -> str:
-        rows = [(s.log_evidence, s.remaining, f"{s.name}: {s.change}") for s in self.suspects]
-        rows.append((0.0, self.sound, "none: the readings as they are, of a sound unit"))
+        rows = [(s.log_evidence, s.remaining, s.name) for s in self.suspects]
+        if not self.answer:
+            rows = [row for row in rows if row[0] > -MARGIN]
+        rows.append((0.0, self.sound, "none: a sound unit"))
         rows.sort(key=lambda r: -r[0])
-        head = ("ln odds", "held out", "in checks", "cause, and what undoing it means")
-        cells = [(f"{odds:.1f}", left.held_out, left.checks, text) for odds, left, text in rows]
-        lines = [*table(head, cells, left=(3,)), "", self.sentence]
+        head = ("ln odds", "held out", "in checks", "cause, undone for the errors held out")
+        # Columns as wide as their heads, which are not broken then.
+        cells = [
+            (f"{odds:.1f}", f"{left.held_out:>8}", f"{left.checks:>9}", name)
+            for odds, left, name in rows
+        ]
+        lines = [self.sentence]
         if self.answer and not self.answer[0].size:
             lines += [f"  {a}" for a in self.answer[0].amplitudes[:_SHOWN]]
         if self.request is not None:
             lines.append(self.request.between(self.suspects[0].name, self.suspects[1].name))
-        return "\n".join(lines)
+        return "\n".join([*lines, "", *table(head, cells, left=(3,))])
 
     __repr__ = __str__
 
@@ -178,6 +199,7 @@ def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
     readings = readings_of(unit, measurements)
     nominal = None if unit.nominal_v_per_g is None else np.array(unit.nominal_v_per_g)
     sound, ranked = rank(readings, (nominal, unit.nominal_tolerance))
+    readings = sound.readings
     base = sound.fit.log_evidence
     suspects = [_suspect(r, j, readings, base) for r in ranked for j in r.places]
     suspects.sort(key=lambda s: -s.log_evidence)
@@ -219,6 +241,8 @@ def _suspect(ranked: Ranked, judged: Judged, readings: Readings, base: float) ->
         Amplitude(p.name, p.unit, float(v) * p.per_unit, float(sd) * p.per_unit)
         for p, v, sd in zip(hypothesis.parameters, judged.amplitudes, judged.sd, strict=True)
     )
+    # Constants of the unit without the mistake say best what it shows in a check position.
+    readings = standing_force(readings, judged.fit.theta)
     mended = hypothesis.undo(readings, judged.amplitudes)
     return Suspect(
         ranked.cause.name,

@@ -37,8 +37,9 @@ _BEHIND = 10.0
 
 @dataclass(frozen=True)
 class Sound:
-    """The readings as those of a sound unit."""
+    """The readings as those of a sound unit, with the force in check positions that it sees."""
 
+    readings: Readings
     system: System
     fit: Fit
     scales: Scales
@@ -65,7 +66,7 @@ def rank(
     `nominal` are the nominal sensitivities in V/g, shape (3,), and their relative tolerance.
     """
     sound = _sound(readings)
-    readings = standing_force(readings, sound.fit.theta)
+    readings = sound.readings
     # What the sound unit takes for noise, tilts and curvature may be the mistake.
     curved = replace(Scales(), curvature=max(sound.scales.curvature, 3.0))
     screen = Screen(sound.system, (sound.scales, Scales(), curved))
@@ -89,7 +90,7 @@ def _sound(readings: Readings) -> Sound:
     fit, scales = climb(linked(readings, start), start)
     system = linked(standing_force(readings, fit.theta), scales)
     fit, scales = climb(system, scales)
-    return Sound(system, fit, scales)
+    return Sound(standing_force(readings, fit.theta), system, fit, scales)
 
 
 def _screened(cause: Cause, known: Known, screen: Screen) -> list[Screened]:

@@ -11,8 +11,9 @@ from triaxcal.diagnosis.core.readings import Readings, rows_in_words
 from triaxcal.model.thermal.shape import GROUP_GAP_DEGC
 from triaxcal.model.types import FloatArray
 
+_SIGN = "the sign lost"
 _FORMS: dict[str, Callable[[FloatArray], FloatArray]] = {
-    "the sign lost": lambda t: -t,
+    _SIGN: lambda t: -t,
     "an unsigned byte": lambda t: t - 256.0,
     "a byte of the wrong sign": lambda t: t + 256.0,
     "kelvin": lambda t: t - 273.15,
@@ -45,12 +46,13 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
                 continue
             rows = readings.rows[own]
             one = len(some) == 1
-            temps = f"{new.mean():+.4g} for {old.mean():+.4g} degC" if one else form
+            name = "a sign too many" if form == _SIGN and old.mean() < 0.0 else form
+            temps = f"{new.mean():+.4g} for {old.mean():+.4g} degC" if one else name
             yield Hypothesis(
-                f"{form}, {rows_in_words(rows)}",
+                f"{name}, {rows_in_words(rows)}",
                 _mended(form, some),
                 rows=rows,
-                change=f"with {temps} in {rows_in_words(rows)}",
+                change=f"with {temps}" + (f" in {rows_in_words(rows)}" if one else " undone"),
                 places=2.0 * len(_FORMS) * (len(blocks) if one else len(together)),
                 log_prior=_at_t0(readings, own, new, tests) * (1.0 if one else 2.5),
             )

@@ -21,14 +21,14 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
             yield Hypothesis(
                 f"about {AXES[axis]}",
                 _turned(axis, None),
-                change=f"with the unit half a turn about {AXES[axis]}, which exchanges {pairs}",
+                change=f"it exchanges {pairs}",
                 places=6.0,
             )
         if not readings.polarity:
             yield Hypothesis(
                 f"about {AXES[axis]}, all sensitivities being negative",
                 falling(_turned(axis, None)),
-                change=f"with the unit half a turn about {AXES[axis]}, which exchanges {pairs}",
+                change=f"it exchanges {pairs}",
                 places=6.0,
                 log_prior=-2.0,
             )
@@ -38,7 +38,7 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
                 f"about {AXES[axis]} at {degc:.4g} degC",
                 _turned(axis, block),
                 rows=readings.rows[readings.of_block(block)],
-                change=f"with the unit half a turn about {AXES[axis]} at {degc:.4g} degC",
+                change=f"it exchanges {pairs} there",
                 places=6.0 * len(blocks),
             )
 
@@ -75,7 +75,7 @@ ENTRY = Cause(
     label="half a turn of the unit",
     doc="The unit was seated half a turn round: two signs of three are inverted.",
     hypotheses=_hypotheses,
-    apart="the sign of each output with a known face upward ([sensor] polarity)",
+    apart="the sign of each output with a known face upward",
     discrete=True,
     rank=31,
 )

@@ -27,7 +27,7 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     yield Hypothesis(
         f"{degrees:.3g} deg about ({words})",
         turned(turn),
-        change=f"with the sensor turned by {degrees:.3g} deg in its case",
+        change="with the axes turned",
         log_prior=LOG_VOLUME,
     )
 

@@ -35,6 +35,6 @@ ENTRY = Cause(
     label="own-axis squares of the sensor",
     doc="The sensor is not linear: its outputs have a term in the square of their own axis' force.",
     hypotheses=_hypotheses,
-    apart="a dwell at 45 deg between two axes; squareness acts on all six positions",
+    apart="a dwell at 45 deg between two axes from squareness, which acts on all six positions",
     rank=40,
 )

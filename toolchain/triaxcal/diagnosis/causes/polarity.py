@@ -49,7 +49,7 @@ ENTRY = Cause(
     label="polarity of an output",
     doc="An output falls where the force along its axis rises, and the description says otherwise.",
     hypotheses=_hypotheses,
-    apart="the data sheet's polarity, or the sign of each output with a known face upward",
+    apart="the sign of each output with a known face upward",
     discrete=True,
     rank=32,
 )

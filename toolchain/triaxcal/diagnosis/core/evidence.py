@@ -23,7 +23,10 @@ from triaxcal.diagnosis.core.sound import (
 from triaxcal.model.types import FloatArray
 
 FAULT_LOG_ODDS = -5.0
-"""Before the data, of any one cause against a sound unit: one unit in 150 has it."""
+"""Before the data, of each cause against a sound unit: one unit in 150 has it.
+
+All causes together make it one unit in six, as of units whose readings somebody looks into.
+"""
 _ROUNDS = 2
 _TURNS = 6
 _CONDITION_MAX = 4.0
