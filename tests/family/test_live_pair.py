@@ -133,3 +133,19 @@ def test_standard_deviations_in_a_file_come_in_pairs_above_0(tmp_path: Path) -> 
     assert "column sd_a_g: the standard deviation of one" in told("theta_deg,a_g,b_g,sd_a_g", ",1")
     head = "theta_deg,a_g,b_g,sd_a_g,sd_b_g"
     assert "column sd_b_g: 0; expected a number above 0" in told(head, ",1e-7,0")
+
+
+def test_standard_deviations_come_with_all_positions_or_with_none() -> None:
+    pair = triaxcal.LivePair()
+    pair.take(*ROWS[0], 1e-7, 1e-7)
+    with pytest.raises(triaxcal.RefusedError, match="position 2: without standard deviations"):
+        pair.take(*ROWS[1])
+    pair.undo()
+    pair.take(*ROWS[0])
+    with pytest.raises(triaxcal.RefusedError, match="position 2: with standard deviations"):
+        pair.take(*ROWS[1], 1e-7, 1e-7)
+    with pytest.raises(triaxcal.RefusedError, match="theta_deg"):
+        pair.take(float("nan"), *ROWS[1][1:])
+    with pytest.raises(triaxcal.RefusedError, match="sd inf, 1"):
+        triaxcal.LivePair().take(*ROWS[0], float("inf"), 1.0)
+    assert pair.rows == (tuple(ROWS[0]),)

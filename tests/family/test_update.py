@@ -229,3 +229,29 @@ def test_nine_constants_that_no_rotation_changes() -> None:
     step = np.zeros(12)
     step[4] = 1e-3
     np.testing.assert_allclose(frame_free(constants + step) - nine, slopes @ step, atol=1e-7)
+
+
+def test_calib_keeps_an_update_that_it_replaces(top: Path, tmp_path: Path) -> None:
+    build = tmp_path / "build"
+    shutil.copytree(top / "build", build)
+    unit = top / "units" / "U"
+    triaxcal.update(unit, recorded(tmp_path, directions(6)), build)
+    updated = (build / "U" / "calibration.json").read_bytes()
+    first = (top / "build" / "U" / "calibration.json").read_bytes()
+    inputs = json.loads(updated)["inputs_sha256"]
+    again = triaxcal.deliver(unit, build)
+    assert (build / "U" / "calibration.json").read_bytes() == first
+    kept = build / f"U.{inputs[:8]}"
+    assert (kept / "calibration.json").read_bytes() == updated
+    assert f"is kept in {kept}/" in again.summary
+    assert "is kept in" not in triaxcal.deliver(unit, build).summary  # no update is there now
+    history = triaxcal.compare_history(triaxcal.read_unit(unit), build)
+    assert [(c.before, c.name) for c in history.result] == [("now", f"update {inputs[:8]}")]
+    assert "are not independent" in history.summary
+    assert "Repeatability: unknown" in history.summary
+
+
+def test_a_result_prints_as_its_text(cal: triaxcal.Calibration, tmp_path: Path) -> None:
+    found = cal.update(recorded(tmp_path, directions(6)))
+    assert str(found) == found.summary
+    assert repr(found) == f"<Study of FieldUpdate>\n{found.summary}"

@@ -38,6 +38,13 @@ class Delivered:
     summary: str
     warnings: tuple[str, ...] = ()
 
+    def __str__(self) -> str:
+        return self.summary
+
+    def __repr__(self) -> str:
+        """Short: the calibration holds whole arrays."""
+        return f"<{type(self).__name__} in {self.folder}>\n{self.summary}"
+
 
 def deliver(
     folder: str | Path, build: str | Path = "build", progress: Progress | None = None
@@ -71,7 +78,7 @@ def deliver(
 def _deliver_unit(unit: Path, build: Path, reference: Compilation) -> Delivered:
     from triaxcal.api.calibration import Calibration  # noqa: PLC0415
     from triaxcal.api.unit import Unit  # noqa: PLC0415
-    from triaxcal.base.publish import publish  # noqa: PLC0415
+    from triaxcal.base.publish import publish_beside  # noqa: PLC0415
     from triaxcal.delivery.saved import Saved  # noqa: PLC0415
     from triaxcal.delivery.unit import deliver as made_of  # noqa: PLC0415
     from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
@@ -90,10 +97,25 @@ def _deliver_unit(unit: Path, build: Path, reference: Compilation) -> Delivered:
     made = passport(delivery, {})
     files = all_files(delivery, made)
     target = build / delivery.unit.name
-    publish(files, target, SOMETIMES)
+    kept = _kept_update(target)
+    publish_beside(files, target, kept, SOMETIMES)
     calibration = Calibration(Unit.of(delivery.unit, unit), Saved.of(delivery))
     text = summary(made, files, str(target))
+    if kept is not None:
+        text += f"\n\nthe update by poses from the field that was there is kept in {kept}/"
     return Delivered(target, tuple(files), calibration, text, warnings)
+
+
+def _kept_update(target: Path) -> Path | None:
+    """Where an update by poses from the field is kept that lies in `target`; None without one."""
+    import json  # noqa: PLC0415
+
+    try:
+        document = json.loads((target / "calibration.json").read_bytes())
+        inputs = str(document["inputs_sha256"]) if document.get("update") else ""
+    except (OSError, ValueError, KeyError, AttributeError, RecursionError):
+        return None
+    return target.with_name(f"{target.name}.{inputs[:8]}") if inputs else None
 
 
 def _beside_earlier(refusal: RefusedError, folder: Path) -> RefusedError:

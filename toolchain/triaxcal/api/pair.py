@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from triaxcal.api.study import Study
+from triaxcal.base.arrays import finite
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.pair.checks import odd_reading
 from triaxcal.fitting.pair.cross_coupling import PairFit, fit_pair
@@ -126,15 +128,24 @@ class LivePair:
             When the readings are in another unit, of other axes, or not numbers; the position is
             then not taken.
         """
+        for name, value in (("theta_deg", theta_deg), ("a_g", a_g), ("b_g", b_g)):
+            finite(name, value)
         odd = odd_reading(np.radians(theta_deg), a_g, b_g, self._head.gravity_g)
         place = f"position {len(self._rows) + 1}"
         if odd:
             raise RefusedError(
                 place, odd, remedy="check angle, columns, signs and unit; type again"
             )
-        if sd_g and (len(sd_g) != 2 or not min(sd_g) > 0.0):
+        if sd_g and (len(sd_g) != 2 or not all(0.0 < v < math.inf for v in sd_g)):
             raise RefusedError(
                 place, "sd " + ", ".join(f"{v:g}" for v in sd_g), expected="two numbers above 0"
+            )
+        if self._rows and bool(sd_g) != (len(self._rows[0]) == 5):
+            raise RefusedError(
+                place,
+                "with standard deviations" if sd_g else "without standard deviations",
+                expected="as the positions before: with them in all positions, or in none",
+                remedy="type the position again",
             )
         self._rows.append((theta_deg, a_g, b_g, *sd_g))
         return self._estimate(self._rows[-1])

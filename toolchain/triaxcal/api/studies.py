@@ -65,8 +65,8 @@ def study_drift(unit: Unit) -> Study[Drift]:
 def compare_history(unit: Unit, build: str | Path = "build") -> Study[list[Change]]:
     """Changes between the calibrations of a unit: those in history/, then that of its readings.
 
-    Where the calibration delivered in a folder of the unit's name below `build` is an update by
-    poses from the field, it comes last.
+    Updates by poses from the field that were delivered below `build` count as well: those of the
+    present calibration come last.
 
     Raises
     ------

@@ -27,6 +27,13 @@ class Study(Generic[T]):
     summary: str
     _draw: Callable[[], bytes] | None = None
 
+    def __str__(self) -> str:
+        return self.summary
+
+    def __repr__(self) -> str:
+        """Short: the result holds whole arrays."""
+        return f"<{type(self).__name__} of {type(self.result).__name__}>\n{self.summary}"
+
     def picture(self) -> bytes:
         """The picture, as SVG.
 

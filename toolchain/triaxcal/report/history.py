@@ -33,8 +33,9 @@ def read_history(
     """All calibrations of a unit, the oldest first, the present one last.
 
     history/ has earlier readings, in the form of the unit's own, or calibration.json files as they
-    were delivered. `delivered` is the calibration.json in use: it comes last where it is an update
-    by poses from the field.
+    were delivered. `delivered` is the calibration.json in use. It counts where it is an update by
+    poses from the field, and so do the updates that are kept beside its folder: after the present
+    one where they are updates of it, before it where they are not.
 
     Raises
     ------
@@ -47,11 +48,17 @@ def read_history(
     )
     found = [_earlier(path, folder, unit) for path in older if not path.name.startswith(".")]
     now = fit_folder(unit, folder)
-    found.append(Calibrated("now", unit.measured.date, now.measurements, now.calibration, now.unit))
-    if delivered is not None and delivered.is_file():
-        last = _saved(delivered, "update")
-        if last.calibration.update is not None:
-            found.append(last)
+    present = Calibrated(
+        "now",
+        unit.measured.date,
+        now.measurements,
+        now.calibration,
+        now.unit,
+        now.inputs_sha256,
+    )
+    updates = [] if delivered is None else _updates(delivered)
+    found += [c for c in updates if now.inputs_sha256 not in c.parents]
+    found += [present, *(c for c in updates if now.inputs_sha256 in c.parents)]
     if len(found) < 2:
         recorded = MEASUREMENTS_FILE
         if unit.recording is not None:
@@ -72,6 +79,19 @@ def read_history(
                 remedy=f"take it out of {HISTORY_FOLDER}",
             )
     return found
+
+
+def _updates(delivered: Path) -> list[Calibrated]:
+    """Updates that were delivered, the oldest first: in use, and kept beside the folder in use."""
+    folder = delivered.parent
+    kept = sorted(folder.parent.glob(f"{folder.name}.????????/{delivered.name}"))
+    found = []
+    for path in (*kept, delivered):
+        if path.is_file():
+            name = "update" if path == delivered else f"update {path.parent.name[-8:]}"
+            found.append(_saved(path, name))
+    updates = [c for c in found if c.calibration.update is not None]
+    return sorted(updates, key=lambda c: len(c.parents))
 
 
 def _earlier(path: Path, folder: Path, unit: UnitDescription) -> Calibrated:
@@ -96,7 +116,8 @@ def _saved(path: Path, name: str) -> Calibrated:
             remedy="put the readings of that day there instead",
         )
     done = saved.fitted
-    return Calibrated(name, day_of(path.stem), done.measurements, done.calibration, done.unit)
+    day = day_of(path.stem)
+    return Calibrated(name, day, done.measurements, done.calibration, done.unit, done.inputs_sha256)
 
 
 def history_text(
@@ -123,6 +144,13 @@ def history_text(
         *_frame_free(history, found),
         "",
     ]
+    related = [f"{c.name} of {c.before}" for c in found if c.is_update]
+    if related:
+        lines += [
+            f"Updates: {', '.join(related)}. The two share their data and are not independent:",
+            "their En does not tell whether they contradict; only the later one counts below.",
+            "",
+        ]
     if repeat is None:
         lines.append("Repeatability: unknown, there are too few calibrations.")
     else:
@@ -137,7 +165,7 @@ def history_text(
                 f"Ageing over {repeat.years:.1f} years, a year: bias {repeat.bias_mg_a_year:+.2g} "
                 f"mg, scale {repeat.scale_ppm_a_year:+.2g} ppm."
             )
-    lines += [contradiction(c) for c in found if c.contradicts]
+    lines += [contradiction(c) for c in found if c.contradicts and not c.is_update]
     return "\n".join(lines)
 
 

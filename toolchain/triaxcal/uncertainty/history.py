@@ -55,6 +55,7 @@ class Calibrated:
         From a name as 2025-03-30, or [measured] date.
     unit : UnitDescription or None
         That it was made with; None is the present one.
+    inputs_sha256 : str
     """
 
     name: str
@@ -62,6 +63,12 @@ class Calibrated:
     measurements: MeasurementSet
     calibration: Calibration
     unit: UnitDescription | None = None
+    inputs_sha256: str = ""
+
+    @property
+    def parents(self) -> tuple[str, ...]:
+        """inputs_sha256 of the calibrations that this one is an update of."""
+        return () if self.calibration.update is None else self.calibration.update.parents
 
     def frame_is_free(self, unit: UnitDescription) -> bool:
         """Whether only |a| = g was known of its poses: its axes are then a convention."""
@@ -95,6 +102,8 @@ class Change:
     nine_where : str
     frame_is_free : bool
         Whether the frame of one of the two is a convention.
+    is_update : bool
+        Whether the later one is an update of the one before: the two are then not independent.
     """
 
     name: str
@@ -112,6 +121,7 @@ class Change:
     nine_en: float
     nine_where: str
     frame_is_free: bool
+    is_update: bool = False
 
     @property
     def contradicts(self) -> bool:
@@ -206,6 +216,7 @@ def _change(unit: UnitDescription, before: Calibrated, after: Calibrated) -> Cha
         nine_en=float(nine_en.max()),
         nine_where=f"{NAMES[which]} at {temps[k]:.4g} °C",
         frame_is_free=before.frame_is_free(unit) or after.frame_is_free(unit),
+        is_update=before.inputs_sha256 in after.parents,
     )
 
 
@@ -253,11 +264,18 @@ class Repeatability:
     scale_ppm_a_year: float | None
 
 
+def independent(history: list[Calibrated]) -> list[Calibrated]:
+    """Without those of which a later one is an update: they share their data."""
+    parents = {parent for c in history for parent in c.parents}
+    return [c for c in history if c.inputs_sha256 not in parents]
+
+
 def repeatability(unit: UnitDescription, history: list[Calibrated]) -> Repeatability | None:
     """Scatter over all calibrations about a straight line in time, or about the mean without days.
 
-    None if there are too few: three are needed with a mean, four with a line.
+    An updated calibration counts once. None if too few: 3 are needed with a mean, 4 with a line.
     """
+    history = independent(history)
     at_t0 = np.array([c.calibration.thermal.constants_at(unit.t0_degc) for c in history])
     kinds = _kinds(at_t0 - at_t0[0], at_t0[0])
     days = [c.day.toordinal() for c in history if c.day]
