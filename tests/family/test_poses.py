@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -281,6 +282,62 @@ def test_unit_vectors_are_known_directions(tmp_path: Path) -> None:
     # 20 poses of 1e-4 m/s^2: three axes share them, four standard errors.
     assert np.abs(constants[:9].reshape(3, 3) - K).max() < 4.0 * 1e-4 / np.sqrt(20.0 / 3.0)
     assert np.abs(constants[9:] - U0).max() < 4.0 * 1e-4 / np.sqrt(20.0)
+
+
+def directed(folder: Path, signs: tuple[int, int, int], more: str = "") -> Path:
+    """A unit whose outputs have these signs against their directions."""
+    force = directions(20)
+    noise = 1e-4 * np.random.default_rng(11).standard_normal((20, 3))
+    rows = np.column_stack([(force @ K.T) * signs + U0 + noise, force])
+    return write_unit(folder, rows, DIRECTED + more, header="ax,ay,az,dx,dy,dz")
+
+
+def constants_of(folder: Path) -> FloatArray:
+    unit = read_unit(folder)
+    assert unit.recording is not None
+    return calibrate_recording(unit, unit.recording, folder)[2].thermal.constants_at(20.0)
+
+
+@pytest.mark.parametrize("signs", list(product((1, -1), repeat=3)), ids=str)
+def test_columns_that_a_refusal_offers_give_the_force_itself(
+    tmp_path: Path, signs: tuple[int, int, int]
+) -> None:
+    """Whatever outputs are inverted: what is advised is a calibration of the known directions."""
+    folder, keys = directed(tmp_path / "U", signs), DIRECTED
+    if min(signs) < 0:
+        with pytest.raises(RefusedError) as refusal:
+            constants_of(folder)
+        told = str(refusal.value)
+        words = {1: "left-handed axes?", -1: "half a turn of the sensor about", -3: "upward"}
+        assert words[sum(signs)] in told
+        offered = told[told.index("acceleration = [") :]
+        keys = keys.replace('acceleration = ["ax", "ay", "az"]', offered)
+        toml = folder / "unit.toml"
+        toml.write_text(toml.read_text().replace(DIRECTED, keys))
+    # The constants are those of the outputs as read, so that the result is the known force.
+    found = constants_of(folder)[:9].reshape(3, 3)
+    assert np.abs(found - np.array(signs)[:, None] * K).max() < 4.0 * 1e-4 / np.sqrt(20.0 / 3.0)
+
+
+def test_inverted_outputs_of_a_stated_polarity_give_the_force_itself(tmp_path: Path) -> None:
+    folder = directed(tmp_path / "U", (-1, -1, -1), "\n[sensor]\npolarity = [-1, -1, -1]")
+    found = constants_of(folder)[:9].reshape(3, 3)
+    assert np.abs(found + K).max() < 4.0 * 1e-4 / np.sqrt(20.0 / 3.0)
+    right = directed(tmp_path / "V", (1, 1, 1), "\n[sensor]\npolarity = [-1, -1, -1]")
+    with pytest.raises(RefusedError, match="expected x, y, z along -x, -y, -z"):
+        constants_of(right)
+
+
+def test_a_vector_that_points_the_other_way_is_named(tmp_path: Path) -> None:
+    force = directions(20)
+    noise = 1e-4 * np.random.default_rng(11).standard_normal((20, 3))
+    readings = force @ K.T + U0 + noise
+    force[3] *= -1.0
+    rows = np.column_stack([readings, force])
+    folder = write_unit(tmp_path / "U", rows, DIRECTED, header="ax,ay,az,dx,dy,dz")
+    with pytest.raises(RefusedError, match="the vector of line 5 points the other way") as refusal:
+        constants_of(folder)
+    assert "pitch" not in str(refusal.value)
 
 
 @pytest.mark.parametrize(

@@ -248,7 +248,7 @@ REFUSED = {
     "left-handed": (
         GOOD * [1, 1, -1, 1, 1],
         AIR,
-        "the sensing axes lie x along -x, y along +y, z along +z of the table; expected x along x",
+        "x along -x, y along +y, z along +z of the table; expected x, y, z along x, y, z, or all",
     ),
     "exchanged": (
         GOOD[:, [0, 1, 3, 2, 4]],

@@ -60,11 +60,14 @@ class Angles:
         In the order of `ANGLE_NAMES`; the third may be missing.
     unit : str
         "deg" or "rad".
+    vectors : bool
+        Whether the columns are those of `direction`, turned into angles where they are read.
     """
 
     kind: str
     columns: tuple[Column, ...]
     unit: str
+    vectors: bool = False
 
 
 def _faces(value: object) -> Mapping[str, str]:
@@ -211,7 +214,7 @@ class RecordingLayout(WrittenFile, _RecordedFile):
     def angles(self) -> Angles | None:
         """Angles of the rows, None without them; directions are turned into aircraft angles."""
         if self.direction is not None:
-            return Angles(AIRCRAFT, self.direction, "deg")
+            return Angles(AIRCRAFT, self.direction, "deg", vectors=True)
         for kind_of_angles, names in ANGLE_NAMES.items():
             columns = tuple(c for c in (getattr(self, name) for name in names) if c is not None)
             if columns:

@@ -71,7 +71,7 @@ def calibrate_table(
     refuse_degrees(poses.source, angles, readings, table, unit.gravity_g)
     refuse_open(poses, gravity_direction(angles.kind, table))
     temps, temperatures = pose_temperatures(unit, poses)
-    force, sign = known_force(poses, layout, table, unit.gravity_g)
+    force, sign = known_force(unit, poses, layout, table)
     known = TablePoses(readings, force, temps, known_quadratic)
     left_out = turns(known, temperatures)
     tried = trials_of(unit, temps, temperatures)

@@ -114,35 +114,61 @@ def _refuse_wrong_rows(poses: PoseSet, readings: FloatArray, force: FloatArray) 
 
 
 def known_force(
-    poses: PoseSet,
-    layout: RecordingLayout,
-    table: FloatArray,
-    gravity_g: float,
+    unit: UnitDescription, poses: PoseSet, layout: RecordingLayout, table: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Known forces, (n, 3), with the sign of the readings; refuses exchanged or turned axes."""
+    """Known forces, (n, 3), and their sign; refuses exchanged, turned or inverted axes.
+
+    Which way angles count gravity is the reading's own convention: their forces get the sign that
+    makes K as `[sensor] polarity` says, positive by default. A direction is upward, so its sign is
+    known.
+    """
     angles, readings = layout.angles, poses.readings
     assert angles is not None
-    force = gravity_g * gravity_direction(angles.kind, table)
-    along, signs = _axes(readings, force)
-    if _in_order(along, signs):
+    force = unit.gravity_g * gravity_direction(angles.kind, table)
+    along, shown = _axes(readings, force)
+    signs = shown * (unit.polarity or (1, 1, 1))
+    if _in_order(along, signs) and (signs[0] > 0.0 or not angles.vectors):
         return force * signs[0], float(signs[0])
     _refuse_wrong_rows(poses, readings, force)
+    stated = unit.polarity or (1, 1, 1)
+    axes = ", ".join(f"{'-' * (sign < 0)}{axis}" for axis, sign in zip(AXES, stated, strict=True))
     found = ", ".join(
-        f"{AXES[i]} along {'+' if signs[i] > 0 else '-'}{AXES[along[i]]}" for i in range(3)
+        f"{AXES[i]} along {'+' if shown[i] > 0 else '-'}{AXES[along[i]]}" for i in range(3)
     )
-    turned = np.zeros((3, 3))
-    turned[np.arange(3), along] = signs * (np.sign(signs.sum()) or 1.0)
-    handed = "left-handed axes? " if np.linalg.det(turned) < 0.0 else ""
-    columns = ""
-    if sorted(along.tolist()) == [0, 1, 2]:
-        # The output whose axis lies along x of the table is the first column, and so on.
-        where = [int(np.flatnonzero(along == k)[0]) for k in range(3)]
-        columns = turned_columns(layout, where, [turned[i, along[i]] < 0.0 for i in where])
     raise RefusedError(
         poses.source,
         f"the sensing axes lie {found} of the table",
-        expected="x along x, y along y, z along z, of one sign",
-        remedy=f"{handed}the angles may be of other axes; if they are right, {columns}"
-        if columns
-        else "check the angles and the columns of [recording] acceleration",
+        expected=f"x, y, z along {axes}" + ", or all the other way" * (not angles.vectors),
+        remedy=_turned_remedy(layout, along, signs, vectors=angles.vectors),
     )
+
+
+def _turned_remedy(
+    layout: RecordingLayout, along: IntArray, signs: FloatArray, *, vectors: bool
+) -> str:
+    """What to do about axes along `along` of the table, of these signs, each (3,).
+
+    The columns that are offered make all signs those of the forces as stated. To offer the other
+    sign of all three would turn the rotation of two into the inversion of one.
+    """
+    if sorted(along.tolist()) != [0, 1, 2]:
+        return "check the angles and the columns of [recording] acceleration"
+    turned = np.zeros((3, 3))
+    turned[np.arange(3), along] = signs
+    # The output whose axis lies along x of the table is the first column, and so on.
+    where = [int(np.flatnonzero(along == k)[0]) for k in range(3)]
+    columns = turned_columns(layout, where, [signs[i] < 0.0 for i in where])
+    what = "directions" if vectors else "angles"
+    in_place = (along == np.arange(3)).all()
+    if in_place and signs.sum() == -3.0:
+        return (
+            "direction is the upward one; if it is, the outputs are inverted: state [sensor] "
+            f"polarity, or {columns}"
+        )
+    if np.linalg.det(turned) < 0.0:
+        head = "left-handed axes? "
+    elif in_place:
+        head = f"half a turn of the sensor about {AXES[int(np.argmax(signs))]}? "
+    else:
+        head = "a turned sensor? "
+    return f"{head}the {what} may be of other axes; if they are right, {columns}"

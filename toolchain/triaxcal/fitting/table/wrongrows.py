@@ -147,19 +147,35 @@ def _words(
 ) -> str:
     """A wrong row in words; `set_rad` are the angles that the file has."""
     force = unit.gravity_g * gravity_direction(angles.kind, set_rad) + row.error_g
+    rivals = "".join(f" or pose {poses.poses[i].number}" for i in row.rivals)
+    away = float(np.linalg.norm(row.error_g))
+    said = _vectors(poses.poses[row.pose].line, set_rad, force, angles)
+    return (
+        f"pose {poses.poses[row.pose].number}{rivals} contradicts the others: the file has "
+        f"{said if angles.vectors else _angles(unit, angles, set_rad, force)}; the "
+        f"difference is {away * 1e3:.3g} mg, the residuals of the others are "
+        f"{row.others_g * 1e3:.2g} mg rms"
+    )
+
+
+def _vectors(line: int, set_rad: FloatArray, force: FloatArray, angles: Angles) -> str:
+    """Upward directions of a row, in words: as stated and as the others have it."""
+    stated, fitted = gravity_direction(angles.kind, set_rad), force / np.linalg.norm(force)
+    words = [", ".join(f"{v + 0.0:.4f}" for v in vector) for vector in (stated, fitted)]
+    slip = ""
+    if float(np.linalg.norm(fitted + stated)) < _ALIKE * float(np.linalg.norm(fitted - stated)):
+        slip = f": the vector of line {line} points the other way"
+    return f"the direction ({words[0]}), the fit of the others gives ({words[1]}){slip}"
+
+
+def _angles(unit: UnitDescription, angles: Angles, set_rad: FloatArray, force: FloatArray) -> str:
+    """The same of angles."""
     seen = angles_from_force(angles.kind, force)
     words = [name.replace("_", " ") for name in ANGLE_NAMES[angles.kind][:2]]
     stated = ", ".join(f"{w} {v:.5g}" for w, v in zip(words, np.degrees(set_rad[:2]), strict=True))
     fitted = ", ".join(f"{w} {v:.5g}" for w, v in zip(words, np.degrees(seen), strict=True))
-    rivals = "".join(f" or pose {poses.poses[i].number}" for i in row.rivals)
-    away = float(np.linalg.norm(row.error_g))
-    return (
-        f"pose {poses.poses[row.pose].number}{rivals} contradicts the others: the file has "
-        f"{stated} deg, "
-        f"the fit of the others gives {fitted} deg{_slip(unit, angles, set_rad, force)}; the "
-        f"difference is {away * 1e3:.3g} mg, the residuals of the others are "
-        f"{row.others_g * 1e3:.2g} mg rms"
-    )
+    slip = _slip(unit, angles, set_rad, force)
+    return f"{stated} deg, the fit of the others gives {fitted} deg{slip}"
 
 
 def _slip(unit: UnitDescription, angles: Angles, stated: FloatArray, force: FloatArray) -> str:
