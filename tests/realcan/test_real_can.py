@@ -16,10 +16,18 @@ from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.fil import exchange
 from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.simframes import FrameMaker
+from triaxcal.rig.source import Wanted, kind_of
 
 WORK = os.environ.get("TRIAXCAL_CAN_WORK")
 pytestmark = pytest.mark.skipif(not WORK, reason="`make test-can` runs these on real SocketCAN")
 LIMIT_S = 60.0
+
+
+def opened(device: str, fd: bool = False) -> socketcan.SocketSource:
+    """The source of a CAN device, by the registry."""
+    source = kind_of(device).open(Wanted(device, fd, lambda: pytest.fail("a CAN device")))
+    assert isinstance(source, socketcan.SocketSource)
+    return source
 
 
 def ip(*arguments):
@@ -80,7 +88,7 @@ def same(a, b):
 @pytest.mark.parametrize("layout", ["classic", "fd"])
 def test_every_frame_arrives_with_the_kernels_time(vcan, layout):
     frames = some_frames(layout=layout)
-    source = socketcan.open_socketcan(vcan, fd=layout == "fd")
+    source = opened(vcan, fd=layout == "fd")
     before = time.time_ns()
     send(vcan, frames, fd=layout == "fd")
     found, _ = read_until(source, lambda count, _: count >= len(frames))
@@ -94,7 +102,7 @@ def test_every_frame_arrives_with_the_kernels_time(vcan, layout):
 def test_what_the_kernel_drops_is_counted_exactly(vcan, monkeypatch):
     monkeypatch.setattr(socketcan, "QUEUE_BYTES", 1 << 16)
     frames = some_frames(5)
-    source = socketcan.open_socketcan(vcan, fd=False)
+    source = opened(vcan)
     assert "the queue holds" in source.notes()[0]
     send(vcan, frames)
     first, _ = read_until(source, lambda count, _: count > 50)
@@ -108,7 +116,7 @@ def test_what_the_kernel_drops_is_counted_exactly(vcan, monkeypatch):
 
 
 def test_error_frames_are_seen(vcan):
-    source = socketcan.open_socketcan(vcan, fd=False)
+    source = opened(vcan)
     one = some_frames(1).take(slice(0, 1))
     bus_off = Frames(one.t_ns, np.array([0x20000040], np.uint32), one.length, one.fd, one.data)
     send(vcan, bus_off)
@@ -119,7 +127,7 @@ def test_error_frames_are_seen(vcan):
 
 
 def test_a_link_that_goes_down_and_up(vcan):
-    source = socketcan.open_socketcan(vcan, fd=False)
+    source = opened(vcan)
     ip("set", vcan, "down")
     _, notes = read_until(source, lambda _, notes: bool(notes))
     assert "the link is down" in notes[0]
@@ -134,7 +142,7 @@ def test_a_link_that_goes_down_and_up(vcan):
 
 
 def test_a_device_that_is_taken_away_and_comes_back(vcan):
-    source = socketcan.open_socketcan(vcan, fd=False)
+    source = opened(vcan)
     ip("del", vcan)
     _, notes = read_until(source, lambda _, notes: bool(notes))
     assert notes
@@ -181,7 +189,7 @@ def test_between_two_controllers():
     for device in ("can0", "can1"):
         ip("set", device, "type", "can", "bitrate", "500000")
         ip("set", device, "up")
-    source = socketcan.open_socketcan("can1", fd=False)
+    source = opened("can1")
     frames = some_frames(1).take(slice(0, 150))
     parts = []
     for start in range(0, len(frames), 10):  # the controller holds 64 bytes: give it time
