@@ -255,3 +255,25 @@ def test_a_result_prints_as_its_text(cal: triaxcal.Calibration, tmp_path: Path) 
     found = cal.update(recorded(tmp_path, directions(6)))
     assert str(found) == found.summary
     assert repr(found) == f"<Study of FieldUpdate>\n{found.summary}"
+
+
+def test_data_that_the_calibration_has_seen_are_no_update(
+    top: Path, cal: triaxcal.Calibration, tmp_path: Path
+) -> None:
+    own = top / "units" / "U" / "log.csv"
+    with pytest.raises(RefusedError, match=r"24 of 24 poses are those that the calibration was"):
+        cal.update(own)
+    assert "24 of 24 poses are those that" in " ".join(cal.check(own).summary.split())
+    build = tmp_path / "build"
+    shutil.copytree(top / "build", build)
+    first = recorded(tmp_path, directions(6))
+    triaxcal.update(top / "units" / "U", first, build)
+    with pytest.raises(RefusedError, match="was updated by this recording already"):
+        triaxcal.update(top / "units" / "U", first, build)
+    again = tmp_path / "again"
+    again.mkdir()
+    triaxcal.update(top / "units" / "U", recorded(again, directions(6), seed=31), build)
+    with pytest.raises(RefusedError, match="was updated by this recording already"):
+        triaxcal.update(top / "units" / "U", first, build)
+    fresh = cal.check(recorded(tmp_path, directions(6), seed=32))
+    assert "those that the calibration" not in fresh.summary

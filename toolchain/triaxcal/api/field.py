@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,6 +69,8 @@ class InTheField:
         done = self.fitted
         gravity_g = stated_gravity_g(done, gravity_m_per_s2)
         poses = inside_range(poses_of(done, recorded, layout), done.calibration.range_degc)
+        if used := _used(done, poses, recorded):
+            poses = replace(poses, findings=(*poses.findings, used))
         force = integer_force_g(done, poses.readings, poses.temps_degc)
         c_error_g = (force**2).sum(axis=1) ** 0.5 - gravity_g
         parts = done.unit, done.measurements, done.calibration
@@ -152,8 +154,17 @@ def bring_up_to_date(
     ))  # fmt: skip
     poses = poses_of(done, recorded, layout)
     digest = _digest(recorded)
-    earlier = () if done.calibration.update is None else done.calibration.update.parents
-    source = Source((*earlier, done.inputs_sha256), Path(poses.source).name, digest)
+    if used := _used(done, poses, recorded):
+        raise RefusedError(
+            poses.source,
+            used,
+            expected="poses that the calibration has not seen",
+            remedy="record new poses",
+        )
+    before = done.calibration.update
+    earlier = () if before is None else before.parents
+    logs = () if before is None else (*before.earlier_sha256, before.recording_sha256)
+    source = Source((*earlier, done.inputs_sha256), Path(poses.source).name, digest, logs)
     parts = done.unit, done.measurements, done.calibration
     found = update_by_poses(parts, poses, gravity_g, allowed, source)
     stated = f"{done.inputs_sha256} {digest} {gravity_g!r} {allowed!r}"
@@ -162,6 +173,22 @@ def bring_up_to_date(
     dwells = pose_dwells(kept.poses, kept.temps_degc)
     measurements = MeasurementSet(kept.source, dwells)
     return Updated(done, Fitted(done.unit, measurements, inputs, found.calibration), found)
+
+
+def _used(done: Fitted, poses: FieldPoses, recorded: Any) -> str:
+    """Words where the calibration was made of these poses, or updated by them; else empty."""
+    from triaxcal.fitting.field.poses import known_poses  # noqa: PLC0415
+
+    update = done.calibration.update
+    if update is not None and _digest(recorded) in (
+        update.recording_sha256,
+        *update.earlier_sha256,
+    ):
+        return "the calibration was updated by this recording already: it says nothing new"
+    same = known_poses(poses, done.measurements)
+    if 2 * same < len(poses):
+        return ""
+    return f"{same} of {len(poses)} poses are those that the calibration was made of: no new data"
 
 
 def _positive(name: str, value: float) -> float:

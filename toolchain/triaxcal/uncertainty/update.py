@@ -53,11 +53,14 @@ class Source:
     parents : tuple of str
         inputs_sha256 of the calibrations before it, the oldest first.
     recording, recording_sha256 : str
+    earlier_sha256 : tuple of str
+        Of the recordings of the updates before.
     """
 
     parents: tuple[str, ...]
     recording: str
     recording_sha256: str
+    earlier_sha256: tuple[str, ...] = ()
 
 
 def update_by_poses(
@@ -120,6 +123,7 @@ def update_by_poses(
         drift.scale,
         drift.axes_rad,
         found.chi_square,
+        source.earlier_sha256,
     )
     calibrated = updated_calibration(made, (state, posterior), found, new.own_sd_g, new.dof)
     return replace(made, calibration=replace(calibrated, update=record))

@@ -24,6 +24,8 @@ class Update:
         (relative), of each angle between axes (rad).
     chi_square : float
         Of the poses against the calibration before, drift allowed for; `poses` are expected.
+    earlier_sha256 : tuple of str
+        Of the recordings of the updates before this one.
     """
 
     parents: tuple[str, ...]
@@ -35,3 +37,4 @@ class Update:
     scale_drift: float
     axes_drift: float
     chi_square: float
+    earlier_sha256: tuple[str, ...] = ()

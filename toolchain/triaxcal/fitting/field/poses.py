@@ -14,7 +14,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import Pose, PoseSet, find_poses
 from triaxcal.readings.identity import refuse_other_serial
-from triaxcal.readings.measurements import measurements_of, read_measurements
+from triaxcal.readings.measurements import MeasurementSet, measurements_of, read_measurements
 from triaxcal.readings.samples import read_samples
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import ACCELERATION_UNITS, RecordingLayout
@@ -64,6 +64,13 @@ class FieldPoses:
             self.findings,
             poses,
         )
+
+
+def known_poses(poses: FieldPoses, measured: MeasurementSet) -> int:
+    """Number of poses whose readings and temperature are those of dwells of a calibration."""
+    own = {(*np.abs(d.voltage_v).tolist(), d.temp_degc) for d in measured.dwells}
+    rows = np.column_stack([np.abs(poses.readings), poses.temps_degc]).tolist()
+    return sum(tuple(row) in own for row in rows)
 
 
 def field_poses(
