@@ -277,3 +277,20 @@ def test_data_that_the_calibration_has_seen_are_no_update(
         triaxcal.update(top / "units" / "U", first, build)
     fresh = cal.check(recorded(tmp_path, directions(6), seed=32))
     assert "those that the calibration" not in fresh.summary
+
+
+def test_an_update_that_makes_nothing_more_certain_says_so(
+    cal: triaxcal.Calibration, tmp_path: Path
+) -> None:
+    path = recorded(tmp_path, directions(6)[[0]], bias=U0)
+    loss = cal.update(path, bias_drift_mg=20.0, scale_drift_ppm=20000, axes_drift_micro_rad=9000)
+    assert (loss.result.sd_after >= loss.result.sd_before).all()
+    assert "no constant is more certain than before" in loss.summary
+    gain = cal.update(
+        recorded(tmp_path, directions(6), bias=U0),
+        bias_drift_mg=0.01,
+        scale_drift_ppm=1,
+        axes_drift_micro_rad=1,
+    )
+    assert (gain.result.sd_after < gain.result.sd_before).any()
+    assert "no constant is more certain" not in gain.summary

@@ -25,6 +25,8 @@ def update_text(serial: str, found: FieldUpdate, before: Calibration) -> str:
         f"{serial} updated by {count} poses of {name}; constants at {t0:g} degC",
         "",
         *_table(found, before),
+        "  +- is two standard uncertainties (95 %); the options of a drift are one",
+        *_no_gain(found),
         "",
         f"chi-square   {found.chi_square:.1f}, {count} expected: the poses against the prior",
         f"|a| - g      {before_mg} mg rms at these poses before, {now_mg} mg now",
@@ -32,6 +34,18 @@ def update_text(serial: str, found: FieldUpdate, before: Calibration) -> str:
     recording = found.calibration.recording
     findings = () if recording is None else recording.findings
     return "\n".join([*lines, *(f"found        {finding}" for finding in findings)])
+
+
+def _no_gain(found: FieldUpdate) -> list[str]:
+    """A line where the update makes no constant more certain than the calibration before."""
+    if (found.sd_after < found.sd_before).any():
+        return []
+    return [
+        "",
+        "no gain      no constant is more certain than before: the drift that is allowed for is",
+        "             more than the poses tell. If `triaxcal check` passes, keep the files before,",
+        "             or state a smaller drift.",
+    ]
 
 
 def _table(found: FieldUpdate, before: Calibration) -> list[str]:

@@ -1,7 +1,8 @@
 """A delivered calibration brought up to date by poses from the field, and what that changed.
 
-The prior is the calibration with all its uncertainty but gravity's and the thermometer's, which act
-again, and an allowance for drift. Poses that contradict it are refused: where
+The prior is the covariance of the calibration's fit, the sources of `_ALIKE` at the temperature
+where each is largest, and an allowance for drift. Gravity acts again, in the poses. Poses that
+contradict it are refused: where
 
     r^T S^-1 r / n,    S = H (V + drift) H^T + R,
 
@@ -39,7 +40,7 @@ from triaxcal.uncertainty.rig_sources import GRAVITY_M_PER_S2
 from triaxcal.uncertainty.updated import FieldUpdate, updated_calibration
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
-_ALIKE = frozenset({"repeatability", "squareness", "level", "thermal_model"})
+_ALIKE = frozenset({"repeatability", "squareness", "level", "thermal_model", "runs"})
 """Sources of a tilter's calibration that are in the prior besides the noise of its readings."""
 _NOTHING = 0.02
 
@@ -81,7 +82,7 @@ def update_by_poses(
     gravity_sd = (GRAVITY_M_PER_S2 if stated is None else stated) / STANDARD_GRAVITY_M_PER_S2
     noise = np.diag(new.own_sd_g**2) + gravity_sd**2
     state = state_of(calibration)
-    factory = calibration_covariance(state, _alike_at_t0(parts))
+    factory = calibration_covariance(state, _alike(parts))
     allowed = factory + drift_covariance(state, drift)
     found = innovation(state, allowed, poses, noise, gravity_g)
     _refuse_contradiction(found, poses, new.dof, drift)
@@ -129,16 +130,20 @@ def update_by_poses(
     return replace(made, calibration=replace(calibrated, update=record))
 
 
-def _alike_at_t0(parts: Parts) -> FloatArray:
-    """Covariance of the constants at T0 of a tilter's rig, (12, 12); zero for a recording."""
+def _alike(parts: Parts) -> FloatArray:
+    """Covariance of the constants of a tilter's rig and model, (12, 12); zero for a recording.
+
+    Of each source the largest over the range: the thermal model errs least at T0.
+    """
     unit, measurements, calibration = parts
     total = np.zeros((12, 12))
     if calibration.recording is None:
-        grid = np.array([unit.t0_degc])
+        grid = np.unique([*np.linspace(*calibration.range_degc, 9), unit.t0_degc])
         rows = np.array(ROWS)
         for s in uncertainty(unit, measurements, calibration, None, grid).sources:
             if s.key in _ALIKE and s.constants is not None:
-                total += s.constants[0][rows[:, None], rows]
+                worst = int(np.trace(s.constants, axis1=1, axis2=2).argmax())
+                total += s.constants[worst][rows[:, None], rows]
     return total
 
 

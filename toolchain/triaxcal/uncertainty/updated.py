@@ -139,7 +139,8 @@ def _recording(
     findings = [*made.poses.findings]
     if made.unseen:
         findings.append(
-            f"the update says next to nothing of {', '.join(made.unseen)}: they stay as they were"
+            f"the update says next to nothing of {', '.join(made.unseen)}: their values "
+            "stay as they were, their uncertainty grows by the drift"
         )
     findings.append("|a| shows no rotation of the axes against the case: it stays as it was")
     size = len(state.theta)
