@@ -12,6 +12,7 @@ from test_recordings import calibrated
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import fit_folder
+from triaxcal.fitting.core.judged import ORIENTATION, TEMPERATURE, HeldOutPoses
 from triaxcal.fitting.route import refuse_poses_beyond_limits
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import products
@@ -109,6 +110,12 @@ def test_a_held_out_error_beyond_the_limit_is_refused(tmp_path: Path) -> None:
     recording = done.calibration.recording
     assert recording is not None
     refuse_poses_beyond_limits(done.unit, done.calibration)
-    worse = replace(recording, left_out_length_g=0.021)
-    with pytest.raises(RefusedError, match="21 mg rms at held-out poses; the fit's residual is"):
-        refuse_poses_beyond_limits(done.unit, replace(done.calibration, recording=worse))
+    pose = recording.poses.poses[4]
+    for what in (ORIENTATION, TEMPERATURE):
+        worse = replace(recording, held_out=(HeldOutPoses(what, (3, 4), np.array([0.001, 0.6])),))
+        with pytest.raises(RefusedError, match="mg rms at held-out poses, with each") as caught:
+            refuse_poses_beyond_limits(done.unit, replace(done.calibration, recording=worse))
+        assert caught.value.place.endswith(f", line {pose.line}")
+        assert f"{what} held out in turn; the largest is 600 mg in pose {pose.number}" in str(
+            caught.value
+        )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.converter import as_converted, signs_of
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.judged import TEMPERATURE
 from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.fitting.pair.cross_coupling import stated_pair
 from triaxcal.fitting.recorded.calibrate import calibrate_poses
@@ -116,7 +117,7 @@ def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) 
     limits = np.array([unit.limits.at(t, unit.t0_degc)[0] for t in temps])
     worst = int((np.abs(errors) / limits).argmax())
     if abs(errors[worst]) <= limits[worst]:
-        _refuse_held_out(unit, recording, float(limits.max()))
+        _refuse_held_out(unit, recording, temps)
         return
     pose = poses[worst]
     key = unit.limits.at(temps[worst], unit.t0_degc)[1]
@@ -130,17 +131,61 @@ def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) 
     )
 
 
-def _refuse_held_out(unit: UnitDescription, recording: RecordingFit, limit_g: float) -> None:
+@dataclass(frozen=True)
+class _Missed:
+    """Poses held out that have one limit in common: their rms error, and the worst of them."""
+
+    what: str
+    limit_g: float
+    key: str
+    rms_g: float
+    worst: int
+    error_g: float
+
+
+def _held_out_groups(
+    unit: UnitDescription, recording: RecordingFit, temps: Sequence[float]
+) -> list[_Missed]:
+    """Held-out errors by the limit of their pose; temperatures held out have that over the range.
+
+    The latter show the curves between the calibrated temperatures, as those of a tilter do.
+    """
+    found = []
+    for held in recording.held_out:
+        over = unit.limits.over_range_g, "limits.over_range_g"
+        own = [
+            over if held.what == TEMPERATURE else unit.limits.at(temps[k], unit.t0_degc)
+            for k in held.poses
+        ]
+        for limit_g, key in sorted(set(own)):
+            at = [n for n, limit in enumerate(own) if limit == (limit_g, key)]
+            errors = np.abs(held.error_g[at])
+            worst = int(errors.argmax())
+            rms = float(np.sqrt(np.mean(errors**2)))
+            found.append(
+                _Missed(held.what, limit_g, key, rms, held.poses[at[worst]], float(errors[worst]))
+            )
+    return found
+
+
+def _refuse_held_out(
+    unit: UnitDescription, recording: RecordingFit, temps: Sequence[float]
+) -> None:
     """Refuse an error at unseen poses that is beyond the limit, whatever the residual is."""
-    error_g = recording.left_out_length_g
-    if error_g is None or error_g <= limit_g:
+    groups = _held_out_groups(unit, recording, temps)
+    missed = max(groups, key=lambda m: m.rms_g / m.limit_g, default=None)
+    if missed is None or missed.rms_g <= missed.limit_g:
         return
-    key = "limits.at_t0_g" if limit_g == unit.limits.at_t0_g else "limits.over_range_g"
+    pose = recording.poses.poses[missed.worst]
+    at = "" if pose.temp_degc is None else f" at {pose.temp_degc:.4g} degC"
+    remedy = "record more poses, in different orientations"
+    if missed.what == TEMPERATURE:
+        remedy = "record poses at more temperatures, or choose another function in [thermal]"
     raise RefusedError(
-        recording.poses.source,
-        f"| |a| - g | = {error_g * 1e3:.4g} mg rms at held-out poses; the fit's residual is "
-        f"{recording.rms_g * 1e3:.3g} mg rms",
-        expected=f"at most {limit_g * 1e3:g} mg ({key})",
-        remedy="record more poses, in different orientations; `triaxcal poses` shows those that "
-        "there are",
+        f"{recording.poses.source}, line {pose.line}",
+        f"| |a| - g | = {missed.rms_g * 1e3:.4g} mg rms at held-out poses, with each "
+        f"{missed.what} held out in turn; the largest is {missed.error_g * 1e3:.4g} mg in pose "
+        f"{pose.number}{at}; the fit's residual is {recording.rms_g * 1e3:.3g} mg rms",
+        expected=f"at most {missed.limit_g * 1e3:g} mg ({missed.key})",
+        remedy=f"{remedy}; `triaxcal poses` shows those that there are",
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint, Candidate
+from triaxcal.fitting.core.judged import ORIENTATION, HeldOutPoses
 from triaxcal.fitting.core.posterior import Posterior
 from triaxcal.fitting.core.recorded import RecordingFit, TermsCovariance
 from triaxcal.fitting.field.poses import FieldPoses
@@ -161,4 +162,5 @@ def _recording(
         findings=tuple(findings),
         expected_g=float(np.sqrt(np.mean(expected**2))),
         held_out_poses=len(made.poses),
+        held_out=(HeldOutPoses(ORIENTATION, tuple(range(len(held_out))), held_out),),
     )

@@ -1,12 +1,50 @@
-"""What a tilter's readings say of their own fit: held-out errors, own-axis squares, runs."""
+"""What readings say of their own fit: held-out errors, own-axis squares, runs."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from triaxcal.fitting.core.outliers import CHANCE
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.unit.priors import AUTO, LINEAR
+
+ORIENTATION, TEMPERATURE = "orientation", "temperature"
+
+
+@dataclass(frozen=True)
+class HeldOutPoses:
+    """|a| - g at poses of a recording, by fits without them.
+
+    Attributes
+    ----------
+    what : str
+        `ORIENTATION` or `TEMPERATURE`: what was held out in turn.
+    poses : tuple of int
+        Indices of the poses.
+    error_g : array, shape (n,)
+    """
+
+    what: str
+    poses: tuple[int, ...]
+    error_g: FloatArray
+
+
+def held_out_poses(
+    errors_g: FloatArray | None, turns: Iterable[tuple[str, Sequence[BoolArray]]]
+) -> tuple[HeldOutPoses, ...]:
+    """Errors in the order of the turns as those of poses; masks are of the poses judged."""
+    found: list[HeldOutPoses] = []
+    start = 0
+    for what, masks in turns:
+        if errors_g is None or not masks:
+            continue
+        poses = tuple(int(k) for mask in masks for k in np.flatnonzero(mask))
+        found.append(HeldOutPoses(what, poses, errors_g[start : start + len(poses)]))
+        start += len(poses)
+    return tuple(found)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from triaxcal.fitting.core.judged import HeldOutPoses
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
 
@@ -138,6 +139,8 @@ class RecordingFit:
     held_out_poses : int
         Of how many poses `left_out_length_g` is.
     shares : tuple of ConstantShare
+    held_out : tuple of HeldOutPoses
+        Errors of orientations and of temperatures held out.
     """
 
     poses: PoseSet
@@ -158,6 +161,7 @@ class RecordingFit:
     expected_g: float | None = None
     held_out_poses: int = 0
     shares: tuple[ConstantShare, ...] = ()
+    held_out: tuple[HeldOutPoses, ...] = ()
 
     @property
     def checked(self) -> bool:

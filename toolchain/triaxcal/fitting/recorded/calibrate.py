@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.judged import ORIENTATION, TEMPERATURE, held_out_poses
 from triaxcal.fitting.core.outliers import left_out_residuals, worst_outlier
 from triaxcal.fitting.recorded.made import Made
 from triaxcal.fitting.recorded.magnitude import fit_with_prior
@@ -40,7 +41,7 @@ from triaxcal.fitting.recorded.trials import (
     worth_judging,
 )
 from triaxcal.model.thermal.shape import ThermalShape
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.poses.poses import PoseSet, find_poses
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.readings.samples import Samples
@@ -69,6 +70,12 @@ class Turns:
     def all(self) -> list[Turn]:
         """In the order of the scores."""
         return self.orientations + self.temperatures + self.halves
+
+    @property
+    def judged(self) -> list[tuple[str, list[BoolArray]]]:
+        """Masks of the poses that orientations and temperatures judge."""
+        kinds = ((ORIENTATION, self.orientations), (TEMPERATURE, self.temperatures))
+        return [(what, [judged for _, judged in turns]) for what, turns in kinds]
 
     @staticmethod
     def values(turns: list[Turn]) -> int:
@@ -111,6 +118,7 @@ def calibrate_poses(
         delivered,
         best,
         Turns.values(turns.orientations),
+        held_out_poses(delivered.own.errors_g, turns.judged),
         why,
         findings,
     )

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration, CalibrationPoint
+from triaxcal.fitting.core.judged import HeldOutPoses
 from triaxcal.fitting.core.posterior import Posterior
 from triaxcal.fitting.core.recorded import (
     LEFT_OUT_PART,
@@ -47,6 +48,8 @@ class Made:
         The linear constants with priors: what the poses see.
     by_orientation : int
         How many of the held-out values, the first ones, are those of orientations.
+    held_out : tuple of HeldOutPoses
+        Of what is delivered.
     """
 
     unit: UnitDescription
@@ -57,6 +60,7 @@ class Made:
     delivered: Delivered
     linear: Judged
     by_orientation: int
+    held_out: tuple[HeldOutPoses, ...]
     why: str
     findings: list[str]
 
@@ -123,6 +127,7 @@ class Made:
             noise_95_g=posterior.half_width,
             expected_g=own.expected_g,
             held_out_poses=self.by_orientation,
+            held_out=self.held_out,
             shares=constant_shares(self.delivered.full, self.unit.t0_degc, self.layout),
         )
 

@@ -9,12 +9,19 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.judged import (
+    ORIENTATION,
+    TEMPERATURE,
+    HeldOutPoses,
+    held_out_poses,
+)
 from triaxcal.fitting.core.recorded import NO_TERMS_COVARIANCE, RecordingFit, TermsCovariance
 from triaxcal.fitting.recorded.calibrate import BEYOND_1_G, pose_dwells
 from triaxcal.fitting.recorded.checks import CONDITION_MAX
 from triaxcal.fitting.recorded.made import recorded_calibration
 from triaxcal.fitting.recorded.temperatures import (
     temperature_findings,
+    temperature_groups,
 )
 from triaxcal.fitting.table.candidates import (
     LEFT_OUT_MAX,
@@ -197,7 +204,7 @@ def _calibration(
         covariance = full.covariance
         terms = TermsCovariance(full.quadratic_covariance, full.cross)
         dof = max(1, 3 * len(temps) - round(float(full.effective.sum())))
-    lengths = _left_out_lengths(best, known, unit.gravity_g)
+    held_out = _held_out_lengths(best, known, unit.gravity_g)
     recording = RecordingFit(
         poses=poses,
         route="angles of a table known",
@@ -206,12 +213,13 @@ def _calibration(
         rms_g=best.fitted_g,
         rms_free_g=math.sqrt(float((best.own_g**2).sum()) / dof),
         held_out_g=best.held_out_g,
-        left_out_length_g=lengths,
+        left_out_length_g=float(np.sqrt(np.mean(held_out[0].error_g ** 2))) if held_out else None,
         condition=best.fit.condition,
         weakest="",
         residual_g=errors,
         findings=tuple(findings),
         terms=terms,
+        held_out=held_out,
     )
     return recorded_calibration(
         unit,
@@ -227,12 +235,17 @@ def _calibration(
     )
 
 
-def _left_out_lengths(best: TableRow, known: TablePoses, gravity_g: float) -> float | None:
-    """Rms |a| - g of each pose held out in turn."""
+def _held_out_lengths(
+    best: TableRow, known: TablePoses, gravity_g: float
+) -> tuple[HeldOutPoses, ...]:
+    """|a| - g of each pose held out in turn, and of the poses of each inner temperature."""
     if best.errors_g is None:
-        return None
-    force = known.force + best.errors_g[: len(known.force)]
-    return float(np.sqrt(np.mean((np.linalg.norm(force, axis=1) - gravity_g) ** 2)))
+        return ()
+    masks, count = turns(known, temperature_groups(known.temps_degc)), len(known.force)
+    force = np.concatenate([known.force[mask] for mask in masks]) + best.errors_g
+    lengths = np.linalg.norm(force, axis=1) - gravity_g
+    kinds = ((ORIENTATION, masks[:count]), (TEMPERATURE, masks[count:]))
+    return held_out_poses(lengths, kinds)
 
 
 def _covariance(best: TableRow, known: TablePoses) -> tuple[FloatArray, TermsCovariance]:
