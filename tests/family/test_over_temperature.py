@@ -47,7 +47,8 @@ def test_a_bias_between_the_temperatures_is_missed_at_temperatures_held_out(
     jump = np.where(rows[:, 4] == 40.0, 0.1, 0.0)
     rows[:, 1:4] += jump[:, None]
     more = (
-        '[thermal]\nmodel = "polynomial"\norder = 3\n[limits]\nat_t0_g = 0.007\nover_range_g = 0.007'
+        '[thermal]\nmodel = "polynomial"\norder = 3\n'
+        "[limits]\nat_t0_g = 0.007\nover_range_g = 0.007\n"
     )
     with pytest.raises(RefusedError, match="temperature held out in turn; the largest is"):
         deliver(unit_with(tmp_path / "U", rows, more))
