@@ -67,6 +67,26 @@ def test_signs_that_contradict_the_stated_polarity_are_refused():
     described("nominal_v_per_g = [1.0, -1.0, 1.0]\npolarity = [1, -1, 1]")
 
 
+def test_keys_that_this_kind_of_unit_does_not_use_are_refused():
+    with pytest.raises(RefusedError, match=r"\[firmware\] terms.*own-squares"):
+        described('\n[firmware]\nterms = "quadratic"')
+    assert described('\n[firmware]\nterms = "own-squares"').firmware_terms == "own-squares"
+    recorded = """format = 1
+serial = "N"
+[site]
+local_gravity_m_per_s2 = 9.8
+[recording]
+file = "log.csv"
+rows = "poses"
+acceleration = ["ax", "ay", "az"]
+acceleration_unit = "g"
+[sensor]
+"""
+    unit_of_text("N", recorded, "unit.toml")
+    with pytest.raises(RefusedError, match=r"nominal_v_per_g.*remove it"):
+        unit_of_text("N", recorded + "nominal_v_per_g = 1.0", "unit.toml")
+
+
 def test_a_unit_of_its_nominal_sensitivity_passes():
     own = described("nominal_v_per_g = -0.5")  # 10 % below, within 20 %
     assert calibrate(own, scaled((1, 1, 1))).serial == "N"

@@ -121,3 +121,17 @@ def test_a_nonlinear_problem_is_solved_from_the_prior_mean() -> None:
     sd = np.sqrt(np.diag(found.covariance))
     assert np.abs((found.theta - centre) / sd).max() < 4.0
     assert sd.max() < 1e-4
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_a_robust_loss_finds_the_noise_of_normal_data(loss: str) -> None:
+    """400 values: s is known to 1 / sqrt(792), the mean of eight of them to 1.3 %; three of it."""
+    found = []
+    for seed in range(8):
+        design, values, prior = problem(400, seed)
+        found.append(
+            fit_map(
+                lambda theta, A=design, y=values: (A @ theta - y, A), prior, np.ones(400), loss=loss
+            ).scale
+        )
+    assert np.mean(found) == pytest.approx(1e-3, rel=3.0 / math.sqrt(2.0 * 396 * 8))

@@ -26,7 +26,14 @@ from triaxcal.unit.gravity import gravity_difference_m_per_s2, refuse_wrong_grav
 from triaxcal.unit.limits import LIMITS, RECORDED_LIMITS, Limits
 from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.pair import QUADRATIC, PairSource, pair_source
-from triaxcal.unit.priors import AUTO, FIRMWARE, PRIORS, FirmwareChoice, Priors
+from triaxcal.unit.priors import (
+    AUTO,
+    FIRMWARE,
+    PRIORS,
+    QUADRATIC_TERMS,
+    FirmwareChoice,
+    Priors,
+)
 from triaxcal.unit.recording import RECORDING, RecordingLayout, recording_layout
 from triaxcal.unit.site import SITE, STANDARD_GRAVITY_M_PER_S2, PlacedSite
 from triaxcal.unit.thermal import Temperatures, ThermalChoice, thermal_choice, thermal_table
@@ -171,6 +178,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
     adc, site = tables["adc"], tables["site"].record(PlacedSite)
     refuse_wrong_gravity(site, tables["site"].file)
     sensor = tables["sensor"].record(Sensor)
+    _refuse_inapplicable(tables, sensor)
     return UnitDescription(
         name=name,
         serial=tables[""][SERIAL],
@@ -200,6 +208,23 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         gravity_difference_m_per_s2=gravity_difference_m_per_s2(site),
         measured=tables["measured"].record(Measured),
     )
+
+
+def _refuse_inapplicable(tables: Mapping[str, Values], sensor: Sensor) -> None:
+    """Refuse what this kind of unit does not use."""
+    if "recording" in tables:
+        if sensor.nominal_v_per_g is not None:
+            raise tables["sensor"].refuse(
+                "nominal_v_per_g",
+                "no such key with [recording], whose acceleration_unit tells the sensitivity",
+                "remove it; [priors] mean_scale is how far the mean sensitivity may be from it",
+            )
+    elif tables["firmware"].record(FirmwareChoice).terms == QUADRATIC_TERMS:
+        raise tables["firmware"].refuse(
+            "terms",
+            '"auto", "linear" or "own-squares": six positions do not show the other products',
+            'set "own-squares"; products of a [quadratic] pair are in the C as they are',
+        )
 
 
 def _polarity(sensor: Sensor, values: Values) -> tuple[int, int, int] | None:

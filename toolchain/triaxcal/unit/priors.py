@@ -51,8 +51,8 @@ class FirmwareChoice:
     terms
         Terms beyond the twelve constants in the C. auto: those whose effect over the working range
         matters against the uncertainty. linear: none. own-squares: the square of each axis' own
-        acceleration. quadratic: all products. State it so that all units of a series run one
-        routine.
+        acceleration. quadratic: all products; not on a tilter. State it so that all units of a
+        series run one routine.
     """
 
     terms: str = setting(word(FIRMWARE_TERMS), AUTO)

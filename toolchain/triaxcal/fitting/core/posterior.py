@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,6 +34,14 @@ _STEPS_MAX = 60
 _SETTLED = 1e-9
 """Of a prior standard deviation."""
 _HALVINGS = 12
+_TURN = 3.0
+_KAPPA = {
+    "linear": 1.0,
+    "huber": math.erf(_TURN / math.sqrt(2.0)),
+    "cauchy": _TURN**2
+    - _TURN**3 * math.sqrt(math.pi / 2.0) * math.exp(_TURN**2 / 2.0) * math.erfc(_TURN / 2.0**0.5),
+}
+"""E[w(x)^2 x^2] of a standard normal x with the weights of `_robust`."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +188,7 @@ def fit_map(
     for step_number in range(_STEPS_MAX):
         w = weight * _robust(residual * weight, loss) if step_number > 1 else weight
         B, y = w[:, None] * (slopes @ L), w * residual
-        at = Linearised.about(B, y - B @ z, count)
+        at = _consistent(Linearised.about(B, y - B @ z, count), s, loss)
         if scale is None:
             s = math.exp(noise_of(at, noise).mean)
         step = at.best(s) - z
@@ -189,7 +197,7 @@ def fit_map(
             break
     w = weight * _robust(residual * weight, loss)
     B = w[:, None] * (slopes @ L)
-    at = Linearised.about(B, w * residual - B @ z, count)
+    at = _consistent(Linearised.about(B, w * residual - B @ z, count), s, loss)
     known = noise_of(at, noise)
     found, reach, dof = math.exp(known.mean), known.half_width() / NORMAL_95, known.dof
     if scale is not None:
@@ -220,11 +228,18 @@ def _line_search(
     return to, after, slopes
 
 
+def _consistent(at: Linearised, scale: float, loss: str) -> Linearised:
+    """The problem with as many values as make s that of normal data, whose squares are lowered."""
+    b2 = at.singular**2
+    used = float((b2 / (scale**2 + b2)).sum())
+    return replace(at, values=at.values - (1.0 - _KAPPA[loss]) * max(at.values - used, 0.0))
+
+
 def _robust(residual: FloatArray, loss: str) -> FloatArray:
     """Square roots of the weights that a robust loss gives weighted residuals (n,)."""
     if loss == "linear":
         return np.ones(len(residual))
-    turn = 3.0 * 1.4826 * float(np.median(np.abs(residual))) or 1e-9
+    turn = _TURN * 1.4826 * float(np.median(np.abs(residual))) or 1e-9
     ratio = np.abs(residual) / turn
     if loss == "huber":
         return np.asarray(1.0 / np.sqrt(np.maximum(ratio, 1.0)), dtype=np.float64)

@@ -82,7 +82,7 @@ def choose_terms(unit: UnitDescription, rows: Sequence[Judged]) -> Delivered:
     if len(rows) == 1:
         return Delivered(linear, linear, "no terms are fitted: [fit] terms")
     full, wide = by_model[FULL.label], by_model[WIDE.label]
-    best = min((full, wide), key=lambda row: row.held_out_g or 0.0)
+    best = min((full, wide), key=_score)
     if _better(wide, full):
         full = best = wide
     stated = unit.firmware_terms
@@ -90,7 +90,7 @@ def choose_terms(unit: UnitDescription, rows: Sequence[Judged]) -> Delivered:
         stated = QUADRATIC_C
     if stated != AUTO:
         return _stated(stated, by_model, linear, full)
-    own = min((by_model[OWN_SQUARES.label], best), key=lambda row: row.held_out_g or 0.0)
+    own = min((by_model[OWN_SQUARES.label], best), key=_score)
     effect, u = largest_effect(unit, linear, own)
     words = f"largest effect {_mg(effect)} at 1 g, where the standard uncertainty is {_mg(u)}"
     if own.held_out_g is None or linear.held_out_g is None:
@@ -113,6 +113,10 @@ def _stated(stated: str, by_model: Mapping[str, Judged], linear: Judged, full: J
     own = {LINEAR_C: linear, OWN_SQUARES_C: by_model[OWN_SQUARES.label], QUADRATIC_C: full}[stated]
     key = "[firmware] terms" if stated != QUADRATIC_C else "[firmware] or [fit] terms"
     return Delivered(own, full, f'{key} = "{stated}"')
+
+
+def _score(row: Judged) -> float:
+    return math.inf if row.held_out_g is None else row.held_out_g
 
 
 def _better(row: Judged, rival: Judged) -> bool:
