@@ -294,3 +294,15 @@ def test_an_update_that_makes_nothing_more_certain_says_so(
     )
     assert (gain.result.sd_after < gain.result.sd_before).any()
     assert "no constant is more certain" not in gain.summary
+
+
+def test_a_refused_option_is_named_as_it_was_typed(top: Path, tmp_path: Path) -> None:
+    path = recorded(tmp_path, directions(6))
+    given = [str(top / "units" / "U"), "--build", str(top / "build")]
+    for command, option, value in (
+        (["update", *given, "--with"], "--bias-drift", "0"),
+        (["update", *given, "--with"], "--gravity", "978"),
+        (["check", *given, "--on"], "--gravity", "978"),
+    ):
+        with pytest.raises(RefusedError, match=f"^{option}: found {value}; expected"):
+            main.main([*command, str(path), option, value], standalone_mode=False)

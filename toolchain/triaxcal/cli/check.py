@@ -7,7 +7,15 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import DELIVERED, UnitFolder, command, example, field_options, say
+from triaxcal.cli.options import (
+    DELIVERED,
+    UnitFolder,
+    by_option,
+    command,
+    example,
+    field_options,
+    say,
+)
 
 
 @command(
@@ -39,8 +47,10 @@ def check(
     import triaxcal  # noqa: PLC0415
     from triaxcal.api.delivery import delivered_file  # noqa: PLC0415
 
-    found = triaxcal.load(delivered_file(unit, build)).check(
-        recorded, layout=layout, gravity_m_per_s2=gravity
-    )
+    done = triaxcal.load(delivered_file(unit, build))
+    try:
+        found = done.check(recorded, layout=layout, gravity_m_per_s2=gravity)
+    except triaxcal.RefusedError as refusal:
+        raise by_option(refusal) from refusal
     say(found.summary)
     sys.exit(not found.result.passed)

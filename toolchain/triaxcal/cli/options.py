@@ -89,6 +89,20 @@ DELIVERED = click.option(
 )
 
 
+_OPTIONS = {
+    "gravity_m_per_s2": "--gravity",
+    "bias_drift_mg": "--bias-drift",
+    "scale_drift_ppm": "--scale-drift",
+    "axes_drift_micro_rad": "--axes-drift",
+}
+
+
+def by_option(refusal: RefusedError) -> RefusedError:
+    """The refusal of an argument of the API by the name of its option."""
+    place = _OPTIONS.get(refusal.place, refusal.place)
+    return type(refusal)(place, refusal.found, expected=refusal.expected, remedy=refusal.remedy)
+
+
 def field_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """--layout and --gravity of a recording from the field."""
     layout = click.option(

@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import DELIVERED, UnitFolder, command, example, field_options, say
+from triaxcal.cli.options import (
+    DELIVERED,
+    UnitFolder,
+    by_option,
+    command,
+    example,
+    field_options,
+    say,
+)
 
 
 @command(
@@ -53,15 +61,18 @@ def update(  # noqa: PLR0917
     """
     import triaxcal  # noqa: PLC0415
 
-    done = triaxcal.update(
-        unit,
-        recorded,
-        build,
-        into=into,
-        layout=layout,
-        gravity_m_per_s2=gravity,
-        bias_drift_mg=bias_drift,
-        scale_drift_ppm=scale_drift,
-        axes_drift_micro_rad=axes_drift,
-    )
+    try:
+        done = triaxcal.update(
+            unit,
+            recorded,
+            build,
+            into=into,
+            layout=layout,
+            gravity_m_per_s2=gravity,
+            bias_drift_mg=bias_drift,
+            scale_drift_ppm=scale_drift,
+            axes_drift_micro_rad=axes_drift,
+        )
+    except triaxcal.RefusedError as refusal:
+        raise by_option(refusal) from refusal
     say(done.summary)
