@@ -49,7 +49,7 @@ class FirmwareChoice:
     Attributes
     ----------
     terms
-        Terms beyond the twelve constants in the C. auto: those whose effect over the working range
+        Terms beyond the twelve constants in the C. auto: those whose effect at T0 and 1 g
         matters against the uncertainty. linear: none. own-squares: the square of each axis' own
         acceleration. quadratic: all products; not on a tilter. State it so that all units of a
         series run one routine.

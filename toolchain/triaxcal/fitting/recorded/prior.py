@@ -5,8 +5,8 @@ own-axis squares, other products, biases. Poses see only some combinations of th
 prior is kept in all 18 of them: what |a| cannot see keeps it, and what |a| sees gets the right one.
 
 Over temperature a constant's function f = sum c_p phi_p(T) has, besides the same standard deviation
-for its constant part, c ~ N(0, sd^2 (Phi^T Phi / n)^-1): the function varies over the poses as much
-as the constant itself may, whatever functions it is written in.
+for its constant part, c ~ N(0, sd^2 (Phi^T Phi / n)^-1): its mean variance over the poses is sd^2
+for each function, whatever functions it is written in.
 """
 
 from __future__ import annotations
