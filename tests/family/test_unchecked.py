@@ -27,6 +27,15 @@ def exact(count: int) -> FloatArray:
     return poses @ K.T + U0
 
 
+def test_a_passport_does_not_deny_the_held_out_poses_of_its_head(tmp_path: Path) -> None:
+    recording = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "m/s^2"'
+    readings = directions(14) @ K.T + U0
+    made = passport(deliver(write_unit(tmp_path / "U", readings, recording, header="a,b,c")), {})
+    page = passport_html(made).decode()
+    assert "Held-out poses" in page
+    assert "Nothing was held out" not in page
+
+
 @pytest.mark.parametrize("count", [4, 6])
 def test_what_no_pose_tests_is_not_called_passed(tmp_path: Path, count: int) -> None:
     recording = 'rows = "poses"\nacceleration = [1, 2, 3]\nacceleration_unit = "m/s^2"'
@@ -37,6 +46,7 @@ def test_what_no_pose_tests_is_not_called_passed(tmp_path: Path, count: int) -> 
     assert "held out        none: no pose is determined by the others" in told
     assert "What the poses leave open gives" in told
     assert "not tested: nothing was held out" in passport_html(made).decode()
+    assert "Nothing was held out." in passport_html(made).decode()
     assert not made.shown
     # What is unknown is stated: cross terms of 10 mrad at least.
     assert made.component_budget.expanded > 0.015

@@ -52,7 +52,7 @@ def passport_html(p: Passport) -> bytes:
             for h in p.held_out
             if h.dwells
         ]
-        or ["Nothing was held out"],
+        or _nothing_held_out(p),
         "acceptance": [_acceptance(a, checked=p.checked) for a in p.acceptance],
         "unchecked": p.unchecked,
         "warnings": (*p.uncertainty.warnings, *_findings(p)),
@@ -110,6 +110,12 @@ def _left_out(calibration: Calibration) -> list[tuple[str, str]]:
     rms = calibration.recording.left_out_length_g
     words = "none: not tested" if rms is None else f"|a| − g {g_in_words(rms)} rms"
     return [("Held-out poses", words)]
+
+
+def _nothing_held_out(p: Passport) -> list[str]:
+    """Said of what was not tested; a recording's held-out poses stand in the head of the page."""
+    recording = p.delivery.calibration.recording
+    return [] if recording is not None and recording.tested else ["Nothing was held out"]
 
 
 def _findings(p: Passport) -> tuple[str, ...]:
