@@ -5,19 +5,23 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import triaxcal
 from diagnosis_units import simulated
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
+from triaxcal.delivery import causes
+from triaxcal.delivery.causes import causes_of, with_cause
 from triaxcal.delivery.fitted import fit_folder, refuse_beyond_limits
 from triaxcal.diagnosis import diagnose
 from triaxcal.diagnosis.answer import MARGIN
 from triaxcal.diagnosis.causes.registry import CAUSES
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Parameter
 from triaxcal.readings.measurements import MeasurementSet, write_measurements
-from triaxcal.unit.description import read_unit
+from triaxcal.unit.description import UnitDescription, read_unit
 
 
 def test_the_dwell_is_named_and_its_error_measured() -> None:
@@ -106,17 +110,72 @@ def test_a_position_that_is_missing_altogether_is_refused() -> None:
 
 def test_the_command_and_the_refusal_name_the_cause(tmp_path: Path) -> None:
     unit, measurements, _ = simulated("hysteresis", 4e-3, 3)
-    (tmp_path / "unit.toml").write_text(unit.toml)
+    folder = described(tmp_path, unit, measurements)
+    done = CliRunner().invoke(main, ["diagnose", str(folder)])
+    assert done.exit_code == 0
+    assert "ln odds" in done.output
+    assert "most probably hysteresis" in done.output
+    with pytest.raises(RefusedError, match="most probably hysteresis"):
+        refuse_beyond_limits(fit_folder(read_unit(folder), folder))
+
+
+def described(tmp_path: Path, unit: UnitDescription, measurements: MeasurementSet) -> Path:
+    """A folder below, alone there: its serial number is the others' too."""
+    folder = tmp_path / "unit"
+    folder.mkdir(exist_ok=True)
+    (folder / "unit.toml").write_text(unit.toml)
     columns = ("position", "temp_degc", "ux_v", "uy_v", "uz_v", "count", "sd_ux_v", "sd_uy_v",
                "sd_uz_v")  # fmt: skip
     rows = [
         (d.position, d.temp_degc, *d.voltage_v.tolist(), d.count, *d.sd_v.tolist())
         for d in measurements.dwells
     ]
-    write_measurements(tmp_path / "measurements.csv", columns, rows)
-    done = CliRunner().invoke(main, ["diagnose", str(tmp_path)])
-    assert done.exit_code == 0
-    assert "ln odds" in done.output
-    assert "most probably hysteresis" in done.output
-    with pytest.raises(RefusedError, match="most probably hysteresis"):
-        refuse_beyond_limits(fit_folder(read_unit(tmp_path), tmp_path))
+    write_measurements(folder / "measurements.csv", columns, rows)
+    return folder
+
+
+def test_squares_in_the_calibration_are_no_fault_and_hide_none(tmp_path: Path) -> None:
+    unit, measurements, _ = simulated("own_square", 8e-3, 2)
+    folder = described(tmp_path, unit, measurements)
+    done = fit_folder(read_unit(folder), folder)
+    assert done.calibration.squares is not None
+    assert done.calibration.squares.included
+    assert diagnose(unit, measurements).answer[0].cause == "own_square"
+    assert not causes_of(unit, done.measurements, done.calibration).doubtful
+    bad = next(d for d in measurements.dwells if d.position == "CP6")
+    dwells = tuple(
+        replace(d, voltage_v=d.voltage_v + np.array([2e-3, 0, 0])) if d is bad else d
+        for d in measurements.dwells
+    )
+    described(tmp_path, unit, MeasurementSet("m.csv", dwells))
+    with pytest.raises(RefusedError) as refused:
+        refuse_beyond_limits(fit_folder(read_unit(folder), folder))
+    assert refused.value.place.endswith(f"measurements.csv, row {bad.row}")
+    assert "most probably one wrong dwell" in refused.value.found
+
+
+def test_a_series_without_squares_is_told_which_key_keeps_them_out(tmp_path: Path) -> None:
+    unit, measurements, _ = simulated("own_square", 8e-3, 2)
+    folder = described(tmp_path, unit, measurements)
+    with (folder / "unit.toml").open("a") as text:
+        text.write('\n[firmware]\nterms = "linear"\n')
+    with pytest.raises(RefusedError, match=r'remove \[firmware\] terms = "linear"'):
+        refuse_beyond_limits(fit_folder(read_unit(folder), folder))
+
+
+def test_what_no_cause_explains_keeps_its_advice(monkeypatch: pytest.MonkeyPatch) -> None:
+    unit, measurements, _ = simulated("dwell", 5e-3, 4)
+    refusal = RefusedError(measurements.source, "misses", expected="1 mg", remedy="measure again")
+    found = diagnose(unit, measurements)
+    best = replace(found.answer[0], cause="unknown")
+    monkeypatch.setattr(causes, "causes_of", lambda *_: replace(found, answer=(best,)))
+    told = with_cause(refusal, unit, measurements, contradiction=True)
+    assert told.remedy.startswith("measure again; no cause of the list")
+
+
+def test_a_folder_is_diagnosed_as_its_unit_is(tmp_path: Path) -> None:
+    unit, measurements, _ = simulated("dwell", 5e-3, 4)
+    folder = described(tmp_path, unit, measurements)
+    found = triaxcal.diagnose(folder)
+    assert found.sentence == triaxcal.diagnose(triaxcal.read_unit(folder)).sentence
+    assert triaxcal.diagnose(str(folder)).answer[0].cause == "dwell"

@@ -15,6 +15,7 @@ from triaxcal.api.unit import Unit
 from triaxcal.base.arrays import finite
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import renew
+from triaxcal.delivery.causes import causes_of
 from triaxcal.delivery.fitted import Fitted, fit_columns, fit_folder
 from triaxcal.delivery.judgement import Verdict, judge
 from triaxcal.delivery.saved import Saved, calibration_json, read_saved
@@ -54,14 +55,12 @@ class Diagnosis:
     def causes(self) -> Causes | None:
         """Physical causes that could explain the readings, ranked as `diagnose` does.
 
-        None for a recording.
+        Quadratic terms of the calibration are no fault. None for a recording.
         """
-        from triaxcal.diagnosis import diagnose  # noqa: PLC0415
-
         done = self._fitted
         if done.unit.recording is not None:
             return None
-        return diagnose(done.unit, done.measurements)
+        return causes_of(done.unit, done.measurements, done.calibration)
 
     def __str__(self) -> str:
         return "\n".join([*self.findings, self.reason])

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
-from triaxcal.api.unit import Unit
+from triaxcal.api.unit import Unit, read_unit
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import columns_of
 from triaxcal.diagnosis import Diagnosis
@@ -12,14 +13,14 @@ from triaxcal.diagnosis import diagnose as _diagnose
 from triaxcal.readings.measurements import MEASUREMENTS_FILE, measurements_of, read_measurements
 
 
-def diagnose(unit: Unit, readings: Any = None) -> Diagnosis:
+def diagnose(unit: Unit | str | Path, readings: Any = None) -> Diagnosis:
     """Rank the causes that could explain the readings of a unit on a tilter.
 
     It needs no calibration: readings that are refused can be diagnosed.
 
     Parameters
     ----------
-    unit : Unit
+    unit : Unit, or path of its folder
     readings : mapping, data frame or structured array, or None
         Columns of measurements.csv by name. None reads the unit's folder.
 
@@ -34,13 +35,15 @@ def diagnose(unit: Unit, readings: Any = None) -> Diagnosis:
     RefusedError
         When the readings break a rule of the file formats, or are a recording.
     """
+    if isinstance(unit, str | Path):
+        unit = read_unit(unit)
     description = unit.description
     if description.recording is not None:
         raise RefusedError(
             f"unit {unit.name}",
             "has [recording]",
             expected="a unit on a tilter",
-            remedy="the findings of its calibration name what its poses contradict",
+            remedy="run `triaxcal calib`; read its `found` lines",
         )
     if readings is not None:
         return _diagnose(description, measurements_of(columns_of(readings), description))

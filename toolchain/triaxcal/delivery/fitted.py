@@ -151,7 +151,7 @@ def refuse_beyond_limits(fitted: Fitted) -> None:
         try:
             refuse_unacceptable(fitted.unit, fitted.calibration, fitted.measurements)
         except RefusedError as refusal:
-            parts = fitted.unit, fitted.measurements
+            parts = fitted.unit, fitted.measurements, fitted.calibration
             raise with_cause(refusal, *parts, contradiction=True) from None
         return
     from triaxcal.fitting.route import refuse_poses_beyond_limits  # noqa: PLC0415

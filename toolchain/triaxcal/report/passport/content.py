@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal.codegen.tryout import Residual
+from triaxcal.delivery.causes import causes_of
 from triaxcal.delivery.judgement import (
     LimitCheck,
     held_out_checks,
@@ -156,9 +157,7 @@ class Passport:
             t.largest_g > _DOUBT * t.limit_g for t in tested
         ):
             return ""
-        from triaxcal.diagnosis import diagnose  # noqa: PLC0415
-
-        found = diagnose(done.unit, done.measurements)
+        found = causes_of(done.unit, done.measurements, done.calibration)
         return found.sentence if found.doubtful else ""
 
     @property
