@@ -64,6 +64,34 @@ def test_exchanged_temperatures_are_refused():
     assert not verdict(exchanged).passed
 
 
+def test_the_outer_temperatures_exchanged_are_refused_though_a_curve_passes_all():
+    """They are never held out, and order 7 follows nine temperatures of any kind within 1 mg."""
+    data = readings(curved((8.0, 4.0)), NINE, sd_v=1e-5, count=400, spread_degc=0.05)
+    away = with_temperature(data, -40.0, 200.0)
+    exchanged = with_temperature(with_temperature(away, 70.0, -40.0), 200.0, 70.0)
+    assert verdict(data).passed
+    found = verdict(exchanged)
+    assert not found.passed
+    assert "temperatures of two blocks exchanged" in str(found.refusal)
+
+
+@pytest.mark.parametrize("position", ["TP2", "TP5"])
+def test_one_wrong_dwell_at_an_outer_temperature_is_refused(position):
+    """5 mg across gravity: |a| does not show it, and the curve at the end follows it."""
+    data = readings(curved((8.0, 4.0)), FIVE, sd_v=1e-5, count=400, spread_degc=0.05)
+    wrong = [
+        replace(d, voltage_v=d.voltage_v + [0.0, 0.0, 5e-3 * 0.55])
+        if d.position == position and d.temp_degc > 60.0
+        else d
+        for d in data.dwells
+    ]
+    (row,) = [d.row for d in data.dwells if d.position == position and d.temp_degc > 60.0]
+    found = verdict(MeasurementSet(data.source, tuple(wrong)))
+    assert not found.passed
+    assert f"row {row}" in found.refusal.place
+    assert "one wrong dwell" in found.refusal.found
+
+
 @pytest.mark.parametrize(
     "powers", [(8.0, 4.0, 1.0), (-15.0, 8.0, -2.5), (1.0, 20.0, 2.0), (15.0, 8.0, 3.0, 0.5)]
 )

@@ -9,6 +9,10 @@ import numpy as np
 
 from triaxcal.base.errors import ContradictionError, RefusedError
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.grouping import group_dwells
+from triaxcal.fitting.tilter.acceptance import dwell_errors_g, dwells_in_range
+from triaxcal.fitting.tilter.contradiction import contradiction
+from triaxcal.fitting.tilter.squares import straight
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
 from triaxcal.model.terms import products
 from triaxcal.readings.measurements import MeasurementSet
@@ -18,6 +22,12 @@ from triaxcal.unit.priors import LINEAR
 if TYPE_CHECKING:
     from triaxcal.diagnosis.answer import Diagnosis
 
+DOUBT = 0.5
+"""Of a limit: beyond it readings that pass are doubtful, and their causes are ranked."""
+_CERTAIN = 20.0
+"""Ln of the odds of a fault against a sound unit; those of sound units are below 0 in 99 of 100."""
+_USUAL_PARAMETERS = 4
+"""Of a curve: a cubic follows the sensors that are known."""
 _SYMPTOMS = ("unknown", "dwells", "curve", "scatter")
 """Causes that say how the readings look: what was advised for them stays."""
 
@@ -52,6 +62,66 @@ def without_quadratic(measurements: MeasurementSet, calibration: Calibration) ->
         linear = force_from_voltage(constants, dwell.voltage_v)
         dwells.append(replace(dwell, voltage_v=dwell.voltage_v + K @ (Q @ products(linear))))
     return replace(measurements, dwells=tuple(dwells))
+
+
+def refuse_certain_fault(
+    unit: UnitDescription, measurements: MeasurementSet, calibration: Calibration
+) -> None:
+    """Refuse readings within the limits that a fault explains beyond doubt.
+
+    Curves through all temperatures follow a fault as well, and the outer temperatures are never
+    held out. So the causes are ranked where readings are doubtful: an error, or the whole of a
+    held-out one, beyond half the limit, dwells that contradict others, or curves of as many
+    parameters as few sound sensors need.
+
+    Raises
+    ------
+    RefusedError
+        When the odds of a fault that spoils constants are beyond `_CERTAIN`, and it is larger than
+        the limit.
+    """
+    if not _doubtful(unit, measurements, calibration):
+        return
+    try:
+        found = causes_of(unit, measurements, calibration)
+    except (RefusedError, np.linalg.LinAlgError):
+        return
+    from triaxcal.diagnosis.causes.registry import CAUSES  # noqa: PLC0415
+
+    if not found.answer or found.answer[0].log_evidence < _CERTAIN:
+        return
+    best, limit = found.answer[0], unit.limits.over_range_g
+    # Amplitudes are in mg, or in mrad of a tilt, which moves a level output as many mg.
+    largest = max((abs(a.value) * 1e-3 for a in best.amplitudes), default=np.inf)
+    if not CAUSES[best.cause].spoils or largest <= limit:
+        return
+    refusal = RefusedError(
+        measurements.source,
+        "residuals and held-out errors are within the limits nevertheless",
+        expected="readings of which no fault is more probable than a sound unit",
+    )
+    if _is_about_rows(found, measurements):
+        raise _at_its_rows(refusal, found, measurements.source)
+    raise RefusedError(
+        refusal.place, refusal.found, expected=refusal.expected, remedy=_advice(found, unit)
+    )
+
+
+def _doubtful(
+    unit: UnitDescription, measurements: MeasurementSet, calibration: Calibration
+) -> bool:
+    dwells = dwells_in_range(unit, calibration.range_degc, measurements)
+    errors = dwell_errors_g(unit, calibration, dwells)
+    limits = np.array([unit.limits.at(d.temp_degc, unit.t0_degc)[0] for d in dwells])
+    test = calibration.held_out
+    held_out = 0.0 if test is None or test.worst is None else abs(test.worst.error_g)
+    groups = group_dwells(measurements, unit.t0_degc)
+    return bool(
+        (errors > DOUBT * limits).any()
+        or held_out > DOUBT * unit.limits.over_range_g
+        or contradiction(unit, straight(groups, calibration.terms, unit.gravity_g))
+        or calibration.shape.parameters > _USUAL_PARAMETERS
+    )
 
 
 def with_cause(
@@ -108,10 +178,10 @@ def _at_its_rows(refusal: RefusedError, found: Diagnosis, source: str) -> Refuse
 
     rows = rows_in_words(np.array(found.answer[0].rows))
     where = refusal.place.removeprefix(source).lstrip(", ")
-    shown = f"{where}: {refusal.found}" if where else refusal.found
+    shown = f"it shows at {where}: {refusal.found}" if where else refusal.found
     return RefusedError(
         f"{source}, {rows}",
-        f"{found.sentence}; it shows at {shown}",
+        f"{found.sentence}; {shown}",
         expected=refusal.expected,
         remedy="correct these rows or measure them again",
     )

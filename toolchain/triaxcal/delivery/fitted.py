@@ -14,7 +14,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.base.plaindata import plain
 from triaxcal.base.tomltable import content_of, text_of
-from triaxcal.delivery.causes import with_cause
+from triaxcal.delivery.causes import refuse_certain_fault, with_cause
 from triaxcal.delivery.coderange import settled_codes
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.core.calibration import Calibration
@@ -148,11 +148,12 @@ def refuse_beyond_limits(fitted: Fitted) -> None:
         Names the readings at fault, or the thermal function, and what to do.
     """
     if fitted.calibration.recording is None:
+        parts = fitted.unit, fitted.measurements, fitted.calibration
         try:
             refuse_unacceptable(fitted.unit, fitted.calibration, fitted.measurements)
         except RefusedError as refusal:
-            parts = fitted.unit, fitted.measurements, fitted.calibration
             raise with_cause(refusal, *parts, contradiction=True) from None
+        refuse_certain_fault(*parts)
         return
     from triaxcal.fitting.route import refuse_poses_beyond_limits  # noqa: PLC0415
 

@@ -15,7 +15,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import Fitted, refuse_beyond_limits
 from triaxcal.fitting.core.calibration import Calibration
-from triaxcal.fitting.tilter.acceptance import dwell_errors_g, dwells_in_range
+from triaxcal.fitting.tilter.acceptance import dwell_errors_g, dwells_in_range, held_out_refusal
 from triaxcal.model.positions import CHECK_POSITIONS
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.thermal import near_t0
@@ -123,7 +123,8 @@ def judge(fitted: Fitted) -> Verdict:
     chosen = next((c for c in calibration.candidates if c.chosen), None)
     needed = limits_that_apply(fitted.unit, calibration.range_degc)
     against = [t for t in tested if t.what == UNCERTAINTY and t.where in needed]
-    words = verdict_words(calibration, checked=checked, shown=all(t.held for t in against))
+    shown = all(t.held for t in against)
+    words = verdict_words(fitted.unit, calibration, checked=checked, shown=shown)
     return Verdict(
         refusal is None,
         refusal,
@@ -143,7 +144,9 @@ def limits_that_apply(unit: UnitDescription, range_degc: tuple[float, float]) ->
     return (*([AT_T0] if at_t0 else []), *([OVER_RANGE] if others else []))
 
 
-def verdict_words(calibration: Calibration, *, checked: bool, shown: bool) -> str:
+def verdict_words(
+    unit: UnitDescription, calibration: Calibration, *, checked: bool, shown: bool
+) -> str:
     """The verdict on what has not been refused: the same words on the terminal and everywhere.
 
     `checked` is whether the readings could contradict the constants, `shown` whether the limits
@@ -151,18 +154,22 @@ def verdict_words(calibration: Calibration, *, checked: bool, shown: bool) -> st
     """
     if not checked:
         return "not checked"
-    untested = not_tested(calibration)
+    untested = not_tested(unit, calibration)
     if untested:
         return f"passed at the dwells; {untested}"
     return "passed" if shown else "passed at the dwells, not shown everywhere"
 
 
-def not_tested(calibration: Calibration) -> str:
+def not_tested(unit: UnitDescription, calibration: Calibration) -> str:
     """What no reading outside the fit has tested, in words; empty where something has."""
     if calibration.recording is not None and not calibration.recording.tested:
         return "not tested: nothing was held out"
     test = calibration.held_out
-    if test is None or test.between:
+    if test is None:
+        return ""
+    if held_out_refusal(unit, calibration, "", 1.0) is not None:
+        return "between them estimated, not shown"
+    if test.between:
         return ""
     if len(calibration.points) == 1:
         return "nothing was held out"

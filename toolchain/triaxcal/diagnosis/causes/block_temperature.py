@@ -90,4 +90,5 @@ ENTRY = Cause(
     apart="the log of the chamber",
     discrete=True,
     rank=60,
+    spoils=True,
 )

@@ -40,4 +40,5 @@ ENTRY = Cause(
     hypotheses=_hypotheses,
     apart="the first temperature again at the end",
     rank=52,
+    spoils=True,
 )

@@ -57,4 +57,5 @@ ENTRY = Cause(
     hypotheses=_hypotheses,
     apart="the same position at the same temperature again",
     rank=10,
+    spoils=True,
 )

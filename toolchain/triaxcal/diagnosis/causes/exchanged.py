@@ -76,4 +76,5 @@ ENTRY = Cause(
     apart="the sign of each output with a known face upward",
     discrete=True,
     rank=30,
+    spoils=True,
 )

@@ -47,4 +47,5 @@ ENTRY = Cause(
     apart="the log of the chamber",
     discrete=True,
     rank=61,
+    spoils=True,
 )

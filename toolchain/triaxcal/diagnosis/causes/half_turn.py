@@ -78,4 +78,5 @@ ENTRY = Cause(
     apart="the sign of each output with a known face upward",
     discrete=True,
     rank=31,
+    spoils=True,
 )

@@ -59,4 +59,5 @@ ENTRY = Cause(
     hypotheses=_hypotheses,
     apart="one temperature again at the end, reached from the other side",
     rank=50,
+    spoils=True,
 )

@@ -40,4 +40,5 @@ ENTRY = Cause(
     apart="the wiring and the columns of the log",
     discrete=True,
     rank=36,
+    spoils=True,
 )

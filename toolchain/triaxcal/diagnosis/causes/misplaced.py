@@ -50,4 +50,5 @@ ENTRY = Cause(
     hypotheses=_hypotheses,
     apart="check dwells, which tell a position from its opposite; the angle of the stop itself",
     rank=20,
+    spoils=True,
 )

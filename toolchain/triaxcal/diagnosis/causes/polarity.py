@@ -52,4 +52,5 @@ ENTRY = Cause(
     apart="the sign of each output with a known face upward",
     discrete=True,
     rank=32,
+    spoils=True,
 )

@@ -51,4 +51,5 @@ ENTRY = Cause(
     apart="the codes of the converter near its end",
     discrete=True,
     rank=41,
+    spoils=True,
 )

@@ -41,4 +41,5 @@ ENTRY = Cause(
     hypotheses=_hypotheses,
     apart="one of the first temperatures again at the end",
     rank=51,
+    spoils=True,
 )

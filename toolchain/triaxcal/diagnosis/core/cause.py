@@ -159,6 +159,9 @@ class Cause:
         The datum that would tell it from what looks the same.
     discrete : bool
         Whether undoing it changes labels or signs, and nothing by an amount.
+    spoils : bool
+        Whether the constants of readings with it are wrong: they are refused where it is certain
+        and beyond the limit, however small their residuals are.
     rank : int
         Place in lists.
     """
@@ -169,4 +172,5 @@ class Cause:
     hypotheses: Callable[[Known], Iterable[Hypothesis]]
     apart: str
     discrete: bool = False
+    spoils: bool = False
     rank: int = 100

@@ -101,7 +101,9 @@ def unacceptable(
             return _contradiction(
                 unit, measurements.source, blame, dwells[worst], float(errors[worst])
             )
-    held_out = _held_out(unit, calibration, measurements.source)
+    test = calibration.held_out
+    share = 1.0 if test is None else test.share
+    held_out = held_out_refusal(unit, calibration, measurements.source, share)
     if held_out is not None:
         return held_out
     if errors[worst] > limits[worst]:
@@ -123,13 +125,18 @@ def dwell_errors_g(
     return result
 
 
-def _held_out(unit: UnitDescription, calibration: Calibration, source: str) -> RefusedError | None:
-    """A temperature held out whose dwells the curves without it miss."""
+def held_out_refusal(
+    unit: UnitDescription, calibration: Calibration, source: str, share: float
+) -> RefusedError | None:
+    """A temperature held out whose dwells the curves without it miss.
+
+    `share` of the error is held against the limit: that of the delivered curves, or 1.
+    """
     test, limit = calibration.held_out, unit.limits.over_range_g
     if test is None or test.worst is None or test.rms_g is None:
         return None
-    worst, rms = test.worst, test.share * test.rms_g
-    error = test.share * abs(worst.error_g)
+    worst, rms = test.worst, share * test.rms_g
+    error = share * abs(worst.error_g)
     if max(error, rms) <= limit:
         return None
     found = (
@@ -141,10 +148,9 @@ def _held_out(unit: UnitDescription, calibration: Calibration, source: str) -> R
             f"with each inner temperature held out in turn, {test.function} misses the components "
             f"of the force by {test.rms_g * 1e3:.4g} mg rms"
         )
-    if test.share < 1.0:
+    if share < 1.0:
         found += (
-            f"; the delivered {calibration.shape.label} is estimated to have "
-            f"{test.share:.2g} of that"
+            f"; the delivered {calibration.shape.label} is estimated to have {share:.2g} of that"
         )
     return RefusedError(
         f"{source}, row {worst.row}",

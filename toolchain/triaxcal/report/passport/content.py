@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal.codegen.tryout import Residual
-from triaxcal.delivery.causes import causes_of
+from triaxcal.delivery.causes import DOUBT, causes_of
 from triaxcal.delivery.judgement import (
     LimitCheck,
     held_out_checks,
@@ -24,9 +24,6 @@ from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import LENGTH, Uncertainty, uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
 from triaxcal.unit.thermal import near_t0
-
-_DOUBT = 0.5
-"""Of a limit: beyond it the passport says what would explain the readings."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +138,8 @@ class Passport:
     @property
     def words(self) -> str:
         """The verdict in words."""
-        return verdict_words(self.delivery.calibration, checked=self.checked, shown=self.shown)
+        done = self.delivery
+        return verdict_words(done.unit, done.calibration, checked=self.checked, shown=self.shown)
 
     @property
     def held_out(self) -> tuple[LimitCheck, ...]:
@@ -154,7 +152,7 @@ class Passport:
         done = self.delivery
         tested = (*residual_checks(done), *held_out_checks(done))
         if done.calibration.recording is not None or not any(
-            t.largest_g > _DOUBT * t.limit_g for t in tested
+            t.largest_g > DOUBT * t.limit_g for t in tested
         ):
             return ""
         found = causes_of(done.unit, done.measurements, done.calibration)
