@@ -80,7 +80,7 @@ def test_one_wrong_dwell_at_an_outer_temperature_is_refused(position):
     """5 mg across gravity: |a| does not show it, and the curve at the end follows it."""
     data = readings(curved((8.0, 4.0)), FIVE, sd_v=1e-5, count=400, spread_degc=0.05)
     wrong = [
-        replace(d, voltage_v=d.voltage_v + [0.0, 0.0, 5e-3 * 0.55])
+        replace(d, voltage_v=d.voltage_v + np.array([0.0, 0.0, 5e-3 * 0.55]))
         if d.position == position and d.temp_degc > 60.0
         else d
         for d in data.dwells
