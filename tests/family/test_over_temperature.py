@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 from test_recordings import calibrated, symmetric_part
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.delivery.judgement import not_tested
 from triaxcal.delivery.unit import deliver
 from triaxcal.fitting.recorded.temperatures import temperature_groups
 from triaxcal.model.types import FloatArray
@@ -223,3 +224,15 @@ def test_kelvin_taken_for_degc_is_refused(tmp_path: Path) -> None:
         'degC; expected T0 among the poses\' temperatures; temperature_unit = "K" if they are '
         "kelvin, else state [thermal] t0_degc"
     )
+
+
+@pytest.mark.parametrize(
+    ("temps", "words"), [((0.0, 20.0, 50.0), "between them not tested"), (TEMPS, "")]
+)
+def test_three_temperatures_test_no_curve_between_them(
+    tmp_path: Path, temps: tuple[float, ...], words: str
+) -> None:
+    """As of a tilter's unit: an inner temperature is held out where three remain."""
+    folder = unit_with(tmp_path / "U", cycle(temps))
+    delivery = deliver(folder)
+    assert not_tested(delivery.unit, delivery.calibration) == words

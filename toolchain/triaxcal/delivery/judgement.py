@@ -39,6 +39,8 @@ class LimitCheck:
     what : str
         "residual" of the fitted model at the dwells of the fit; "held out", at check dwells and
         temperatures held out; "with uncertainty", the residual and the uncertainty (95 %) of |a|.
+    whole : bool
+        False where a source of the uncertainty is unknown: `largest_g` is without it.
     """
 
     where: str
@@ -46,20 +48,20 @@ class LimitCheck:
     largest_g: float
     dwells: int
     what: str = RESIDUAL
+    whole: bool = True
 
     @property
     def held(self) -> bool:
-        """Whether the limit holds; what was not tested does not."""
-        return self.largest_g <= self.limit_g
+        """Whether the limit holds; what was not tested, or is not all known, does not."""
+        return self.whole and self.largest_g <= self.limit_g
 
     def __str__(self) -> str:
         what = f"{self.what} {self.where}"
         if not self.dwells:
             return f"{what}: not tested"
-        if self.largest_g == np.inf:
-            return f"{what}: unknown, limit {self.limit_g * 1e3:g} mg"
         largest, limit = self.largest_g * 1e3, self.limit_g * 1e3
-        words = f"{what}: {largest:.4g} mg, limit {limit:g} mg"
+        more = "" if self.whole else " and what is unknown"
+        words = f"{what}: {largest:.4g} mg{more}, limit {limit:g} mg"
         return words if self.what == UNCERTAINTY else f"{words}, {self.dwells} dwells"
 
 
@@ -115,10 +117,11 @@ def judge(fitted: Fitted) -> Verdict:
     checked = calibration.recording is None or calibration.recording.checked
     tested = (*residual_checks(fitted), *held_out_checks(fitted))
     if checked and refusal is None:
-        found = length_uncertainty_g(fitted.unit, fitted.measurements, calibration)
+        found, whole = length_uncertainty_g(fitted.unit, fitted.measurements, calibration)
         residuals = _both(fitted.unit, UNCERTAINTY, _errors(fitted, checks=True))
         tested += tuple(
-            replace(r, largest_g=r.largest_g + u) for r, u in zip(residuals, found, strict=True)
+            replace(r, largest_g=r.largest_g + u, whole=whole)
+            for r, u in zip(residuals, found, strict=True)
         )
     chosen = next((c for c in calibration.candidates if c.chosen), None)
     needed = limits_that_apply(fitted.unit, calibration.range_degc)
@@ -162,18 +165,19 @@ def verdict_words(
 
 def not_tested(unit: UnitDescription, calibration: Calibration) -> str:
     """What no reading outside the fit has tested, in words; empty where something has."""
-    if calibration.recording is not None and not calibration.recording.tested:
-        return "not tested: nothing was held out"
-    test = calibration.held_out
+    recording, test = calibration.recording, calibration.held_out
+    if recording is not None:
+        if not recording.tested:
+            return "not tested: nothing was held out"
+        curved = calibration.shape.parameters > 1
+        return "between them not tested" if curved and not recording.tested_between else ""
     if test is None:
         return ""
     if held_out_refusal(unit, calibration, "", 1.0) is not None:
         return "between them estimated, not shown"
     if test.between:
         return ""
-    if len(calibration.points) == 1:
-        return "nothing was held out"
-    return "between them not tested"
+    return "nothing was held out" if len(calibration.points) == 1 else "between them not tested"
 
 
 def residual_checks(fitted: Fitted) -> tuple[LimitCheck, ...]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.uncertainty.device_sources import Device
@@ -16,13 +14,12 @@ def length_uncertainty_g(
     measurements: MeasurementSet,
     calibration: Calibration,
     device: Device | None = None,
-) -> tuple[float, float]:
+) -> tuple[tuple[float, float], bool]:
     """Expanded uncertainty (95 %) of |a| at T0 and over the range, worst orientation, in g.
 
-    Infinite where a source is unknown.
+    And whether it is all of it: a source may be unknown, as the change with temperature.
     """
     found = uncertainty(unit, measurements, calibration, device)
-    if any(s.unknown for s in found.sources):
-        return math.inf, math.inf
     length = found.force_u[:, :, LENGTH]
-    return float(length[found.t0_index].max()), float(length.max())
+    both = float(length[found.t0_index].max()), float(length.max())
+    return both, not any(s.unknown for s in found.sources)

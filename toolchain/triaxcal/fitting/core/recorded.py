@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from triaxcal.fitting.core.judged import HeldOutPoses
+from triaxcal.fitting.core.judged import TEMPERATURE, HeldOutPoses
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet
 
@@ -167,6 +167,14 @@ class RecordingFit:
     def checked(self) -> bool:
         """Whether the uncertainty of the constants is known."""
         return bool(self.parts) or self.dof > 0
+
+    @property
+    def tested_between(self) -> bool:
+        """Whether temperatures that the fit did not use have tested its functions of temperature.
+
+        True of a file of an earlier version, which does not say so.
+        """
+        return not self.held_out or any(h.what == TEMPERATURE for h in self.held_out)
 
     @property
     def tested(self) -> bool:
