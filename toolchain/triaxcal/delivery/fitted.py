@@ -153,7 +153,8 @@ def refuse_beyond_limits(fitted: Fitted) -> None:
             refuse_unacceptable(fitted.unit, fitted.calibration, fitted.measurements)
         except RefusedError as refusal:
             raise with_cause(refusal, *parts, contradiction=True) from None
-        refuse_certain_fault(*parts)
+        if fitted.unit.recording is None:  # faces that a hand has set are judged by their limits
+            refuse_certain_fault(*parts)
         return
     from triaxcal.fitting.route import refuse_poses_beyond_limits  # noqa: PLC0415
 

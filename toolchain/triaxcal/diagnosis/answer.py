@@ -143,7 +143,7 @@ class Diagnosis:
         if others:
             text += f"; the readings cannot tell it from {' or '.join(others)}"
             data = dict.fromkeys(s.apart for s in (best, *self.answer[1:]))
-            text += f" (what would: {'; '.join(data)})"
+            text += f"; to tell them apart: {'; or '.join(data)}"
         return text
 
     @property

@@ -109,11 +109,14 @@ def _refuse_signs(
         exchanged = [p for p, axis in _AXIS_PAIRS.items() if axis in wrong]
         ways = {1: swap, 2: turn, 3: "all positions turned over"}[len(wrong)]
     names = " and ".join(f"K{AXES[i]}{AXES[i]}" for i in wrong)
+    first = groups[0]
     rows = "; ".join(
-        f"rows {min(r)} and {max(r)} ({g.temp_degc:.6g} degC)"
-        for g in groups
-        for r in [(g.dwells[a].row, g.dwells[b].row) for a, b in exchanged]
+        f"rows {min(r)} and {max(r)}"
+        for r in [(first.dwells[a].row, first.dwells[b].row) for a, b in exchanged]
     )
+    rows += f" ({first.temp_degc:.6g} degC)"
+    if len(groups) > 1:
+        rows += ", and those of the other temperatures"
     raise ContradictionError(
         f"{source}, {rows}",
         f"{names} {'has' if len(wrong) == 1 else 'have'} the wrong sign at every temperature: "
