@@ -155,7 +155,9 @@ def test_the_command_keeps_the_files_before_and_their_hash(top: Path, tmp_path: 
         )
         assert done.exit_code == 0, done.output
         assert "the files before are kept in" in " ".join(done.output.split())
-        assert max(map(len, done.output.splitlines())) <= 90  # a path may be longer than 80
+        # A path is as long as it is, and is not cut.
+        lines = [line for line in done.output.splitlines() if str(tmp_path) not in line]
+        assert max(map(len, lines)) <= 80
     document = json.loads((build / "U" / "calibration.json").read_bytes())
     second = document["update"]["parents"][1]
     assert document["update"]["parents"] == [first, second]
