@@ -32,6 +32,8 @@ _RAD_PER_ARCSEC = np.pi / 180.0 / 3600.0
 class TableGrid:
     """Positions of a table, for one unit or for a series.
 
+    A series shares one inverse::
+
         grid = triaxcal.TableGrid("aircraft", angles_deg)
         series = grid.serial(quadratic=True)          # inverts once
         for readings in series_of_units:
