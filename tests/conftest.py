@@ -26,6 +26,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 LONG = {
     "family/test_check.py",
+    "family/test_converter_signs.py",
     "family/test_cross_coupling.py",
     "family/test_doubtful.py",
     "family/test_files.py",
@@ -35,6 +36,7 @@ LONG = {
     "family/test_over_temperature.py",
     "family/test_pair_in_a_unit.py",
     "family/test_pair_on_a_tilter.py",
+    "family/test_poses.py",
     "family/test_priors_measured.py",
     "family/test_rate_term.py",
     "family/test_real_recordings.py",
@@ -52,8 +54,9 @@ LONG = {
     "rig/test_session.py",
     "targets/test_targets.py",
     "test_batch.py",
-    "test_diagnosis_faults.py",
     "test_design.py",
+    "test_diagnosis.py",
+    "test_diagnosis_faults.py",
     "test_dynamic_calibrate.py",
     "test_dynamic_equations.py",
     "test_dynamic_plan.py",
