@@ -6,10 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Parameter, Undo
-from triaxcal.diagnosis.core.readings import Readings
+from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Parameter, shifted
 from triaxcal.model.positions import AXES
-from triaxcal.model.types import FloatArray
 
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
@@ -21,7 +19,7 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
         for i in outputs:
             yield Hypothesis(
                 f"{place}, output {AXES[i]}",
-                shifted(int(row), (i,)),
+                shifted(((int(row), i),)),
                 (Parameter(f"output {AXES[i]}"),),
                 np.array([row]),
                 f"without {readings.positions[k]} of row {row}",
@@ -30,24 +28,12 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
         if readings.test[k]:
             yield Hypothesis(
                 place,
-                shifted(int(row), (0, 1, 2)),
+                shifted(tuple((int(row), i) for i in range(3))),
                 tuple(Parameter(f"output {a}") for a in AXES),
                 np.array([row]),
                 f"without {readings.positions[k]} of row {row}",
                 places=4.0 * len(readings),
             )
-
-
-def shifted(row: int, outputs: tuple[int, ...]) -> Undo:
-    """Undo a shift of outputs of one row."""
-
-    def undo(readings: Readings, amplitudes: FloatArray) -> Readings:
-        changed = readings.outputs.copy()
-        for i, amplitude in zip(outputs, amplitudes, strict=True):
-            changed[readings.rows == row, i] -= amplitude
-        return readings.but(outputs=changed)
-
-    return undo
 
 
 ENTRY = Cause(

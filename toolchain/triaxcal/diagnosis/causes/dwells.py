@@ -7,10 +7,9 @@ from math import comb
 
 import numpy as np
 
-from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Parameter, Undo
-from triaxcal.diagnosis.core.readings import Readings, rows_in_words
+from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Parameter, shifted
+from triaxcal.diagnosis.core.readings import rows_in_words
 from triaxcal.model.positions import AXES
-from triaxcal.model.types import FloatArray
 
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
@@ -23,22 +22,12 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
             continue
         yield Hypothesis(
             rows_in_words(rows),
-            _shifted(tuple(some)),
+            shifted(tuple(some)),
             tuple(Parameter(f"row {row} output {AXES[i]}") for row, i in some),
             rows,
             f"without {rows_in_words(rows)}",
             places=5.0 * comb(outputs, count),
         )
-
-
-def _shifted(some: tuple[tuple[int, int], ...]) -> Undo:
-    def undo(readings: Readings, amplitudes: FloatArray) -> Readings:
-        changed = readings.outputs.copy()
-        for (row, i), amplitude in zip(some, amplitudes, strict=True):
-            changed[readings.rows == row, i] -= amplitude
-        return readings.but(outputs=changed)
-
-    return undo
 
 
 ENTRY = Cause(

@@ -99,6 +99,18 @@ def unchanged(readings: Readings, _amplitudes: FloatArray) -> Readings:
     return readings
 
 
+def shifted(some: tuple[tuple[int, int], ...]) -> Undo:
+    """Undo shifts of single outputs, each by its row of the file and its axis."""
+
+    def undo(readings: Readings, amplitudes: FloatArray) -> Readings:
+        changed = readings.outputs.copy()
+        for (row, i), amplitude in zip(some, amplitudes, strict=True):
+            changed[readings.rows == row, i] -= amplitude
+        return readings.but(outputs=changed)
+
+    return undo
+
+
 def explained(log_density: float, count: int) -> float:
     """`log_density` of `count` outputs, for a model that takes them as normal of variance 1 g^2."""
     return log_density + 0.5 * count * float(np.log(2.0 * np.pi))
