@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +14,25 @@ from family_cases import COLUMNS, U0, K, csv_text, directions, log, write_unit
 
 import triaxcal
 from builds import UNITS
+from triaxcal.api.field import InTheField
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
+from triaxcal.delivery.fitted import Fitted
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.unit import write_simulated_unit
 
 G = 9.80665
+
+
+class InTheFieldOf(InTheField):
+    """A calibration of which only the fit is there."""
+
+    def __init__(self, fitted: Fitted) -> None:
+        self._fitted = fitted
+
+    @property
+    def fitted(self) -> Fitted:
+        return self._fitted
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +89,74 @@ def test_a_bias_that_drifted_by_2_mg_fails_and_is_named(build: Path, tmp_path: P
     assert "the bias of y changed by" in line
     assert float(line.partition("by ")[2].split()[0]) == pytest.approx(2.0, abs=0.6)
     assert "beyond" not in text.split("FAILED")[0]  # no pose is beyond 20 mg
+
+
+@pytest.mark.parametrize("mg", [50.0, 150.0, -100.0])
+def test_a_large_change_of_one_bias_is_named_as_well(cal: triaxcal.Calibration, mg: float) -> None:
+    """|a| is not linear in it: (0.1 g)^2 / 2 across it is 5 mg, ten times the noise of a pose."""
+    own_axis = U0 + np.array([0.0, mg * 1e-3 * float(np.linalg.norm(K[1])), 0.0])
+    found = cal.check(columns(directions(14, seed=4), bias=own_axis)).result
+    assert not found.passed
+    assert len(found.explanations) == 1
+    words = found.explanations[0].words
+    assert "the bias of y changed by" in words
+    sd = float(words.partition("(sd ")[2].rstrip(")"))
+    assert float(words.partition("by ")[2].split()[0]) == pytest.approx(mg, abs=4 * sd + 0.5)
+    assert found.suspicions == ()
+
+
+def test_two_disturbed_poses_are_named(cal: triaxcal.Calibration) -> None:
+    poses = directions(14, seed=4).copy()
+    poses[8] *= 1.006
+    poses[11] *= 0.992
+    (only,) = cal.check(columns(poses)).result.explanations
+    assert re.match(
+        r"pose 9, line \d+ by \+[56]\S* mg and pose 12, line \d+ by -[78]\S* mg alone", only.words
+    )
+    assert "the other 12 poses agree" in only.words
+
+
+def test_a_limit_within_the_noise_is_not_tested(tmp_path: Path) -> None:
+    """Noise of 3 mg a pose, limit 1 mg: of 14 poses several are beyond it, in a sound unit too."""
+    limits = "[limits]\nat_t0_g = 0.02\nover_range_g = 0.02\n"
+    rows = log(directions(24))
+    folder = write_unit(tmp_path / "N", rows, COLUMNS, more=limits)
+    fitted = triaxcal.fit(triaxcal.read_unit(folder)).fitted
+    unit = replace(fitted.unit, limits=replace(fitted.unit.limits, at_t0_g=1e-3))
+    tight = InTheFieldOf(replace(fitted, unit=unit))
+    noisy = columns(directions(14, seed=4), sd=0.35)
+    found = tight.check(noisy).result
+    assert found.passed
+    assert found.undecided.sum() >= 3
+    assert "not tested" in tight.check(noisy).summary
+    still = columns(directions(14, seed=4), bias=U0 + K @ [0.0, 2e-3, 0.0])
+    assert tight.check(still).result.beyond.any()
+
+
+def test_readings_beyond_the_codes_of_the_c_are_clamped_as_the_c_does(build: Path) -> None:
+    cal = triaxcal.load(build / "U" / "calibration.json")
+    code_max = cal.fitted.unit.adc.code_max * cal.fitted.unit.adc.volts_per_code
+    poses = directions(6).copy()
+    poses[0] *= 1.5 * code_max / (K[2, 2] + U0[2])
+    study = cal.check(columns(poses))
+    assert study.result.c_error_g is not None
+    assert study.result.expected.error_g[0] > study.result.c_error_g[0] + 0.3
+    flag = "1 of 6 poses (pose 1, line 1) have raw codes beyond"
+    assert study.result.flagged[0].startswith(flag)
+    assert "sets status 4" in study.summary
+    assert not study.result.passed
+
+
+def test_a_file_that_is_not_there(build: Path) -> None:
+    unit = str(build.parent / "units" / "U")
+    with pytest.raises(RefusedError, match=r"^no.csv: no such file; expected a recording; check"):
+        main.main(["check", unit, "--build", str(build), "--on", "no.csv"], standalone_mode=False)
+
+
+def test_one_pose_cannot_tell_why(cal: triaxcal.Calibration) -> None:
+    found = cal.check(columns(directions(1), bias=U0 + K @ [0.0, 0.0, 0.1])).result
+    assert not found.passed
+    assert found.suspicions == ("one pose cannot tell why",)
 
 
 def test_another_sensor_fails_and_no_single_change_is_named(cal: triaxcal.Calibration) -> None:

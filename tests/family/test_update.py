@@ -265,7 +265,8 @@ def test_data_that_the_calibration_has_seen_are_no_update(
     own = top / "units" / "U" / "log.csv"
     with pytest.raises(RefusedError, match=r"24 of 24 poses are those that the calibration was"):
         cal.update(own)
-    assert "24 of 24 poses are those that" in " ".join(cal.check(own).summary.split())
+    with pytest.raises(RefusedError, match=r"24 of 24 poses are those that the calibration was"):
+        cal.check(own)
     build = tmp_path / "build"
     shutil.copytree(top / "build", build)
     first = recorded(tmp_path, directions(6))
@@ -277,8 +278,7 @@ def test_data_that_the_calibration_has_seen_are_no_update(
     triaxcal.update(top / "units" / "U", recorded(again, directions(6), seed=31), build)
     with pytest.raises(RefusedError, match="was updated by this recording already"):
         triaxcal.update(top / "units" / "U", first, build)
-    fresh = cal.check(recorded(tmp_path, directions(6), seed=32))
-    assert "those that the calibration" not in fresh.summary
+    cal.check(recorded(tmp_path, directions(6), seed=32))
 
 
 def test_an_update_that_makes_nothing_more_certain_says_so(

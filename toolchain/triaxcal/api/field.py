@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,7 +61,7 @@ class InTheField:
             serial number, or the calibration does not know its uncertainty.
         """
         from triaxcal.api.study import Study  # noqa: PLC0415
-        from triaxcal.delivery.check import integer_force_g  # noqa: PLC0415
+        from triaxcal.delivery.check import in_the_c  # noqa: PLC0415
         from triaxcal.fitting.field.poses import inside_range  # noqa: PLC0415
         from triaxcal.report.check import check_text  # noqa: PLC0415
         from triaxcal.uncertainty.check import check_poses  # noqa: PLC0415
@@ -69,12 +69,10 @@ class InTheField:
         done = self.fitted
         gravity_g = stated_gravity_g(done, gravity_m_per_s2)
         poses = inside_range(poses_of(done, recorded, layout), done.calibration.range_degc)
-        if used := _used(done, poses, recorded):
-            poses = replace(poses, findings=(*poses.findings, used))
-        force = integer_force_g(done, poses.readings, poses.temps_degc)
-        c_error_g = (force**2).sum(axis=1) ** 0.5 - gravity_g
+        _refuse_used(done, poses, recorded)
+        by_c = in_the_c(done, poses.readings, poses.temps_degc)
         parts = done.unit, done.measurements, done.calibration
-        found = check_poses(parts, poses, gravity_g, c_error_g)
+        found = check_poses(parts, poses, gravity_g, by_c.force_g, by_c.status)
         return Study(found, check_text(done.unit.serial, found))
 
     def update(
@@ -154,13 +152,7 @@ def bring_up_to_date(
     ))  # fmt: skip
     poses = poses_of(done, recorded, layout)
     digest = _digest(recorded)
-    if used := _used(done, poses, recorded):
-        raise RefusedError(
-            poses.source,
-            used,
-            expected="poses that the calibration has not seen",
-            remedy="record new poses",
-        )
+    _refuse_used(done, poses, recorded)
     before = done.calibration.update
     earlier = () if before is None else before.parents
     logs = () if before is None else (*before.earlier_sha256, before.recording_sha256)
@@ -175,20 +167,24 @@ def bring_up_to_date(
     return Updated(done, Fitted(done.unit, measurements, inputs, found.calibration), found)
 
 
-def _used(done: Fitted, poses: FieldPoses, recorded: Any) -> str:
-    """Words where the calibration was made of these poses, or updated by them; else empty."""
+def _refuse_used(done: Fitted, poses: FieldPoses, recorded: Any) -> None:
+    """Refuse poses that the calibration was made of, or updated by: they tell nothing new."""
     from triaxcal.fitting.field.poses import known_poses  # noqa: PLC0415
 
-    update = done.calibration.update
-    if update is not None and _digest(recorded) in (
-        update.recording_sha256,
-        *update.earlier_sha256,
-    ):
-        return "the calibration was updated by this recording already: it says nothing new"
+    update, used = done.calibration.update, ""
+    logs = () if update is None else (update.recording_sha256, *update.earlier_sha256)
     same = known_poses(poses, done.measurements)
-    if 2 * same < len(poses):
-        return ""
-    return f"{same} of {len(poses)} poses are those that the calibration was made of: no new data"
+    if logs and _digest(recorded) in logs:
+        used = "the calibration was updated by this recording already"
+    elif 2 * same >= len(poses):
+        used = f"{same} of {len(poses)} poses are those that the calibration was made of"
+    if used:
+        raise RefusedError(
+            poses.source,
+            used,
+            expected="poses that the calibration has not seen",
+            remedy="record new poses",
+        )
 
 
 def _positive(name: str, value: float) -> float:

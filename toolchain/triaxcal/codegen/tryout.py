@@ -81,14 +81,16 @@ def run_on_dwells(
         When the unit's own method flags one of its dwells.
     """
     voltages = np.array([d.voltage_v for d in dwells])
-    corners = list(_corners(unit, dwells))
+    exact = exact_codes(unit, voltages, np.array([d.temp_degc for d in dwells]))
+    exact[:, 1:] = exact[:, 1:].clip(unit.adc.code_min, unit.adc.code_max)
+    corners = list(corners_of(exact))
     at_t0 = thermal.constants_at(unit.t0_degc)
     results = [_result(BEFORE, unit, dwells, force_from_voltage(at_t0, voltages))]
     for method, routine in ((METHODS[name], found) for name, found in routines.items()):
         if isinstance(routine, RefusedError):
             results.append(MethodResult(method, (), str(routine)))
             continue
-        accel, status = _between_codes(routine, corners)
+        accel, status = between_codes(routine, corners)
         flagged = _flagged(source, method.label, dwells, status)
         if flagged is not None and method.name == unit.method:
             raise flagged
@@ -103,14 +105,15 @@ Corner = tuple[Int32Array, Int32Array, FloatArray]
 """Temperature codes (n,), raw codes (n, 3), and the weights (n,) of the C's answers there."""
 
 
-def _corners(unit: UnitDescription, dwells: Sequence[Dwell]) -> Iterator[Corner]:
-    """Codes on both sides of the dwells' temperature and readings, where any of them has weight."""
-    adc, sensor = unit.adc, unit.temperature_sensor
-    voltages = np.array([d.voltage_v for d in dwells])
-    raw = (voltages / adc.volts_per_code).clip(adc.code_min, adc.code_max)
-    temps = np.array([d.temp_degc for d in dwells])
-    temp = (temps - sensor.degc_at_zero) / sensor.degc_per_code
-    exact = np.column_stack([temp, raw])
+def exact_codes(unit: UnitDescription, readings: FloatArray, temps_degc: FloatArray) -> FloatArray:
+    """Temperatures (n,) and readings (n, 3) in codes, not rounded, (n, 4)."""
+    sensor = unit.temperature_sensor
+    temp = (temps_degc - sensor.degc_at_zero) / sensor.degc_per_code
+    return np.column_stack([temp, readings / unit.adc.volts_per_code])
+
+
+def corners_of(exact: FloatArray) -> Iterator[Corner]:
+    """Codes on both sides of `exact_codes` (n, 4), where any of them has weight."""
     # Voltages of whole codes come back with the rounding of a division.
     whole = np.abs(exact - np.rint(exact)) < _WHOLE
     below = np.where(whole, np.rint(exact), np.floor(exact))
@@ -126,7 +129,7 @@ def _corners(unit: UnitDescription, dwells: Sequence[Dwell]) -> Iterator[Corner]
             yield temp_code, raw_code, weight
 
 
-def _between_codes(
+def between_codes(
     routine: Routine, corners: Sequence[Corner]
 ) -> tuple[FloatArray, npt.NDArray[np.uint32]]:
     """Interpolated accelerations (n, 3) in LSB, and every status bit that a side has set."""

@@ -16,30 +16,36 @@ _ROWS = 40
 
 def check_text(serial: str, found: FieldCheck) -> str:
     """Poses, chi-square, limits, and why it failed."""
-    lines = [f"{serial} against {_name(found.poses.source)}: {len(found.poses)} poses", ""]
+    lines = [f"{serial} against {_name(found.poses.source)}: {_poses(len(found.poses))}", ""]
     lines += _table(found)
     e, count = found.expected, len(found.poses)
     lines += [
         "",
         f"chi-square   {e.chi_square:.1f}, {count} expected; {_chance(found.chance)}",
         f"largest      {_worst(found)}",
-        f"would show   a change of the bias, in 95 of 100 checks: {_seen(found)}",
     ]
-    lines += [f"found        {finding}" for finding in found.poses.findings]
+    if found.consistent:
+        lines += [f"would show   a change of the bias, in 95 of 100 checks: {_seen(found)}"]
+    lines += [f"found        {words}" for words in (*found.poses.findings, *found.flagged)]
     lines += ["", *verdict_lines(found)]
     return "\n".join(lines)
 
 
 def verdict_lines(found: FieldCheck) -> list[str]:
     """Passed or failed, with the reasons."""
+    undecided = int(found.undecided.sum())
+    noisy = f"{undecided} of {_poses(len(found.poses))} beyond the limit by less than their noise"
     if found.passed:
-        return ["passed       the constants agree with this recording, and every pose is in limits"]
+        limits = "no pose is surely beyond its limit" if undecided else "every pose is in limits"
+        lines = [f"passed       the constants agree with this recording, and {limits}"]
+        noisy += ": hold the unit stiller and longer"
+        return lines + [f"not tested   {noisy}"] * bool(undecided)
     reasons = []
     if not found.consistent:
         reasons.append("the constants contradict this recording beyond the uncertainty")
     if not found.within_limits:
-        beyond = int((found.largest_g > found.limit_g).sum())
-        reasons.append(f"{beyond} of {len(found.poses)} poses are beyond the limit")
+        beyond = int(found.beyond.sum())
+        reasons.append(f"{beyond} of {_poses(len(found.poses))} beyond the limit")
     lines = ["FAILED       " + "; ".join(reasons)]
     alike = found.explanations
     if alike:
@@ -66,7 +72,7 @@ def _table(found: FieldCheck) -> list[str]:
             "-" if found.c_error_g is None else f"{found.c_error_g[k] * 1e3:+.3f}",
             f"{2.0 * e.sd_g[k] * 1e3:.3f}",
             f"{found.limit_g[k] * 1e3:g}",
-            "beyond" if found.largest_g[k] > found.limit_g[k] else "",
+            "beyond" if found.beyond[k] else "noise" if found.undecided[k] else "",
         ]
         for k in shown
     ]
@@ -75,6 +81,10 @@ def _table(found: FieldCheck) -> list[str]:
     if len(shown) < len(found.poses):
         lines.append(f"  the {len(shown)} poses nearest to their limits, of {len(found.poses)}")
     return lines
+
+
+def _poses(count: int) -> str:
+    return f"{count} pose{'s' * (count != 1)}"
 
 
 def _worst(found: FieldCheck) -> str:

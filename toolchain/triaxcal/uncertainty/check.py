@@ -5,29 +5,37 @@ passes where
 
     r^T cov(r)^-1 r / n    is no larger than Fisher's F with n and nu degrees of freedom gives once
                            in 1 / CHANCE checks of a sound unit, and
-    |r_i|                  is within the unit's limit in each pose, by the C as by the model.
+    |r_i|                  is beyond the unit's limit in no pose, by the C as by the model, by more
+                           than its noise: than the quantile of a normal distribution that the
+                           noise of any of the n poses exceeds once in 1 / CHANCE checks.
 
-Where it fails, causes of one kind are fitted by generalised least squares: those that leave an
-ordinary chi-square are named, all of them, with as few parameters as any needs.
+Where it fails, causes of one kind are fitted (`uncertainty.explain`): those that leave an ordinary
+chi-square are named, all of them, with as few values as any needs.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 
 from triaxcal.fitting.core.outliers import CHANCE
 from triaxcal.fitting.field.poses import FieldPoses, inside_range
-from triaxcal.model.types import FloatArray
-from triaxcal.uncertainty.expected import Expected, chance_of, expected
-from triaxcal.uncertainty.explain import Explanation, Parts, explain, suspect
+from triaxcal.fixedpoint.integer_model import STATUS_RAW_RANGE, STATUS_SATURATED
+from triaxcal.model.types import BoolArray, FloatArray, IntArray
+from triaxcal.uncertainty.expected import Expected, chance_of, expectation
+from triaxcal.uncertainty.explain import Explanation, Parts, why
 
 _POWER = 1.645
 """Normal quantile of 95 %: how surely a change is to be seen."""
 _SEEN_MAX_G = 0.5
 """A larger change of a bias is no small one any more: it counts as not seen."""
+_STATUS = (
+    (STATUS_RAW_RANGE, "have raw codes beyond those of the calibration: the C clamps them"),
+    (STATUS_SATURATED, "are beyond what the C can give: it saturates"),
+)
 
 
 @dataclass(frozen=True)
@@ -42,6 +50,8 @@ class FieldCheck:
         Errors by the fitted model, and their uncertainty.
     c_error_g : array, shape (n,), or None
         |a| - g by the integers of the C.
+    c_status : array of int, shape (n,), or None
+        Status that the C gives there.
     limit_g : array, shape (n,)
         Limit of each pose.
     chance : float
@@ -57,6 +67,7 @@ class FieldCheck:
     poses: FieldPoses
     expected: Expected
     c_error_g: FloatArray | None
+    c_status: IntArray | None
     limit_g: FloatArray
     chance: float
     explanations: tuple[Explanation, ...]
@@ -75,14 +86,47 @@ class FieldCheck:
         return own if self.c_error_g is None else np.maximum(own, np.abs(self.c_error_g))
 
     @property
+    def noise_g(self) -> FloatArray:
+        """What the noise of each of the n poses exceeds once in 1 / `CHANCE` checks, shape (n,)."""
+        quantile = NormalDist().inv_cdf(1.0 - CHANCE / len(self.poses))
+        result: FloatArray = quantile * self.expected.own_sd_g
+        return result
+
+    @property
+    def beyond(self) -> BoolArray:
+        """Whether each pose is beyond its limit by more than its noise, shape (n,)."""
+        result: BoolArray = self.largest_g > self.limit_g + self.noise_g
+        return result
+
+    @property
+    def undecided(self) -> BoolArray:
+        """Whether each pose is beyond its limit by less than its noise, shape (n,)."""
+        result: BoolArray = (self.largest_g > self.limit_g) & ~self.beyond
+        return result
+
+    @property
+    def flagged(self) -> tuple[str, ...]:
+        """Poses where the C gives a status, in words."""
+        if self.c_status is None:
+            return ()
+        found = []
+        for bit, words in _STATUS:
+            where = np.flatnonzero(self.c_status & bit)
+            if len(where):
+                share = f"{len(where)} of {len(self.poses)} poses"
+                first = self.poses.names[int(where[0])]
+                found.append(f"{share} ({first}) {words} and sets status {bit}")
+        return tuple(found)
+
+    @property
     def consistent(self) -> bool:
         """Whether chi-square is what the uncertainty leads to expect."""
         return self.chance >= CHANCE
 
     @property
     def within_limits(self) -> bool:
-        """Whether every pose is within its limit."""
-        return bool((self.largest_g <= self.limit_g).all())
+        """Whether no pose is beyond its limit by more than its noise."""
+        return not self.beyond.any()
 
     @property
     def passed(self) -> bool:
@@ -94,9 +138,15 @@ def check_poses(
     parts: Parts,
     poses: FieldPoses,
     gravity_g: float,
-    c_error_g: FloatArray | None = None,
+    c_force_g: FloatArray | None = None,
+    c_status: IntArray | None = None,
 ) -> FieldCheck:
     """Hold a calibration against poses within its working range.
+
+    Parameters
+    ----------
+    c_force_g, c_status : arrays, shapes (n, 3) and (n,), or None
+        What the C gives there.
 
     Raises
     ------
@@ -105,19 +155,19 @@ def check_poses(
     """
     unit, _, calibration = parts
     poses = inside_range(poses, calibration.range_degc)
-    found = expected(*parts, poses, gravity_g)
-    count = len(poses)
-    chance = chance_of(found.chi_square, count, found.dof)
-    explanations: tuple[Explanation, ...] = ()
-    suspicions: tuple[str, ...] = ()
-    if chance < CHANCE:
-        explanations = explain(found, poses)
-        suspicions = suspect(parts, poses, gravity_g, found, explained=bool(explanations))
+    expects = expectation(*parts, poses.temps_degc)
+    found = expects.at(poses, gravity_g)
+    chance = chance_of(found.chi_square, len(poses), found.dof)
+    explanations, suspicions = (
+        why(expects, poses, gravity_g, found) if chance < CHANCE else ((), ())
+    )
     limits = [unit.limits.at(t, unit.t0_degc)[0] for t in poses.temps_degc.tolist()]
+    c_error_g = None if c_force_g is None else np.linalg.norm(c_force_g, axis=1) - gravity_g
     return FieldCheck(
         poses,
         found,
         c_error_g,
+        c_status,
         np.array(limits),
         chance,
         explanations,

@@ -32,7 +32,7 @@ from triaxcal.uncertainty.orientation import weights
 from triaxcal.uncertainty.source import Source
 from triaxcal.unit.description import UnitDescription
 
-_OF_THE_POSE = frozenset({"raw_code", "temperature_code", "model"})
+OF_THE_POSE = frozenset({"raw_code", "temperature_code", "model"})
 """Sources that are new in each pose; they are part of R here."""
 _STEP_DEGC = 0.1
 """Covariances are evaluated at temperatures rounded to this."""
@@ -109,15 +109,6 @@ class Expected:
         result: FloatArray = (inverse @ self.error_g) / np.sqrt(np.diag(inverse))
         return result
 
-    def explained(self, columns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Chi-square that is left, values and sd of causes with these effects (n, k) on |a|."""
-        weighted = self.solve(columns)
-        information = columns.T @ weighted
-        covariance = np.linalg.pinv(information, rcond=1e-9, hermitian=True)
-        values = covariance @ (weighted.T @ self.error_g)
-        left = self.chi_square - float(values @ information @ values)
-        return max(left, 0.0), values, np.sqrt(np.diag(covariance))
-
 
 def chance_of(chi_square: float, count: int, dof: int) -> float:
     """Chance of a chi-square of `count` values as large; 1 where it is below what is expected."""
@@ -126,14 +117,60 @@ def chance_of(chi_square: float, count: int, dof: int) -> float:
     return fisher_tail(count, dof, chi_square / count)
 
 
-def expected(
+@dataclass(frozen=True)
+class Expectation:
+    """What a calibration leads one to expect at some temperatures, whatever the readings are.
+
+    Attributes
+    ----------
+    unit : UnitDescription
+    calibration : Calibration
+    known : Uncertainty
+        At `known.temps_degc`, which hold those of the poses.
+    roots : tuple of arrays, each of shape (temperatures, m, m)
+        V_s(T)^(1/2) of the sources that all poses share.
+    dofs : tuple of float
+        Of these sources.
+    """
+
+    unit: UnitDescription
+    calibration: Calibration
+    known: Uncertainty
+    roots: tuple[FloatArray, ...]
+    dofs: tuple[float, ...]
+
+    def at(self, poses: FieldPoses, gravity_g: float) -> Expected:
+        """Errors of |a| at poses, and their covariance."""
+        calibration = self.calibration
+        force, slopes = force_and_slopes(calibration, poses.readings, poses.temps_degc)
+        length = np.linalg.norm(force, axis=1)
+        K, U0 = unpack_constants(calibration.thermal.constants_at(poses.temps_degc))
+        sensitivity = output_sensitivity(K)
+        index = np.searchsorted(self.known.temps_degc, _rounded(calibration, poses.temps_degc))
+        factors = [_factor(root, index, force / length[:, None]) for root in self.roots]
+        own, own_dof = _own_variance(self.unit, calibration, self.known, poses, slopes)
+        each = [float((f**2).sum()) for f in factors] + [float(own.sum())]
+        dofs = (*self.dofs, own_dof)
+        loss = math.fsum(v * v / d for v, d in zip(each, dofs, strict=True))
+        dof = math.fsum(each) ** 2 / loss if loss else math.inf
+        return Expected(
+            error_g=length - gravity_g,
+            force_g=force,
+            slopes=slopes * sensitivity,
+            outputs_g=(poses.readings - U0) / sensitivity,
+            own_sd_g=np.sqrt(own),
+            factor_g=np.concatenate([*factors, np.zeros((len(own), 1))], axis=1),
+            dof=max(1, int(min(dof, _DOF_MAX))),
+        )
+
+
+def expectation(
     unit: UnitDescription,
     measurements: MeasurementSet,
     calibration: Calibration,
-    poses: FieldPoses,
-    gravity_g: float,
-) -> Expected:
-    """Errors of |a| at poses within the range, and their covariance.
+    temps_degc: FloatArray,
+) -> Expectation:
+    """What is expected at poses of these temperatures, within the range.
 
     Raises
     ------
@@ -148,40 +185,38 @@ def expected(
             expected="a calibration with more poses than constants",
             remedy="calibrate the unit with more poses",
         )
-    force, slopes = force_and_slopes(calibration, poses.readings, poses.temps_degc)
-    length = np.linalg.norm(force, axis=1)
-    K, U0 = unpack_constants(calibration.thermal.constants_at(poses.temps_degc))
-    sensitivity = np.linalg.norm(K, axis=2) * np.sign(np.diagonal(K, axis1=1, axis2=2))
-    temps = np.round(poses.temps_degc / _STEP_DEGC) * _STEP_DEGC
-    temps = temps.clip(*calibration.range_degc)
-    grid = np.unique([*temps.tolist(), unit.t0_degc])
+    grid = np.unique([*_rounded(calibration, temps_degc).tolist(), unit.t0_degc])
     known = uncertainty(unit, measurements, calibration, None, grid)
-    common = [s for s in known.sources if s.force is not None and s.key not in _OF_THE_POSE]
-    index = np.searchsorted(grid, temps)
-    factors = [_factor(s, index, force / length[:, None]) for s in common]
-    own, own_dof = _own_variance(unit, calibration, known, poses, slopes)
-    each = [float((f**2).sum()) for f in factors] + [float(own.sum())]
-    dofs = [s.dof for s in common] + [own_dof]
-    loss = math.fsum(v * v / d for v, d in zip(each, dofs, strict=True))
-    dof = math.fsum(each) ** 2 / loss if loss else math.inf
-    return Expected(
-        error_g=length - gravity_g,
-        force_g=force,
-        slopes=slopes * sensitivity,
-        outputs_g=(poses.readings - U0) / sensitivity,
-        own_sd_g=np.sqrt(own),
-        factor_g=np.concatenate([*factors, np.zeros((len(own), 1))], axis=1),
-        dof=max(1, int(min(dof, _DOF_MAX))),
-    )
+    shared = [s for s in known.sources if s.force is not None and s.key not in OF_THE_POSE]
+    roots, dofs = tuple(_root(s) for s in shared), tuple(s.dof for s in shared)
+    return Expectation(unit, calibration, known, roots, dofs)
 
 
-def _factor(source: Source, index: IntArray, direction: FloatArray) -> FloatArray:
-    """F of a source: rows of the poses by the roots of its covariances, (n, 12 or 30)."""
+def output_sensitivity(K: FloatArray) -> FloatArray:
+    """Of each output along its own direction, signed as K_ii; (n, 3, 3) to (n, 3)."""
+    result: FloatArray = np.linalg.norm(K, axis=2) * np.sign(np.diagonal(K, axis1=1, axis2=2))
+    return result
+
+
+def _rounded(calibration: Calibration, temps_degc: FloatArray) -> FloatArray:
+    result: FloatArray = np.round(temps_degc / _STEP_DEGC) * _STEP_DEGC
+    return result.clip(*calibration.range_degc)
+
+
+def _root(source: Source) -> FloatArray:
+    """Symmetric roots of the covariances of D."""
     assert source.force is not None
     values, vectors = np.linalg.eigh(source.force)
-    roots = (vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-    w = weights(direction, source.force.shape[-1] // 3)[:, 3]
-    result: FloatArray = np.einsum("na,nab->nb", w, roots[index])
+    result: FloatArray = (vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ np.swapaxes(
+        vectors, 1, 2
+    )
+    return result
+
+
+def _factor(root: FloatArray, index: IntArray, direction: FloatArray) -> FloatArray:
+    """F of a source: rows of the poses by the roots of its covariances, (n, 12 or 30)."""
+    w = weights(direction, root.shape[-1] // 3)[:, 3]
+    result: FloatArray = np.einsum("na,nab->nb", w, root[index])
     return result
 
 

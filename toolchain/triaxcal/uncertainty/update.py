@@ -33,7 +33,7 @@ from triaxcal.fitting.field.update import (
 from triaxcal.model.framefree import frame_free, frame_free_slopes
 from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.evaluate import uncertainty
-from triaxcal.uncertainty.expected import chance_of, expected
+from triaxcal.uncertainty.expected import chance_of, expectation
 from triaxcal.uncertainty.explain import Parts
 from triaxcal.uncertainty.propagation import ROWS
 from triaxcal.uncertainty.rig_sources import GRAVITY_M_PER_S2
@@ -77,7 +77,7 @@ def update_by_poses(
     """
     unit, _, calibration = parts
     poses = inside_range(poses, calibration.range_degc)
-    new = expected(*parts, poses, gravity_g)
+    new = expectation(*parts, poses.temps_degc).at(poses, gravity_g)
     stated = unit.stated.gravity_m_per_s2
     gravity_sd = (GRAVITY_M_PER_S2 if stated is None else stated) / STANDARD_GRAVITY_M_PER_S2
     noise = np.diag(new.own_sd_g**2) + gravity_sd**2

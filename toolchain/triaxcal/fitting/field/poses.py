@@ -96,6 +96,10 @@ def field_poses(
         When the file cannot be read, names another serial number, has no still pose, or is in
         another unit than the calibration.
     """
+    if isinstance(recorded, Path) and not recorded.exists():
+        raise RefusedError(
+            str(recorded), "no such file", expected="a recording", remedy="check its name"
+        )
     layout = layout or unit.recording
     if layout is None:
         return _of_dwells(unit, recorded)
