@@ -191,9 +191,7 @@ def test_three_implementations_agree_on_a_planned_unit(
     write_generated(plan, tmp_path)
     generated = Generated(start_generated(tmp_path, tmp_path).load())
     image = image_bytes(plan)
-    check = cross_check(
-        plan, vector_sets(plan, 20_000), lambda: generated, lambda: reference.routine(image), image
-    )
+    check = cross_check(plan, vector_sets(plan, 20_000), generated, reference.routine(image), image)
     bound = prove(plan)
     assert bound.lsb <= 1.0
     assert 0.8 * bound.lsb <= check.largest_error_lsb <= bound.lsb

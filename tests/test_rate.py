@@ -165,7 +165,7 @@ def test_three_implementations_agree(
     generated, handwritten = routines_of(plan.rate, library, reference.library)
     image = image_bytes(plan)
     sets = vector_sets(plan, 20_000)
-    check = cross_check(plan, sets, lambda: generated, lambda: handwritten.routine(image), image)
+    check = cross_check(plan, sets, generated, handwritten.routine(image), image)
     bound = prove(plan)
     assert 0.8 * bound.lsb <= check.largest_error_lsb <= bound.lsb
     assert check_images(plan, image_cases(plan, image), generated, handwritten) > 300

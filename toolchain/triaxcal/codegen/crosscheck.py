@@ -7,7 +7,6 @@ triax_calib.h, and from the image through triax_calib_load) answer the same vect
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
@@ -37,6 +36,8 @@ NumberArray = TypeVar("NumberArray", IntArray, FloatArray)
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 RANDOM_VECTORS = 1_000_000
 SEED = 20130526
+_SHARED_TEMP = 16  # random int32: raw codes a temperature, nearly all of which are out of range
+_PART = 65536  # vectors that a thread puts to the three implementations at a time
 _BLOCK = 8192  # of the Python model: its working arrays stay in the cache
 
 
@@ -90,8 +91,10 @@ def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[Vector
             shape.raw_min, shape.raw_max, (random_vectors, 3), dtype=np.int32, endpoint=True
         ),
     )
+    temps = -(-random_vectors // _SHARED_TEMP)
+    temps_of_any = rng.integers(INT32_MIN, INT32_MAX, temps, dtype=np.int32, endpoint=True)
     anything = (
-        np.sort(rng.integers(INT32_MIN, INT32_MAX, random_vectors, dtype=np.int32, endpoint=True)),
+        np.repeat(np.sort(temps_of_any), _SHARED_TEMP)[:random_vectors],
         rng.integers(INT32_MIN, INT32_MAX, (random_vectors, 3), dtype=np.int32, endpoint=True),
     )
     return [
@@ -172,123 +175,139 @@ def _gather(table: NumberArray, index: IntArray) -> NumberArray:
 
 
 def cross_check(
-    plan: Plan,
-    sets: list[VectorSet],
-    generated: Callable[[], Generated],
-    reference: Callable[[], Routine],
-    image: bytes,
+    plan: Plan, sets: list[VectorSet], generated: Generated, reference: Routine, image: bytes
 ) -> CrossCheck:
     """Run every vector through the three implementations and the image through the loader.
-
-    `generated` and `reference` give the compiled C. They may wait for the compiler: Python answers
-    meanwhile.
 
     Raises
     ------
     RefusedError
         At the first mismatch: its input and both outputs.
     """
+    python, real = python_routine(plan), _columns(plan.real_rows())
+
+    def agreed(part: _Part) -> list[_Worst]:
+        vectors, chosen = part.vectors, part.chosen
+        temp, raw = vectors.temp[chosen], vectors.raw[chosen]
+        expected = python(temp, raw)
+        _compare(part, "generated C", generated.run(temp, raw), expected)
+        _compare(part, "reference C", reference(temp, raw), expected)
+        return _largest_errors(plan, real, temp, raw, expected) if vectors.exhaustive else []
+
     with ThreadPoolExecutor(2) as pool:
-        compiled = (
-            pool.submit(lambda: _answers(generated().run, sets)),
-            pool.submit(lambda: _answers(reference(), sets)),
-        )
-        python = _answers(python_routine(plan), sets)
-        largest = _largest_errors(plan, sets, python)
-        for vectors, expected, *found in zip(
-            sets, python, *(future.result() for future in compiled), strict=True
-        ):
-            _compare(vectors, "generated C", found[0], expected)
-            _compare(vectors, "reference C", found[1], expected)
-    boundary = next(v for v in sets if v.name == "boundaries")
-    built = generated()
-    loaded, answers = built.run_image(image, boundary.temp, boundary.raw)
-    if loaded != STATUS_OK:
-        raise RefusedError("triax_calib_load", f"refused its own image with status {loaded}")
-    _compare(
-        boundary,
-        "generated C with the image",
-        answers,
-        generated().run(boundary.temp, boundary.raw),
+        errors = [worst for found in pool.map(agreed, _parts(sets)) for worst in found]
+    _check_image(next(v for v in sets if v.name == "boundaries"), generated, image)
+    # Floats find the vector, whose error is then computed exactly.
+    largest = max(
+        (
+            _exact_error(plan, max(own, key=lambda worst: worst.error_lsb))
+            for axis in range(3)
+            if (own := [worst for worst in errors if worst.axis == axis])
+        ),
+        default=0.0,
     )
     return CrossCheck({v.name: len(v.temp) for v in sets}, largest)
 
 
-def _answers(routine: Routine, sets: list[VectorSet]) -> list[Answers]:
-    return [routine(v.temp, v.raw) for v in sets]
+@dataclass(frozen=True)
+class _Part:
+    """Some neighbouring vectors of a set."""
+
+    vectors: VectorSet
+    chosen: slice
 
 
-def _largest_errors(plan: Plan, sets: list[VectorSet], answers: list[Answers]) -> float:
-    """Largest |integer - real| in LSB over the exhaustive sets."""
-    real = _columns(plan.real_rows())
-    errors = [
-        _largest_error(plan, real, vectors, found)
-        for vectors, found in zip(sets, answers, strict=True)
-        if vectors.exhaustive
+@dataclass(frozen=True)
+class _Worst:
+    """The vector whose answer is furthest from the real-valued plan, in one axis, by floats."""
+
+    error_lsb: float
+    axis: int
+    temp: int
+    raw: tuple[int, int, int]
+    answer: int
+
+
+def _parts(sets: list[VectorSet]) -> list[_Part]:
+    return [
+        _Part(vectors, slice(start, start + _PART))
+        for vectors in sets
+        for start in range(0, len(vectors.temp), _PART)
     ]
-    return max(errors, default=0.0)
 
 
-def _compare(vectors: VectorSet, name: str, found: Answers, expected: Answers) -> None:
+def _check_image(boundary: VectorSet, generated: Generated, image: bytes) -> None:
+    """The loader takes the image, and the routine then answers as with the header's constants."""
+    loaded, answers = generated.run_image(image, boundary.temp, boundary.raw)
+    if loaded != STATUS_OK:
+        raise RefusedError("triax_calib_load", f"refused its own image with status {loaded}")
+    expected = generated.run(boundary.temp, boundary.raw)
+    whole = _Part(boundary, slice(0, len(boundary.temp)))
+    _compare(whole, "generated C with the image", answers, expected)
+
+
+def _compare(part: _Part, name: str, found: Answers, expected: Answers) -> None:
     differs = difference(found, expected)
     if differs is None:
         return
-    i = differs.first
+    vectors, i = part.vectors, part.chosen.start + differs.first
     raise RefusedError(
         f"cross-check, vector {i} of '{vectors.name}'",
         f"temp_code {vectors.temp[i]}, raw_code {vectors.raw[i].tolist()}: {name} gives "
         f"{differs.found}",
         expected=differs.expected,
-        remedy=f"{differs.count} of {len(vectors.temp)} vectors differ: do not use this build, "
-        "report it",
+        remedy=f"{differs.count} of {len(found[1])} vectors tried together differ: do not use "
+        "this build, report it",
     )
 
 
-def _largest_error(plan: Plan, table: FloatArray, vectors: VectorSet, answers: Answers) -> float:
-    """Largest |integer - real| in LSB over the vectors that no limit touched.
+def _largest_errors(
+    plan: Plan, table: FloatArray, temp: Int32Array, raw: Int32Array, answers: Answers
+) -> list[_Worst]:
+    """Where |integer - real| is largest in each axis, over the vectors that no limit touched.
 
-    Found in floats, whose rounding may reach 1e-6 LSB and more than the proven bound leaves; then
-    computed exactly where it was found.
+    In floats, whose rounding may reach 1e-6 LSB and more than the proven bound leaves.
     """
-    shape = plan.shape
-    fraction = 2.0 ** (32 - shape.output_shift)
     clean = np.flatnonzero(answers[1] == STATUS_OK)
-    found = [(0.0, -1)] * 3
+    found: list[_Worst] = []
     for start in range(0, len(clean), _BLOCK):
         chosen = clean[start : start + _BLOCK]
-        rows = _gather(table, vectors.temp[chosen].astype(np.int64) - plan.temp_min_code)
-        u = vectors.raw[chosen].astype(np.float64) * 2.0 ** (shape.raw_shift - 32)
-        real = np.empty((3, len(chosen)))
+        real = _real_lsb(plan, table, temp[chosen], raw[chosen])
         for i in range(3):
-            real[i] = rows[:, i, 3]
-            for j in range(3):
-                real[i] += rows[:, i, j] * u[:, j]
-        if plan.rate is not None:
-            fullest = rates_of(plan.rate, vectors.temp[chosen]) * (plan.rate.gain / 2.0**32)
-            real += plan.rate.real[:, None] * fullest
-        if plan.real_quadratic is not None:
-            real = real + plan.real_quadratic @ products(real.T).T * 2.0**-64
-        if plan.real_sensitivity is not None:
-            force = forces_of(vectors.temp[chosen], vectors.raw[chosen]).astype(np.float64)
-            real += plan.real_sensitivity @ force.T * 2.0**-32
-        for i in range(3):
-            error = np.abs(answers[0][chosen, i] - real[i] * fraction)
+            error = np.abs(answers[0][chosen, i] - real[i])
             worst = int(error.argmax())
-            found[i] = max(found[i], (float(error[worst]), int(chosen[worst])))
-    return max(
-        (
-            abs(_exact_error(plan, vectors, v, i, int(answers[0][v, i])))
-            for i, (_, v) in enumerate(found)
-            if v >= 0
-        ),
-        default=0.0,
-    )
+            v = int(chosen[worst])
+            x, y, z = raw[v].tolist()
+            answer = int(answers[0][v, i])
+            found.append(_Worst(float(error[worst]), i, int(temp[v]), (x, y, z), answer))
+    return found
 
 
-def _exact_error(plan: Plan, vectors: VectorSet, v: int, axis: int, answer: int) -> float:
-    temp, raw = vectors.temp[v : v + 1], vectors.raw[v : v + 1]
+def _real_lsb(plan: Plan, table: FloatArray, temp: Int32Array, raw: Int32Array) -> FloatArray:
+    """The real-valued plan's answers (3, n) in output LSB, temperatures in range."""
+    rows = _gather(table, temp.astype(np.int64) - plan.temp_min_code)
+    u = raw.astype(np.float64) * 2.0 ** (plan.shape.raw_shift - 32)
+    real = np.empty((3, len(temp)))
+    for i in range(3):
+        real[i] = rows[:, i, 3]
+        for j in range(3):
+            real[i] += rows[:, i, j] * u[:, j]
+    if plan.rate is not None:
+        fullest = rates_of(plan.rate, temp) * (plan.rate.gain / 2.0**32)
+        real += plan.rate.real[:, None] * fullest
+    if plan.real_quadratic is not None:
+        real = real + plan.real_quadratic @ products(real.T).T * 2.0**-64
+    if plan.real_sensitivity is not None:
+        real += plan.real_sensitivity @ forces_of(temp, raw).astype(np.float64).T * 2.0**-32
+    return real * 2.0 ** (32 - plan.shape.output_shift)
+
+
+def _exact_error(plan: Plan, worst: _Worst) -> float:
+    temp, raw = np.array([worst.temp], np.int32), np.array([worst.raw], np.int32)
     rate = 0 if plan.rate is None else int(rates_of(plan.rate, temp)[0])
     force = forces_of(temp, raw)[0].tolist()
-    return exact_error_lsb(
-        plan, int(temp[0]), raw[0].tolist(), axis, answer, rate_code=rate, force_code=force
-    )
+    lsb = exact_error_lsb(
+        plan, worst.temp, list(worst.raw), worst.axis, worst.answer,
+        rate_code=rate, force_code=force,
+    )  # fmt: skip
+    return abs(lsb)

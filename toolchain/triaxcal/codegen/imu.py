@@ -142,9 +142,7 @@ def rate_bound(gyro: Plan, own: Bound, accel: Bound) -> tuple[float, float, floa
 def _check(plan: Plan, routines: tuple[Generated, Reference], count: int) -> CrossCheck:
     image = image_bytes(plan)
     generated, reference = routines
-    check = cross_check(
-        plan, vector_sets(plan, count), lambda: generated, lambda: reference.routine(image), image
-    )
+    check = cross_check(plan, vector_sets(plan, count), generated, reference.routine(image), image)
     return replace(check, images=check_images(plan, image_cases(plan, image), generated, reference))
 
 

@@ -75,10 +75,6 @@ class Reference:
     library: ctypes.CDLL
     entry: ClassVar[str] = "triax_ref_batch"
 
-    def loaded(self) -> ctypes.CDLL:
-        """The library, as `Compilation.load` gives it."""
-        return self.library
-
     def routine(self, image: bytes) -> Routine:
         """Bind an image."""
 

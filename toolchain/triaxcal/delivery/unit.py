@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from ctypes import CDLL
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -121,21 +120,15 @@ def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delive
         sets = vector_sets(plan)
         image = firmware.files[IMAGE_FILE]
         cases = image_cases(plan, image)
-        # Loaded by the thread that asks first, when the compiler is done.
-        ours = cache(compilation.load)
-        theirs = cache(reference.load) if isinstance(reference, Compilation) else reference.loaded
-        check = cross_check(
-            plan,
-            sets,
-            lambda: routines_of(plan.rate, ours(), ours())[0],
-            lambda: routines_of(plan.rate, theirs(), theirs())[1].routine(image),
-            image,
-        )
-        tried = routines_of(plan.rate, ours(), theirs())
+        # The compiler was at work meanwhile.
+        ours = compilation.load()
+        theirs = reference.load() if isinstance(reference, Compilation) else reference.library
+        tried = routines_of(plan.rate, ours, theirs)
+        check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
         check = replace(check, images=check_images(plan, cases, *tried))
         _refuse_wrong_bound(unit, bound, check)
-        methods = _on_dwells(fitted, plan, ours(), Reference(theirs()))
-        compiler = Generated(ours()).compiler
+        methods = _on_dwells(fitted, plan, ours, Reference(theirs))
+        compiler = Generated(ours).compiler
     parts = unit, fitted.measurements, fitted.inputs_sha256, fitted.calibration
     delivery = Delivery(*parts, firmware, bound, check, methods, compiler)
     _refuse_beyond_limits(delivery)
