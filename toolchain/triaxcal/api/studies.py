@@ -16,8 +16,8 @@ from triaxcal.design.search import Design, best, usual
 from triaxcal.design.words import comparison, rig_plan
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.fitting.core.drift import Drift, study
-from triaxcal.poses.poses import PoseSet
 from triaxcal.poses.poses import find_poses as poses_of
+from triaxcal.poses.poseset import PoseSet
 from triaxcal.readings.samples import Samples, read_samples
 from triaxcal.report import studies
 from triaxcal.report.dynamic import plan_summary

@@ -19,7 +19,6 @@ from triaxcal.delivery.coderange import settled_codes
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import PairTerms
-from triaxcal.fitting.pair.cross_coupling import stated_pair
 from triaxcal.fitting.tilter.acceptance import refuse_unacceptable
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import (
@@ -71,11 +70,19 @@ def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
         unit, measurements, calibration = calibrate_recording(unit, unit.recording, folder)
     else:
         measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
-        calibration = _of_tilter(unit, measurements, stated_pair(unit, folder))
+        calibration = _of_tilter(unit, measurements, _stated_pair(unit, folder))
         unit, calibration = settled_codes(unit, calibration)
     if inputs_sha256(folder, unit) != inputs:
         raise _changed(folder)
     return Fitted(unit, measurements, inputs, calibration)
+
+
+def _stated_pair(unit: UnitDescription, folder: Path) -> PairTerms | None:
+    if unit.pair is None:
+        return None
+    from triaxcal.fitting.pair.cross_coupling import stated_pair  # noqa: PLC0415
+
+    return stated_pair(unit, folder)
 
 
 def _of_tilter(

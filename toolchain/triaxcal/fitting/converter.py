@@ -19,7 +19,7 @@ from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.model.curves import ThermalModel
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.poses import PoseSet
+from triaxcal.poses.poseset import PoseSet
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.unit.recording import RecordingLayout
 from triaxcal.unit.recordingfile import SignedColumn

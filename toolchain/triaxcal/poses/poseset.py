@@ -7,10 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.stillness import Stillness
 
 SD_FLOOR_G = 1e-4
 """Standard deviation of a pose that no length of it removes."""
+
+
+@dataclass(frozen=True)
+class Stillness:
+    """Where a recording is still.
+
+    Attributes
+    ----------
+    time_s, motion : arrays, shape (m,)
+        For pictures: evenly spaced moments; motion in the unit of the readings.
+    runs : tuple of (start, stop)
+        Still stretches, as indices of samples, stop excluded.
+    quietest : float
+        Least motion that lasts for half of the shortest pose, in the unit of the readings.
+    """
+
+    time_s: FloatArray
+    motion: FloatArray
+    runs: tuple[tuple[int, int], ...]
+    quietest: float
 
 
 @dataclass(frozen=True)

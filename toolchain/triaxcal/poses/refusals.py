@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.poses.stillness import Stillness
+from triaxcal.poses.poseset import Stillness
 from triaxcal.readings.samples import Samples
 from triaxcal.readings.table import TIME
 from triaxcal.unit.recording import RecordingLayout

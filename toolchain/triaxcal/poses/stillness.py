@@ -17,13 +17,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 from triaxcal.poses.cells import HALF, Cells
+from triaxcal.poses.poseset import Stillness
 from triaxcal.readings.samples import Samples
 from triaxcal.readings.spool import Spool
 from triaxcal.readings.table import TIME
@@ -47,26 +47,6 @@ _SETTLING_S, _SETTLING_SHARE = 0.25, 0.1
 """More left out there, of a stretch that is long enough: a hand lets go, a table calms down."""
 _ONE_POSE = math.radians(1.0)
 """Sway, rms, of two neighbours and what lies between: a knock within a pose, and not a turn."""
-
-
-@dataclass(frozen=True)
-class Stillness:
-    """What was found.
-
-    Attributes
-    ----------
-    time_s, motion : arrays, shape (m,)
-        For pictures: evenly spaced moments; motion in the unit of the readings.
-    runs : tuple of (start, stop)
-        Still stretches, as indices of samples, stop excluded.
-    quietest : float
-        Least motion that lasts for half of the shortest pose, in the unit of the readings.
-    """
-
-    time_s: FloatArray
-    motion: FloatArray
-    runs: tuple[tuple[int, int], ...]
-    quietest: float
 
 
 def find_stillness(

@@ -8,7 +8,7 @@ from triaxcal.base.screentext import table
 from triaxcal.fitting.core.drift import Drift
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.poses import PoseSet
+from triaxcal.poses.poseset import PoseSet
 from triaxcal.readings.samples import READING, Samples
 from triaxcal.readings.table import TIME
 from triaxcal.report.pictures.line_plot import BAD, COLOURS, GOOD, Band, Line, Panel, line_plot

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from triaxcal.fitting.core.judged import TEMPERATURE, HeldOutPoses
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.poses import PoseSet
+from triaxcal.poses.poseset import PoseSet
 
 
 @dataclass(frozen=True)

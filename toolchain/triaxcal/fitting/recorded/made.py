@@ -29,7 +29,7 @@ from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import RateTerm, Terms
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.poses import PoseSet
+from triaxcal.poses.poseset import PoseSet
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import RecordingLayout
 

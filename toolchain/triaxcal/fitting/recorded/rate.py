@@ -11,7 +11,7 @@ import numpy as np
 
 from triaxcal.fitting.core.drift import half_cycles
 from triaxcal.model.types import BoolArray, FloatArray
-from triaxcal.poses.poses import PoseSet
+from triaxcal.poses.poseset import PoseSet
 from triaxcal.readings.samples import TEMP, Samples
 from triaxcal.readings.spool import SAMPLED
 from triaxcal.readings.table import TIME

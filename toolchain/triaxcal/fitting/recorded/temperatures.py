@@ -10,7 +10,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS
 from triaxcal.model.thermal.shape import EDGE_DEGC, GROUP_GAP_DEGC, ThermalShape
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.poses import PoseSet
+from triaxcal.poses.poseset import PoseSet
 from triaxcal.unit.description import UnitDescription
 
 THERMAL_SPREAD_DEGC = 5.0

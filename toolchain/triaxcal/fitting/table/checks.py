@@ -13,7 +13,7 @@ from triaxcal.fitting.table.oriented import design_condition, inverse_linear
 from triaxcal.model.orientation import gravity_direction
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.poses.poses import PoseSet
+from triaxcal.poses.poseset import PoseSet
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import Angles, RecordingLayout
 

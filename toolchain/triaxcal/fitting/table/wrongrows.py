@@ -17,7 +17,7 @@ from triaxcal.fitting.core.outliers import worst_outlier
 from triaxcal.fitting.table.candidates import TablePoses, TableRow, TableTrial, judge_table, turns
 from triaxcal.model.orientation import angles_from_force, gravity_direction
 from triaxcal.model.types import FloatArray
-from triaxcal.poses.poses import PoseSet
+from triaxcal.poses.poseset import PoseSet
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import ANGLE_NAMES, Angles
 
