@@ -36,11 +36,11 @@ def refusal(data, **keys):
     ("convert", "at", "words"),
     [
         (lambda t: t + 256.0, -40.0, "rows 2 to 7: dwells at 216 degC;"),
-        (lambda t: t + 256.0, -10.0, "an unsigned byte for a signed one (less 256): -10 degC"),
+        (lambda t: t + 256.0, -10.0, "an unsigned byte: -10 degC"),
         (lambda t: t + 273.15, 45.0, "kelvin: 45 degC"),
         (lambda t: t + 273.15, None, "kelvin: -40, -10, 20, 45, 70 degC"),
-        (lambda t: 1.8 * t + 32.0, 70.0, "degF: 70 degC"),
-        (lambda t: t - 256.0, 70.0, "(more 256): 70 degC"),
+        (lambda t: 1.8 * t + 32.0, 70.0, "degrees Fahrenheit: 70 degC"),
+        (lambda t: t - 256.0, 70.0, "a byte of the wrong sign: 70 degC"),
     ],
 )
 def test_unbelievable_temperatures_are_named_before_the_fit(convert, at, words):

@@ -13,12 +13,13 @@ from test_recordings import calibrated
 from recordings import recording
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
-from triaxcal.fitting.table.allterms import AllTerms, TablePriors
+from triaxcal.fitting.table.allterms import AllTerms
 from triaxcal.fitting.table.full import fit_full
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.orientation import AIRCRAFT, gravity_direction
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray
+from triaxcal.unit.priors import Priors
 
 NOISE = 3e-6
 STEPS = np.radians(np.arange(-30.0, 31.0, 15.0))
@@ -125,7 +126,7 @@ def test_what_is_held_out_is_what_a_fit_without_it_gives() -> None:
 
     def fit(kept: slice | FloatArray, left_out: Sequence[FloatArray]):
         part = AllTerms(readings[kept], force[kept], np.ones((25, 1))[kept], 1, np.zeros((3, 6)))
-        return fit_full(part, start, TablePriors(), left_out)
+        return fit_full(part, start, Priors(), left_out)
 
     told = fit(slice(None), masks).errors_g
     assert told is not None

@@ -29,6 +29,15 @@ def products(vector: FloatArray) -> FloatArray:
     return result
 
 
+def product_slopes(vector: FloatArray) -> FloatArray:
+    """Derivatives (..., 6, 3) of the products of vectors (..., 3) by their components."""
+    result = np.zeros((*vector.shape[:-1], 6, 3))
+    for k, (i, j) in enumerate(PRODUCT_AXES):
+        result[..., k, i] += vector[..., j]
+        result[..., k, j] += vector[..., i]
+    return result
+
+
 @dataclass(frozen=True)
 class RateTerm:
     """Offset that a changing temperature adds.

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from triaxcal.model.temperatures import ToDegc, degc_of_fahrenheit, degc_of_kelvin
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.thermometer import TemperatureSensor
 
@@ -16,10 +17,10 @@ def to_degc(unit: str, sensor: TemperatureSensor | None = None) -> Conversion:
     """Conversion of temperatures in "degC", "K", "degF" or codes ("code") of `sensor` to degC."""
     if sensor is not None and unit == "code":
         return lambda values: sensor.degc_at_zero + values * sensor.degc_per_code
-    conversions: dict[str, Conversion] = {
+    conversions: dict[str, ToDegc] = {
         "degC": lambda values: values,
-        "K": lambda values: values - 273.15,
-        "degF": lambda values: (values - 32.0) / 1.8,
+        "K": degc_of_kelvin,
+        "degF": degc_of_fahrenheit,
     }
     return conversions[unit]
 

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo
 from triaxcal.diagnosis.core.readings import Readings, rows_in_words
+from triaxcal.model.temperatures import MISTAKES, ToDegc
 from triaxcal.model.thermal.shape import GROUP_GAP_DEGC
 from triaxcal.model.types import FloatArray
 
 _SIGN = "the sign lost"
-_FORMS: dict[str, Callable[[FloatArray], FloatArray]] = {
-    _SIGN: lambda t: -t,
-    "an unsigned byte": lambda t: t - 256.0,
-    "a byte of the wrong sign": lambda t: t + 256.0,
-    "kelvin": lambda t: t - 273.15,
-    "degrees Fahrenheit": lambda t: (t - 32.0) / 1.8,
-}
+_FORMS: dict[str, ToDegc] = {_SIGN: lambda t: -t, **MISTAKES}
 _WORKING_DEGC = -80.0, 160.0
 """Where accelerometers are calibrated: what a form makes of a temperature must be inside."""
 _LEAST_DEGC = 3.0

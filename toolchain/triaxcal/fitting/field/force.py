@@ -6,7 +6,7 @@ import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
-from triaxcal.model.terms import PRODUCT_AXES
+from triaxcal.model.terms import product_slopes
 from triaxcal.model.types import FloatArray
 
 
@@ -29,9 +29,5 @@ def length_slopes(Q: FloatArray | None, linear: FloatArray, force: FloatArray) -
     unit: FloatArray = force / np.linalg.norm(force, axis=1, keepdims=True)
     if Q is None:
         return unit
-    slopes = np.zeros((len(linear), 6, 3))
-    for k, (i, j) in enumerate(PRODUCT_AXES):
-        slopes[:, k, i] += linear[:, j]
-        slopes[:, k, j] += linear[:, i]
-    more: FloatArray = np.einsum("ni,ik,nkj->nj", unit, Q, slopes)
+    more: FloatArray = np.einsum("ni,ik,nkj->nj", unit, Q, product_slopes(linear))
     return unit + more

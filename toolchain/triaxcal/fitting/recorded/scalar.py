@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from triaxcal.model.terms import PRODUCT_AXES, products
+from triaxcal.model.terms import PRODUCT_AXES, product_slopes, products
 from triaxcal.model.types import BoolArray, FloatArray
 
 _RADIUS_MAX = 4.0
@@ -217,7 +217,7 @@ def residual_of(
     unit = force / length[:, None]
     through = np.broadcast_to(np.eye(3), (n, 3, 3))
     if Q.any():
-        through = through + Q @ _product_slopes(linear)
+        through = through + Q @ product_slopes(linear)
     row = ((unit[:, None] @ through) @ N)[:, 0]  # d|a| / d(U - U0)
     outer = (row[:, :, None] * linear[:, None, :]).reshape(n, 9)
     by_gain = -outer @ model.gain.reshape(-1, 9).T
@@ -228,12 +228,3 @@ def residual_of(
         by_product @ model.quadratic.reshape(-1, 18).T,
     ]
     return length - data.gravity_g, np.concatenate(columns, axis=1)
-
-
-def _product_slopes(force: FloatArray) -> FloatArray:
-    """Derivative of the products by the force, shape (n, 6, 3)."""
-    slopes = np.zeros((len(force), 6, 3))
-    for k, (i, j) in enumerate(PRODUCT_AXES):
-        slopes[:, k, i] += force[:, j]
-        slopes[:, k, j] += force[:, i]
-    return slopes

@@ -15,39 +15,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.model.metrological import force_from_voltage
-from triaxcal.model.terms import PRODUCT_AXES, products
+from triaxcal.model.terms import PRODUCT_AXES, product_slopes, products
 from triaxcal.model.types import FloatArray
+from triaxcal.unit.priors import Priors
 
 _SD_MIN = 1e-12
 """Of a prior, g/g^2: such a term is left out."""
 
 
-@dataclass(frozen=True)
-class TablePriors:
-    """Standard deviations of the priors, all of mean zero.
-
-    Attributes
-    ----------
-    own_square, product : float
-        Of xx in x, yy in y, zz in z; of every other product, g/g^2. 0 leaves it out.
-    cross : float
-        Misalignment of two axes to each other, rad.
-    scale : float
-        Each scale factor against the mean of the three, relative.
-    """
-
-    own_square: float = 5e-3
-    product: float = 3e-4
-    cross: float = 1e-2
-    scale: float = 2e-2
-
-    def quadratic_sd(self) -> FloatArray:
-        """Of Q, shape (3, 6)."""
-        sd = np.full((3, 6), max(self.product, _SD_MIN))
-        for k, (i, j) in enumerate(PRODUCT_AXES):
-            if i == j:
-                sd[i, k] = self.own_square
-        return sd
+def quadratic_sd(priors: Priors) -> FloatArray:
+    """Standard deviations of Q, shape (3, 6), g/g^2."""
+    sd = np.full((3, 6), max(priors.product_g_per_g2, _SD_MIN))
+    for k, (i, j) in enumerate(PRODUCT_AXES):
+        if i == j:
+            sd[i, k] = priors.own_square_g_per_g2
+    return sd
 
 
 @dataclass(frozen=True)
@@ -108,7 +90,7 @@ class AllTerms:
 
 
 def prior_rows(
-    problem: AllTerms, start: FloatArray, priors: TablePriors
+    problem: AllTerms, start: FloatArray, priors: Priors
 ) -> tuple[FloatArray, FloatArray]:
     """Rows W of the prior and their aims c, |W theta - c|^2: misalignment, scales, Q.
 
@@ -126,23 +108,14 @@ def prior_rows(
             E[i, j, at : at + problem.gains] = middle / diagonal[i]
     rows, aims = [], []
     for i, j in ((0, 1), (0, 2), (1, 2)):
-        rows.append((E[i, j] + E[j, i]) / 2.0 / priors.cross)
+        rows.append((E[i, j] + E[j, i]) / 2.0 / priors.cross_term_rad)
         aims.append(0.0)
     mean = (E[0, 0] + E[1, 1] + E[2, 2]) / 3.0
     relative = np.abs(diagonal) / np.abs(diagonal).mean()
     for i in range(3):
         # E_ii is 1 at the linear fit, whose scales differ by `relative` already.
-        rows.append((E[i, i] - mean) / priors.scale)
-        aims.append((1.0 - relative[i]) / priors.scale)
+        rows.append((E[i, i] - mean) / priors.scale_factor)
+        aims.append((1.0 - relative[i]) / priors.scale_factor)
     of_q = np.zeros((18, total))
-    of_q[:, problem.linear :] = np.diag(1.0 / priors.quadratic_sd().ravel())
+    of_q[:, problem.linear :] = np.diag(1.0 / quadratic_sd(priors).ravel())
     return np.concatenate([np.array(rows), of_q]), np.concatenate([aims, np.zeros(18)])
-
-
-def product_slopes(linear: FloatArray) -> FloatArray:
-    """Derivatives of the products (n, 6) by the components, shape (n, 6, 3)."""
-    result = np.zeros((len(linear), 6, 3))
-    for k, (i, j) in enumerate(PRODUCT_AXES):
-        result[:, k, i] += linear[:, j]
-        result[:, k, j] += linear[:, i]
-    return result

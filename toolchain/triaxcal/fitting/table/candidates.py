@@ -15,7 +15,7 @@ import numpy as np
 
 from triaxcal.fitting.core.calibration import Candidate
 from triaxcal.fitting.recorded.checks import CONDITION_MAX
-from triaxcal.fitting.table.allterms import AllTerms, TablePriors
+from triaxcal.fitting.table.allterms import AllTerms
 from triaxcal.fitting.table.full import FullFit, fit_full
 from triaxcal.fitting.table.oriented import (
     TRACELESS,
@@ -26,6 +26,7 @@ from triaxcal.model.metrological import force_from_voltage, pack_constants
 from triaxcal.model.terms import products
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.unit.priors import Priors
 
 LEFT_OUT_MAX = 10.0 * CONDITION_MAX
 """Of what a turn leaves: it is only to judge, not to ship."""
@@ -107,7 +108,7 @@ class TableTrial:
     unknowns: int
     gains: int = 1
     quadratic: bool = False
-    priors: TablePriors | None = None
+    priors: Priors | None = None
 
     @property
     def parameters(self) -> int:
@@ -228,7 +229,7 @@ def _forward_over_temperature(shape: ThermalShape, gains: int, poses: TablePoses
 
 
 def _all_terms(
-    trial: TableTrial, priors: TablePriors, poses: TablePoses, left_out: Sequence[BoolArray]
+    trial: TableTrial, priors: Priors, poses: TablePoses, left_out: Sequence[BoolArray]
 ) -> TableFit:
     """All terms, from the constants of the forward form."""
     start = _forward_over_temperature(trial.shape, trial.gains, poses)

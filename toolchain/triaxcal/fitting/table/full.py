@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.fitting.table.allterms import AllTerms, TablePriors, prior_rows
+from triaxcal.fitting.table.allterms import AllTerms, prior_rows, quadratic_sd
 from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.unit.priors import Priors
 
 _ROUNDS = 12
 _SETTLED = 1e-10
@@ -108,7 +109,7 @@ class _Round:
 def fit_full(
     problem: AllTerms,
     start: FloatArray,
-    priors: TablePriors,
+    priors: Priors,
     left_out: Sequence[BoolArray] = (),
 ) -> FullFit:
     """Fit all terms to poses whose force is known.
@@ -148,7 +149,7 @@ def _noise(residual: FloatArray, free: FloatArray) -> FloatArray:
 
 
 def _result(
-    problem: AllTerms, last: _Round, priors: TablePriors, left_out: Sequence[BoolArray]
+    problem: AllTerms, last: _Round, priors: Priors, left_out: Sequence[BoolArray]
 ) -> FullFit:
     covariance = last.covariance()
     count, at = problem.basis.shape[1], problem.linear
@@ -163,7 +164,7 @@ def _result(
         cross=(full @ covariance[:at, at:]).reshape(12, count, 18),
         noise_g=last.noise,
         effective=last.effective(covariance),
-        by_data=1.0 - np.diag(of_q).reshape(3, 6) / priors.quadratic_sd() ** 2,
+        by_data=1.0 - np.diag(of_q).reshape(3, 6) / quadratic_sd(priors) ** 2,
         condition=float(np.linalg.cond(last.design)),
         errors_g=_held_out(problem, last, covariance, left_out),
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from triaxcal.fitting.recorded.frame import rotation_to, turned_constants
@@ -9,7 +11,6 @@ from triaxcal.fitting.recorded.magnitude import fit_scalar
 from triaxcal.fitting.recorded.scalar import NINE, scalar_data
 from triaxcal.fitting.recorded.temperatures import gain_functions, thermal_shapes
 from triaxcal.fitting.recorded.trials import detail
-from triaxcal.fitting.table.allterms import TablePriors
 from triaxcal.fitting.table.candidates import TableTrial
 from triaxcal.fitting.table.oriented import (
     OrientedFit,
@@ -20,7 +21,7 @@ from triaxcal.fitting.table.oriented import (
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import UnitDescription
-from triaxcal.unit.priors import AUTO, LINEAR, OWN_SQUARES, QUADRATIC_TERMS
+from triaxcal.unit.priors import AUTO, LINEAR, OWN_SQUARES, QUADRATIC_TERMS, Priors
 
 
 def trials_of(
@@ -52,19 +53,14 @@ def _most(trial: TableTrial, temps: FloatArray) -> int:
     return 3 * (len(temps) - (trial.priors is not None))
 
 
-def _priors(unit: UnitDescription) -> TablePriors:
+def _priors(unit: UnitDescription) -> Priors:
     """[priors]; a unit whose firmware has own squares alone has no other product."""
-    stated = unit.priors
-    own_only = unit.firmware_terms == OWN_SQUARES
-    return TablePriors(
-        own_square=stated.own_square_g_per_g2,
-        product=0.0 if own_only else stated.product_g_per_g2,
-        cross=stated.cross_term_rad,
-        scale=stated.scale_factor,
-    )
+    if unit.firmware_terms == OWN_SQUARES:
+        return replace(unit.priors, product_g_per_g2=0.0)
+    return unit.priors
 
 
-def one_temperature_trials(shape: ThermalShape, priors: TablePriors) -> list[TableTrial]:
+def one_temperature_trials(shape: ThermalShape, priors: Priors) -> list[TableTrial]:
     """The forms of P0; simpler ones first."""
     return [
         TableTrial("linear (12)", "inverse form", shape, inverse_linear, 12),
@@ -76,7 +72,7 @@ def one_temperature_trials(shape: ThermalShape, priors: TablePriors) -> list[Tab
     ]
 
 
-def thermal_trials(shape: ThermalShape, priors: TablePriors) -> list[TableTrial]:
+def thermal_trials(shape: ThermalShape, priors: Priors) -> list[TableTrial]:
     """The forward form with a thermal function, and K with fewer functions; the same with Q."""
     gains = [(n, f"; {detail(shape, n)}") for n in gain_functions(shape)]
     return [
@@ -85,10 +81,8 @@ def thermal_trials(shape: ThermalShape, priors: TablePriors) -> list[TableTrial]
     ]
 
 
-def _with_priors(
-    shape: ThermalShape, gains: int, priors: TablePriors, functions: str
-) -> TableTrial:
-    terms = "all terms (13)" if priors.product > 0.0 else "own squares"
+def _with_priors(shape: ThermalShape, gains: int, priors: Priors, functions: str) -> TableTrial:
+    terms = "all terms (13)" if priors.product_g_per_g2 > 0.0 else "own squares"
     return TableTrial(
         f"{terms} with priors{functions}",
         "inverse form",

@@ -7,21 +7,17 @@ it is shows in which conversions bring it back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+
+import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.model.temperatures import MISTAKES
+from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.unit.description import UnitDescription
 
 BELIEVED_DEGC = (-60.0, 130.0)
-_KELVIN = 273.15
-_MISTAKES: tuple[tuple[str, Callable[[float], float]], ...] = (
-    ("an unsigned byte for a signed one (less 256)", lambda t: t - 256.0),
-    ("a signed byte for an unsigned one (more 256)", lambda t: t + 256.0),
-    ("kelvin", lambda t: t - _KELVIN),
-    ("kelvin taken off twice", lambda t: t + _KELVIN),
-    ("degF", lambda t: (t - 32.0) / 1.8),
-)
 
 
 def refuse_unbelievable_temperatures(unit: UnitDescription, measurements: MeasurementSet) -> None:
@@ -38,25 +34,26 @@ def refuse_unbelievable_temperatures(unit: UnitDescription, measurements: Measur
     odd = [d for d in measurements.dwells if not low <= d.temp_degc <= high]
     if not odd:
         return
+    temps = np.array([d.temp_degc for d in odd])
     causes = [
-        f"{name}: {_temps(odd, convert)} degC"
-        for name, convert in _MISTAKES
-        if all(low <= convert(d.temp_degc) <= high for d in odd)
+        f"{name}: {_temps(convert(temps))} degC"
+        for name, convert in MISTAKES.items()
+        if all(low <= t <= high for t in convert(temps))
     ]
     remedy = "correct them; if they are right, state [thermal] range_degc with them in it"
     if causes:
         remedy = f"{', or '.join(causes)}? {remedy}"
     raise RefusedError(
         f"{measurements.source}, {_rows(odd)}",
-        f"dwells at {_temps(odd)} degC",
+        f"dwells at {_temps(temps)} degC",
         expected=f"temperatures from {low:g} to {high:g} degC, where such sensors work",
         remedy=remedy,
     )
 
 
-def _temps(dwells: Sequence[Dwell], convert: Callable[[float], float] = float) -> str:
+def _temps(temps_degc: FloatArray) -> str:
     """Temperatures to 1 degC, each once."""
-    return ", ".join(f"{t:g}" for t in sorted({round(convert(d.temp_degc)) for d in dwells}))
+    return ", ".join(f"{t:g}" for t in np.unique(np.rint(temps_degc) + 0.0))
 
 
 def _rows(dwells: Sequence[Dwell]) -> str:
