@@ -94,8 +94,8 @@ def test_an_aged_bias_contradicts_and_is_named(unit: UnitDescription) -> None:
     assert second.contradicts
     assert second.en > EN_MAX
     assert second.where.startswith("U0y at")
-    # 0.2 mV over -0.5485 V/g; the rig's tilts add some hundredths of a mg.
-    assert second.bias_mg == pytest.approx(-0.365, abs=0.1)
+    # 0.2 mV over 0.5485 V/g, the sensitivity of the output; the rig's tilts add some hundredths of a mg.
+    assert second.bias_mg == pytest.approx(+0.365, abs=0.1)
 
 
 def test_repeatability_and_ageing(unit: UnitDescription) -> None:
@@ -154,14 +154,14 @@ def test_the_command(folder: Path) -> None:
 
 
 def test_calib_tells_of_a_contradiction_with_figures(folder: Path, tmp_path: Path) -> None:
-    """0.5 mV over Kxx = -0.5506 V/g is -0.908 mg; noise of 1 micro-g a dwell, and curves."""
+    """0.5 mV over a sensitivity of 0.5508 V/g is 0.908 mg; noise of 1 micro-g a dwell, and curves."""
     done = CliRunner().invoke(main, ["calib", str(folder), "--build", str(tmp_path / "build")])
     assert done.exit_code == 0, done.output
     told = WARNING.fullmatch(done.stderr.strip())
     assert told, done.stderr
     assert (told["name"], told["before"], told["constant"]) == ("now", "2025-03-30", "U0x")
     by, allowed = float(told["by"]), float(told["allowed"])
-    assert by == pytest.approx(-0.908, abs=0.01)
+    assert by == pytest.approx(+0.908, abs=0.01)
     assert 0.0005 < allowed < 0.01
     assert float(told["en"]) == pytest.approx(abs(by) / allowed, rel=0.01)  # printed to 3 figures
 
@@ -284,7 +284,7 @@ def test_an_update_in_the_field_comes_last(
         triaxcal.compare_history(triaxcal.read_unit(folder), tmp_path / "build")
     field = tmp_path / "field"
     recorded(field, "field.csv", np.concatenate([np.eye(3), -np.eye(3)]), GAIN, BIAS)
-    triaxcal.update(folder, field / "field.csv", tmp_path / "build")
+    triaxcal.update(folder, field / "field.csv", tmp_path / "build", bias_drift_mg=2.0)
     found = triaxcal.compare_history(triaxcal.read_unit(folder), tmp_path / "build")
     (change,) = found.result
     assert (change.before, change.name) == ("now", "update")

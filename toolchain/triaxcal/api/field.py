@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from triaxcal.uncertainty.updated import FieldUpdate
 
 
+_DRIFT_BY_LIMITS = None, None, None
+
+
 class InTheField:
     """What can be done with a calibration and a recording that was made with it."""
 
@@ -135,7 +138,7 @@ def bring_up_to_date(
     recorded: Any,
     layout: str | Path | None = None,
     gravity_m_per_s2: float | None = None,
-    drift: tuple[float | None, float | None, float | None] = (None, None, None),
+    drift: tuple[float | None, float | None, float | None] = _DRIFT_BY_LIMITS,
 ) -> Updated:
     """Update of a calibration by a recording; `drift` is mg, ppm, micro-rad, None by the limits."""
     from triaxcal.fitting.field.update import Drift, default_drift  # noqa: PLC0415
@@ -158,7 +161,9 @@ def bring_up_to_date(
     logs = () if before is None else (*before.earlier_sha256, before.recording_sha256)
     source = Source((*earlier, done.inputs_sha256), Path(poses.source).name, digest, logs)
     parts = done.unit, done.measurements, done.calibration
-    found = update_by_poses(parts, poses, gravity_g, allowed, source)
+    found = update_by_poses(
+        parts, poses, gravity_g, allowed, source, drift_is_stated=drift != _DRIFT_BY_LIMITS
+    )
     stated = f"{done.inputs_sha256} {digest} {gravity_g!r} {allowed!r}"
     inputs = hashlib.sha256(stated.encode()).hexdigest()
     kept = found.poses

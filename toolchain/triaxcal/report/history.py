@@ -179,8 +179,8 @@ def _frame_free(history: list[Calibrated], found: list[Change]) -> list[str]:
     head = [f"{last.name} less {last.before}, T0", "changed by", "+- 95 %", "unit"]
     lines = table(head, rows, left=(0, 3))
     lines += [
-        "These nine do not depend on the frame. En free is the largest of 27; chance alone",
-        f"gives more than {EN_MAX_NINE:.2f} in one comparison of twenty.",
+        "These nine do not depend on the frame. En free is the largest of 27. Chance",
+        f"alone gives more than {EN_MAX_NINE:.2f} in one comparison of twenty.",
     ]
     for c in found:
         if c.en > EN_MAX and not c.nine_contradicts:

@@ -22,12 +22,12 @@ def update_text(serial: str, found: FieldUpdate, before: Calibration) -> str:
     count = len(found.poses)
     before_mg, now_mg = (_rms(e) for e in (found.error_before_g, found.error_after_g))
     lines = [
-        f"{serial} updated by {count} poses of {name}; constants at {t0:g} degC",
+        f"{serial} updated by {count} pose{'s' * (count != 1)} of {name}; constants at {t0:g} degC",
         "",
         *_table(found, before),
         "  +- is two standard uncertainties (95 %); the options of a drift are one",
-        *_no_gain(found),
         "",
+        _length(found),
         f"chi-square   {found.chi_square:.1f}, {count} expected: the poses against the prior",
         f"|a| - g      {before_mg} mg rms at these poses before, {now_mg} mg now",
     ]
@@ -36,16 +36,11 @@ def update_text(serial: str, found: FieldUpdate, before: Calibration) -> str:
     return "\n".join([*lines, *(f"found        {finding}" for finding in findings)])
 
 
-def _no_gain(found: FieldUpdate) -> list[str]:
-    """A line where the update makes no constant more certain than the calibration before."""
-    if (found.sd_after < found.sd_before).any():
-        return []
-    return [
-        "",
-        "no gain      no constant is more certain than before: the drift that is allowed for is",
-        "             more than the poses tell. If `triaxcal check` passes, keep the files before,",
-        "             or state a smaller drift.",
-    ]
+def _length(found: FieldUpdate) -> str:
+    sds = found.length_before_g, found.length_allowed_g, found.length_after_g
+    before, drifted, now = (f"+-{_K * sd * 1e3:.3g}" for sd in sds)
+    values = f"{before} mg before, {drifted} mg drifted, {now} mg now"
+    return f"|a|          uncertain by {values} (rms over all orientations)"
 
 
 def _table(found: FieldUpdate, before: Calibration) -> list[str]:

@@ -24,8 +24,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.outliers import fisher_tail
 from triaxcal.fitting.field.force import force_and_slopes
 from triaxcal.fitting.field.poses import FieldPoses
-from triaxcal.model.metrological import unpack_constants
-from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
 from triaxcal.uncertainty.orientation import weights
@@ -48,8 +47,6 @@ class Expected:
     error_g : array, shape (n,)
         |a| - g by the fitted model.
     force_g : array, shape (n, 3)
-    slopes, outputs_g : arrays, shape (n, 3)
-        Each output without its bias over its sensitivity, and the derivative of |a| by it.
     own_sd_g : array, shape (n,)
         Root of R: what is new in each pose.
     factor_g : array, shape (n, m)
@@ -60,8 +57,6 @@ class Expected:
 
     error_g: FloatArray
     force_g: FloatArray
-    slopes: FloatArray
-    outputs_g: FloatArray
     own_sd_g: FloatArray
     factor_g: FloatArray
     dof: int
@@ -92,8 +87,6 @@ class Expected:
         return Expected(
             self.error_g[kept],
             self.force_g[kept],
-            self.slopes[kept],
-            self.outputs_g[kept],
             self.own_sd_g[kept],
             self.factor_g[kept],
             self.dof,
@@ -127,8 +120,8 @@ class Expectation:
     calibration : Calibration
     known : Uncertainty
         At `known.temps_degc`, which hold those of the poses.
-    roots : tuple of arrays, each of shape (temperatures, m, m)
-        V_s(T)^(1/2) of the sources that all poses share.
+    roots : dict of arrays, each of shape (temperatures, m, m)
+        V_s(T)^(1/2) of the sources that all poses share, by their keys.
     dofs : tuple of float
         Of these sources.
     """
@@ -136,7 +129,7 @@ class Expectation:
     unit: UnitDescription
     calibration: Calibration
     known: Uncertainty
-    roots: tuple[FloatArray, ...]
+    roots: dict[str, FloatArray]
     dofs: tuple[float, ...]
 
     def at(self, poses: FieldPoses, gravity_g: float) -> Expected:
@@ -144,10 +137,7 @@ class Expectation:
         calibration = self.calibration
         force, slopes = force_and_slopes(calibration, poses.readings, poses.temps_degc)
         length = np.linalg.norm(force, axis=1)
-        K, U0 = unpack_constants(calibration.thermal.constants_at(poses.temps_degc))
-        sensitivity = output_sensitivity(K)
-        index = np.searchsorted(self.known.temps_degc, _rounded(calibration, poses.temps_degc))
-        factors = [_factor(root, index, force / length[:, None]) for root in self.roots]
+        factors = [self.factor(key, poses, force) for key in self.roots]
         own, own_dof = _own_variance(self.unit, calibration, self.known, poses, slopes)
         each = [float((f**2).sum()) for f in factors] + [float(own.sum())]
         dofs = (*self.dofs, own_dof)
@@ -156,12 +146,19 @@ class Expectation:
         return Expected(
             error_g=length - gravity_g,
             force_g=force,
-            slopes=slopes * sensitivity,
-            outputs_g=(poses.readings - U0) / sensitivity,
             own_sd_g=np.sqrt(own),
             factor_g=np.concatenate([*factors, np.zeros((len(own), 1))], axis=1),
             dof=max(1, int(min(dof, _DOF_MAX))),
         )
+
+    def factor(self, key: str, poses: FieldPoses, force_g: FloatArray) -> FloatArray:
+        """F of a source: rows of the poses by the roots of its covariances, (n, 12 or 30)."""
+        root = self.roots[key]
+        index = np.searchsorted(self.known.temps_degc, _rounded(self.calibration, poses.temps_degc))
+        direction = force_g / np.linalg.norm(force_g, axis=1, keepdims=True)
+        w = weights(direction, root.shape[-1] // 3)[:, 3]
+        result: FloatArray = np.einsum("na,nab->nb", w, root[index])
+        return result
 
 
 def expectation(
@@ -188,14 +185,8 @@ def expectation(
     grid = np.unique([*_rounded(calibration, temps_degc).tolist(), unit.t0_degc])
     known = uncertainty(unit, measurements, calibration, None, grid)
     shared = [s for s in known.sources if s.force is not None and s.key not in OF_THE_POSE]
-    roots, dofs = tuple(_root(s) for s in shared), tuple(s.dof for s in shared)
+    roots, dofs = {s.key: _root(s) for s in shared}, tuple(s.dof for s in shared)
     return Expectation(unit, calibration, known, roots, dofs)
-
-
-def output_sensitivity(K: FloatArray) -> FloatArray:
-    """Of each output along its own direction, signed as K_ii; (n, 3, 3) to (n, 3)."""
-    result: FloatArray = np.linalg.norm(K, axis=2) * np.sign(np.diagonal(K, axis1=1, axis2=2))
-    return result
 
 
 def _rounded(calibration: Calibration, temps_degc: FloatArray) -> FloatArray:
@@ -210,13 +201,6 @@ def _root(source: Source) -> FloatArray:
     result: FloatArray = (vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ np.swapaxes(
         vectors, 1, 2
     )
-    return result
-
-
-def _factor(root: FloatArray, index: IntArray, direction: FloatArray) -> FloatArray:
-    """F of a source: rows of the poses by the roots of its covariances, (n, 12 or 30)."""
-    w = weights(direction, root.shape[-1] // 3)[:, 3]
-    result: FloatArray = np.einsum("na,nab->nb", w, root[index])
     return result
 
 

@@ -21,12 +21,7 @@ from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import MeasurementSet
-from triaxcal.uncertainty.expected import (
-    Expectation,
-    Expected,
-    chance_of,
-    output_sensitivity,
-)
+from triaxcal.uncertainty.expected import Expectation, Expected, chance_of
 from triaxcal.unit.description import UnitDescription
 
 Parts = tuple[UnitDescription, MeasurementSet, Calibration]
@@ -69,7 +64,7 @@ class Explanation:
 
 @dataclass(frozen=True)
 class _Outputs:
-    """Readings (n, 3) as outputs in g: K, U0 and the outputs' sensitivities at each pose."""
+    """K, U0 and the outputs' sensitivities at each pose, as `model.framefree` has them."""
 
     K: FloatArray
     U0: FloatArray
@@ -78,7 +73,7 @@ class _Outputs:
     @staticmethod
     def of(calibration: Calibration, poses: FieldPoses) -> _Outputs:
         K, U0 = unpack_constants(calibration.thermal.constants_at(poses.temps_degc))
-        return _Outputs(K, U0, output_sensitivity(K))
+        return _Outputs(K, U0, np.linalg.norm(K, axis=2))
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import PairTerms
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.framefree import NAMES, frame_free, frame_free_slopes, relative_scales
-from triaxcal.model.metrological import BIASES, CONSTANT_NAMES
+from triaxcal.model.metrological import BIASES, CONSTANT_NAMES, unpack_constants
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import MeasurementSet, read_measurements
 from triaxcal.uncertainty.evaluate import uncertainty
@@ -233,9 +233,15 @@ def _kinds(change: FloatArray, constants: FloatArray) -> tuple[FloatArray, Float
 
 
 def _scales(constants: FloatArray) -> FloatArray:
-    """What brings a change of each constant to the unit of `_unit_of`, shape (12,)."""
-    own = constants[list(_OWN_AXIS)]
-    return np.concatenate([1e6 / np.repeat(own, 3), 1e3 / own])
+    """What brings a change of each constant to the unit of `_unit_of`, shape (12,).
+
+    By the sensitivity of each output along its own direction, as `model.framefree` has it: K_ii of
+    a sensor that is turned by 90 degrees is about zero.
+    """
+    K = unpack_constants(constants)[0]
+    sensitivity = np.linalg.norm(K, axis=1)
+    signed = np.where(np.diag(K) < 0.0, -sensitivity, sensitivity)
+    return np.concatenate([1e6 / np.repeat(signed, 3), 1e3 / sensitivity])
 
 
 def _unit_of(constant: int) -> str:

@@ -47,11 +47,11 @@ _ORIGINS = {
 
 
 def recording_sources(p: Curves, recording: RecordingFit) -> list[Source]:
-    """All sources but the device's own."""
+    """All sources but the device's own; the covariance of an update has gravity in it."""
     return [
         *_fit(p, recording),
         *rate_source(p, recording),
-        _gravity(p),
+        *([] if p.calibration.update else [_gravity(p)]),
         *thermometer(p),
         _unmodelled(p, recording),
         *([_temperature()] if recording.poses.temps_degc is None else []),
@@ -63,9 +63,12 @@ def _fit(p: Curves, recording: RecordingFit) -> list[Source]:
     if recording.parts:
         return [_part(p, recording, part) for part in recording.parts]
     key, name, _, advice = _ORIGINS[NOISE_PART]
+    origin = "|a| - g at the poses, per degree of freedom"
+    if p.calibration.update:
+        name, origin = "the constants after the update", p.calibration.covariance_source
     if not recording.checked:
-        origin = "unknown: as many constants as poses"
-        return [Source(key=key, name=name, unit="g", advice=advice, origin=origin)]
+        unknown = "unknown: as many constants as poses"
+        return [Source(key=key, name=name, unit="g", advice=advice, origin=unknown)]
     constants, force = _effects(p, CovariancePart(key, recording.covariance, recording.terms))
     return [
         Source(
@@ -73,7 +76,7 @@ def _fit(p: Curves, recording: RecordingFit) -> list[Source]:
             name=name,
             unit="g",
             advice=advice,
-            origin="|a| - g at the poses, per degree of freedom",
+            origin=origin,
             sd=recording.rms_free_g,
             distribution=STUDENT,
             dof=float(recording.dof),

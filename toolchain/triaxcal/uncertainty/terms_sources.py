@@ -19,9 +19,12 @@ _QUADRATIC = tuple(10 * i + 4 + k for i in range(3) for k in range(6))
 
 
 def pair_source(p: Curves) -> list[Source]:
-    """Cross-coupling of a pair: the scatter of its readings on the dividing head."""
+    """Cross-coupling of a pair: the scatter of its readings on the dividing head.
+
+    The covariance of an update has it in it.
+    """
     pair = p.calibration.pair
-    if pair is None:
+    if pair is None or p.calibration.update:
         return []
     force = np.zeros((len(p.temps_degc), 30, 30))
     force[:, np.array(_QUADRATIC)[:, None], _QUADRATIC] = pair.covariance

@@ -1,13 +1,15 @@
 """A delivered calibration brought up to date by poses from the field, and what that changed.
 
-The prior is the covariance of the calibration's fit, the sources of `_ALIKE` at the temperature
-where each is largest, and an allowance for drift. Gravity acts again, in the poses. Poses that
-contradict it are refused: where
+The prior is `uncertainty.fieldprior`'s. Poses that contradict it are refused: where
 
     r^T S^-1 r / n,    S = H (V + drift) H^T + R,
 
 is larger than a sound unit gives once in 1 / CHANCE updates, the poses and the calibration cannot
-both be right, and an average of both would be wrong for certain.
+both be right, and an average of both would be wrong for certain. R holds what is new in the poses:
+their noise, and local gravity, which acts again.
+
+An update must tell more than what it replaces. Where a drift is stated, or the poses show one, that
+is the calibration with the drift allowed for. Otherwise it is the calibration as it was delivered.
 """
 
 from __future__ import annotations
@@ -20,29 +22,16 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.fieldupdate import Update
 from triaxcal.fitting.core.outliers import CHANCE
 from triaxcal.fitting.field.poses import FieldPoses, inside_range
-from triaxcal.fitting.field.update import (
-    Drift,
-    Innovation,
-    State,
-    calibration_covariance,
-    drift_covariance,
-    innovation,
-    state_of,
-    updated,
-)
+from triaxcal.fitting.field.update import Drift, State, innovation, updated
 from triaxcal.model.framefree import frame_free, frame_free_slopes
 from triaxcal.model.types import FloatArray
-from triaxcal.uncertainty.evaluate import uncertainty
-from triaxcal.uncertainty.expected import chance_of, expectation
-from triaxcal.uncertainty.explain import Parts
-from triaxcal.uncertainty.propagation import ROWS
-from triaxcal.uncertainty.rig_sources import GRAVITY_M_PER_S2
-from triaxcal.uncertainty.updated import FieldUpdate, updated_calibration
-from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.uncertainty.expected import Expectation, Expected, chance_of, expectation
+from triaxcal.uncertainty.explain import Parts, why
+from triaxcal.uncertainty.fieldprior import field_prior, noise_of_poses
+from triaxcal.uncertainty.updated import FieldUpdate, Solved, updated_calibration
 
-_ALIKE = frozenset({"repeatability", "squareness", "level", "thermal_model", "runs"})
-"""Sources of a tilter's calibration that are in the prior besides the noise of its readings."""
-_NOTHING = 0.02
+_USEFUL = 0.9
+"""Of the uncertainty of |a|: an update must lower it below this share."""
 
 
 @dataclass(frozen=True)
@@ -65,55 +54,41 @@ class Source:
 
 
 def update_by_poses(
-    parts: Parts, poses: FieldPoses, gravity_g: float, drift: Drift, source: Source
+    parts: Parts,
+    poses: FieldPoses,
+    gravity_g: float,
+    drift: Drift,
+    source: Source,
+    *,
+    drift_is_stated: bool = True,
 ) -> FieldUpdate:
     """Bring a calibration up to date.
+
+    Parameters
+    ----------
+    drift_is_stated : bool
+        Whether somebody knows of the drift; if not, poses that agree with the calibration must
+        lower its own uncertainty.
 
     Raises
     ------
     RefusedError
-        When no pose is within the range, the poses contradict the calibration, or they lower no
-        uncertainty.
+        When no pose is within the range, the poses contradict the calibration, or they tell no
+        more than it does.
     """
-    unit, _, calibration = parts
-    poses = inside_range(poses, calibration.range_degc)
-    new = expectation(*parts, poses.temps_degc).at(poses, gravity_g)
-    stated = unit.stated.gravity_m_per_s2
-    gravity_sd = (GRAVITY_M_PER_S2 if stated is None else stated) / STANDARD_GRAVITY_M_PER_S2
-    noise = np.diag(new.own_sd_g**2) + gravity_sd**2
-    state = state_of(calibration)
-    factory = calibration_covariance(state, _alike(parts))
-    allowed = factory + drift_covariance(state, drift)
-    found = innovation(state, allowed, poses, noise, gravity_g)
-    _refuse_contradiction(found, poses, new.dof, drift)
-    posterior = updated(state, allowed, poses, noise, gravity_g)
-    nine = _nine(state)
-    share = posterior.share_of_data(nine)
-    if share.max() < _NOTHING:
-        raise RefusedError(
-            poses.source,
-            f"its {len(poses)} poses lower no uncertainty: their noise is "
-            f"{float(np.median(new.own_sd_g)) * 1e3:.3g} mg",
-            expected="poses that tell more than the calibration and its drift",
-            remedy="hold the unit stiller and longer, or keep the calibration",
-        )
-    t0 = unit.t0_degc
-    t0_basis = calibration.shape.basis(t0)
-    after = frame_free(state.curves(posterior.theta) @ t0_basis)
-    covariance = posterior.spread_covariance
-    made = FieldUpdate(
-        calibration=calibration,
-        poses=poses,
-        before=frame_free(state.curves(state.theta) @ t0_basis),
-        after=after,
-        sd_before=_sd(nine, factory),
-        sd_allowed=_sd(nine, allowed),
-        sd_after=_sd(nine, covariance),
-        share=share,
-        chi_square=found.chi_square,
-        error_before_g=new.error_g,
-        error_after_g=state.length(state.delivered(posterior.theta), poses)[0] - gravity_g,
-    )
+    poses = inside_range(poses, parts[2].range_degc)
+    expects = expectation(*parts, poses.temps_degc)
+    new, prior = expects.at(poses, gravity_g), field_prior(parts, drift)
+    noise = noise_of_poses(parts[0], expects, poses, new)
+    known = prior.state, prior.allowed, poses, noise, gravity_g
+    posterior = updated(*known)
+    found = innovation(*known, theta=posterior.theta)
+    solved = Solved(poses, gravity_g, new, prior, posterior, found)
+    if chance_of(found.chi_square, len(poses), new.dof) < CHANCE:
+        raise _contradiction(expects, solved, drift)
+    made = _changes(parts, solved)
+    drifted = drift_is_stated or chance_of(new.chi_square, len(poses), new.dof) < CHANCE
+    _refuse_nothing(made, new, drifted=drifted)
     record = Update(
         source.parents,
         source.recording,
@@ -126,25 +101,36 @@ def update_by_poses(
         found.chi_square,
         source.earlier_sha256,
     )
-    calibrated = updated_calibration(made, (state, posterior), found, new.own_sd_g, new.dof)
-    return replace(made, calibration=replace(calibrated, update=record))
+    calibration = replace(updated_calibration(made, solved), update=record)
+    return replace(made, calibration=calibration)
 
 
-def _alike(parts: Parts) -> FloatArray:
-    """Covariance of the constants of a tilter's rig and model, (12, 12); zero for a recording.
-
-    Of each source the largest over the range: the thermal model errs least at T0.
-    """
-    unit, measurements, calibration = parts
-    total = np.zeros((12, 12))
-    if calibration.recording is None:
-        grid = np.unique([*np.linspace(*calibration.range_degc, 9), unit.t0_degc])
-        rows = np.array(ROWS)
-        for s in uncertainty(unit, measurements, calibration, None, grid).sources:
-            if s.key in _ALIKE and s.constants is not None:
-                worst = int(np.trace(s.constants, axis1=1, axis2=2).argmax())
-                total += s.constants[worst][rows[:, None], rows]
-    return total
+def _changes(parts: Parts, solved: Solved) -> FieldUpdate:
+    """What the update changes; its calibration is still the one before."""
+    unit, _, calibration = parts
+    poses, prior, theta = solved.poses, solved.prior, solved.posterior.theta
+    state, t0 = prior.state, unit.t0_degc
+    t0_basis, nine = calibration.shape.basis(t0), _nine(state)
+    each = prior.factory + prior.thermal, prior.allowed + prior.thermal, solved.covariance
+    sds = [_sd(nine, covariance) for covariance in each]
+    lengths = [prior.length_g(covariance, t0) for covariance in each]
+    now, _ = state.length(state.delivered(theta), poses.readings, poses.temps_degc)
+    return FieldUpdate(
+        calibration=calibration,
+        poses=poses,
+        before=frame_free(state.curves(state.theta) @ t0_basis),
+        after=frame_free(state.curves(theta) @ t0_basis),
+        sd_before=sds[0],
+        sd_allowed=sds[1],
+        sd_after=sds[2],
+        length_before_g=lengths[0],
+        length_allowed_g=lengths[1],
+        length_after_g=lengths[2],
+        share=solved.posterior.share_of_data(nine),
+        chi_square=solved.innovation.chi_square,
+        error_before_g=solved.new.error_g,
+        error_after_g=now - solved.gravity_g,
+    )
 
 
 def _nine(state: State) -> FloatArray:
@@ -164,23 +150,47 @@ def _sd(nine: FloatArray, covariance: FloatArray) -> FloatArray:
     return result
 
 
-def _refuse_contradiction(found: Innovation, poses: FieldPoses, dof: int, drift: Drift) -> None:
-    chance = chance_of(found.chi_square, len(poses), dof)
-    if chance >= CHANCE:
-        return
-    error, sd = found.left_out
-    worst = int(np.abs(error / sd).argmax())
-    of_worst = (
-        f"{poses.names[worst]} contradicts most: |a| - g = {found.error_g[worst] * 1e3:+.3g} mg, "
-        f"{error[worst] * 1e3:+.3g} mg from what the others predict, whose sd is "
-        f"{sd[worst] * 1e3:.2g} mg"
-    )
-    raise RefusedError(
+def _contradiction(expects: Expectation, solved: Solved, drift: Drift) -> RefusedError:
+    """The refusal, with what would explain the poses."""
+    poses, found = solved.poses, solved.innovation
+    explanations, suspicions = why(expects, poses, solved.gravity_g, solved.new)
+    words = suspicions[0] if suspicions else "nothing explains it"
+    if explanations:
+        others = len(explanations) - 1
+        words = f"they agree if {explanations[0].words}"
+        words += f", or by {others} other single changes" * bool(others)
+    return RefusedError(
         poses.source,
-        f"its poses contradict the delivered calibration beyond its uncertainty: chi-square "
-        f"{found.chi_square:.4g} of {len(poses)} poses; {of_worst}",
+        f"its poses contradict the delivered calibration beyond its uncertainty and the drift: "
+        f"chi-square {found.chi_square:.4g} of {len(poses)} poses; {words}",
         expected=f"about {len(poses)}, with a drift of {drift.bias_g * 1e3:.3g} mg of the biases "
         f"and {drift.scale * 1e6:.3g} ppm of the scales (standard deviations)",
         remedy="look at `triaxcal check`; state a larger drift if the sensor may have it, or "
         "calibrate the unit again",
+    )
+
+
+def _refuse_nothing(made: FieldUpdate, new: Expected, *, drifted: bool) -> None:
+    """Refuse an update that makes |a| no more certain than what it would replace."""
+    least_g = _USEFUL * (made.length_allowed_g if drifted else made.length_before_g)
+    if made.length_after_g <= least_g:
+        return
+    count, now = len(made.poses), f"{made.length_after_g * 1e3:.3g} mg after the update"
+    poses = f"{count} pose" + "s" * (count != 1)
+    if drifted:
+        noise = float(np.median(new.own_sd_g)) * 1e3
+        raise RefusedError(
+            made.poses.source,
+            f"{poses} tell too little: |a| is uncertain by {made.length_allowed_g * 1e3:.3g} mg "
+            f"with the drift, and by {now}; the noise of a pose is {noise:.3g} mg",
+            expected="poses that tell more than the calibration and its drift",
+            remedy="hold the unit stiller and longer, in more directions; the delivered "
+            "calibration is kept",
+        )
+    raise RefusedError(
+        made.poses.source,
+        f"{poses} in agreement with the delivered calibration, which knows more: |a| is uncertain "
+        f"by {made.length_before_g * 1e3:.3g} mg, and would be by {now}",
+        expected="poses that show a drift, or tell more than the calibration",
+        remedy="keep the delivered calibration; state the drift if you know that there is one",
     )

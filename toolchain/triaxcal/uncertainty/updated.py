@@ -12,10 +12,12 @@ from triaxcal.fitting.core.judged import ORIENTATION, HeldOutPoses
 from triaxcal.fitting.core.posterior import Posterior
 from triaxcal.fitting.core.recorded import RecordingFit, TermsCovariance
 from triaxcal.fitting.field.poses import FieldPoses
-from triaxcal.fitting.field.update import Innovation, State
+from triaxcal.fitting.field.update import Innovation
 from triaxcal.fitting.recorded.made import covariance_blocks
 from triaxcal.model.framefree import NAMES
 from triaxcal.model.types import FloatArray
+from triaxcal.uncertainty.expected import Expected
+from triaxcal.uncertainty.fieldprior import FieldPrior
 
 _UNSEEN = 0.1
 """Share of the data below which a constant counts as not seen by the poses."""
@@ -34,6 +36,8 @@ class FieldUpdate:
         Nine constants at T0 that no rotation of the frame changes (`model.framefree`).
     sd_before, sd_allowed, sd_after : arrays, shape (9,)
         Their standard uncertainties: of the calibration, with the allowance for drift, and now.
+    length_before_g, length_allowed_g, length_after_g : float
+        The same of |a| at T0, rms over all orientations.
     share : array, shape (9,)
         How much of each the poses determine now, 0 to 1.
     chi_square : float
@@ -49,6 +53,9 @@ class FieldUpdate:
     sd_before: FloatArray
     sd_allowed: FloatArray
     sd_after: FloatArray
+    length_before_g: float
+    length_allowed_g: float
+    length_after_g: float
     share: FloatArray
     chi_square: float
     error_before_g: FloatArray
@@ -60,24 +67,45 @@ class FieldUpdate:
         return tuple(n for n, s in zip(NAMES, self.share, strict=True) if s < _UNSEEN)
 
 
-def updated_calibration(
-    made: FieldUpdate,
-    solved: tuple[State, Posterior],
-    found: Innovation,
-    own_sd_g: FloatArray,
-    dof: int,
-) -> Calibration:
+@dataclass(frozen=True)
+class Solved:
+    """Poses, what was expected of them, and the most probable parameters.
+
+    Attributes
+    ----------
+    poses : FieldPoses
+    gravity_g : float
+    new : Expected
+        By the calibration before, without a drift.
+    prior : FieldPrior
+    posterior : Posterior
+    innovation : Innovation
+    """
+
+    poses: FieldPoses
+    gravity_g: float
+    new: Expected
+    prior: FieldPrior
+    posterior: Posterior
+    innovation: Innovation
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of theta after the update, (p, p)."""
+        return self.posterior.spread_covariance + self.prior.thermal
+
+
+def updated_calibration(made: FieldUpdate, solved: Solved) -> Calibration:
     """The calibration after the update; its poses are those of the field."""
-    state, posterior = solved
+    state, theta, covariance = solved.prior.state, solved.posterior.theta, solved.covariance
     old, P = made.calibration, state.functions
-    theta, covariance = posterior.theta, posterior.spread_covariance
     constants = state.curves(theta)
     Q = None if old.terms.quadratic_per_g is None else state.quadratic(theta)
     full = covariance[: 12 * P, : 12 * P].reshape(12, P, 12, P)
     thermal, t0 = old.shape.model(constants), old.thermal.t0_degc
     basis = old.shape.basis(t0)
     at_t0 = np.einsum("p,apbq,q->ab", basis, full, basis)
-    recording = _recording(made, (state, posterior), found, own_sd_g, dof)
+    recording = _recording(made, solved)
     recording = replace(recording, covariance=full, terms=_terms(old, covariance, 12 * P))
     rms = recording.rms_g
     return replace(
@@ -127,16 +155,9 @@ def _terms(old: Calibration, covariance: FloatArray, count: int) -> TermsCovaria
     return replace(before, quadratic=covariance[count:, count:], cross=cross)
 
 
-def _recording(
-    made: FieldUpdate,
-    solved: tuple[State, Posterior],
-    found: Innovation,
-    own_sd_g: FloatArray,
-    dof: int,
-) -> RecordingFit:
-    state, posterior = solved
-    singular = posterior.at.singular
-    held_out, expected = found.left_out
+def _recording(made: FieldUpdate, solved: Solved) -> RecordingFit:
+    state, singular = solved.prior.state, solved.posterior.at.singular
+    held_out, expected = solved.innovation.left_out
     findings = [*made.poses.findings]
     if made.unseen:
         findings.append(
@@ -151,9 +172,9 @@ def _recording(
         poses=made.poses.poses,
         route="update of the calibration before by |a| = g",
         covariance=np.zeros((12, state.functions, 12, state.functions)),
-        dof=min(dof, 10**6) + len(made.poses),
+        dof=min(solved.new.dof, 10**6) + len(made.poses),
         rms_g=float(np.sqrt(np.mean(made.error_after_g**2))),
-        rms_free_g=float(np.sqrt(np.mean(own_sd_g**2))),
+        rms_free_g=float(np.sqrt(np.mean(solved.new.own_sd_g**2))),
         held_out_g=float(np.sqrt(np.mean(held_out**2))),
         left_out_length_g=float(np.sqrt(np.mean(held_out**2))),
         condition=math.sqrt((1.0 + high**2) / (1.0 + low**2)),

@@ -92,11 +92,13 @@ class State:
         result[12 * self.functions :] = 0.0
         return result
 
-    def length(self, theta: FloatArray, poses: FieldPoses) -> tuple[FloatArray, FloatArray]:
-        """|a| at poses, (n,), in g, and its derivative by theta, (n, parameters)."""
-        basis = self.calibration.shape.basis(poses.temps_degc)
+    def length(
+        self, theta: FloatArray, readings: FloatArray, temps_degc: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """|a| at readings (n, 3), (n,), in g, and its derivative by theta, (n, parameters)."""
+        basis = self.calibration.shape.basis(temps_degc)
         constants, Q = basis @ self.curves(theta).T, self.quadratic(theta)
-        linear = force_from_voltage(constants, poses.readings)
+        linear = force_from_voltage(constants, readings)
         force = linear if Q is None else linear + products(linear) @ Q.T
         rows = length_slopes(Q, linear, force)
         by_output = np.einsum("ni,nij->nj", rows, np.linalg.inv(unpack_constants(constants)[0]))
@@ -111,7 +113,10 @@ class State:
 
 
 def state_of(calibration: Calibration) -> State:
-    """Parameters of a calibration: its curves in the functions of its shape."""
+    """Parameters of a calibration: its curves in the functions of its shape, and its Q.
+
+    Q is among them where its uncertainty is known: by the fit, own-axis squares or a pair.
+    """
     shape = calibration.shape
     temps = np.linspace(*calibration.range_degc, 8 * shape.parameters + 1)
     temps = np.unique([*temps, calibration.thermal.t0_degc])
@@ -119,12 +124,14 @@ def state_of(calibration: Calibration) -> State:
     curves = np.linalg.lstsq(shape.basis(temps), values, rcond=None)[0].T
     recording, Q = calibration.recording, calibration.terms.quadratic_per_g
     known = recording is not None and recording.terms.quadratic is not None
+    known |= calibration.pair is not None
+    known |= calibration.squares is not None and calibration.squares.included
     rest = np.zeros(18 if known else 0) if Q is None or not known else Q.ravel()
     return State(calibration, np.concatenate([curves.ravel(), rest]))
 
 
-def calibration_covariance(state: State, at_t0: FloatArray) -> FloatArray:
-    """Covariance of theta; `at_t0`, (12, 12), is what is alike at all temperatures besides."""
+def fit_covariance(state: State) -> FloatArray:
+    """Covariance of theta by the fit alone."""
     calibration, P, size = state.calibration, state.functions, len(state.theta)
     covariance = np.zeros((size, size))
     recording = calibration.recording
@@ -142,7 +149,7 @@ def calibration_covariance(state: State, at_t0: FloatArray) -> FloatArray:
             for k, row in enumerate(rows):
                 block[row][:, rows] = own[k]
         covariance[: 12 * P, : 12 * P] = block.reshape(12 * P, 12 * P)
-    return covariance + _everywhere(state, at_t0)
+    return covariance
 
 
 def drift_covariance(state: State, drift: Drift) -> FloatArray:
@@ -159,24 +166,32 @@ def drift_covariance(state: State, drift: Drift) -> FloatArray:
             S[i, j] = S[j, i] = drift.scale if i == j else drift.axes_rad / 2.0
             columns.append(np.concatenate([(K @ S).ravel(), np.zeros(3)]))
     factor = np.array(columns).T
-    return _everywhere(state, factor @ factor.T)
+    return alike(state, factor @ factor.T)
 
 
-def _everywhere(state: State, twelve: FloatArray) -> FloatArray:
-    """Covariance of theta of errors of the constants, (12, 12), alike at all temperatures."""
+def alike(state: State, covariance: FloatArray) -> FloatArray:
+    """Covariance of theta of errors that are alike at all temperatures.
+
+    Parameters
+    ----------
+    covariance : array, shape (12, 12) or (30, 30)
+        Of the constants, and of Q row by row; that of Q counts where theta has Q.
+    """
     P, shape = state.functions, state.calibration.shape
     temps = np.linspace(*state.calibration.range_degc, 8 * P + 1)
     basis = shape.basis(temps)
     ones = np.linalg.lstsq(basis, np.ones(len(basis)), rcond=None)[0]
-    result = np.zeros((len(state.theta), len(state.theta)))
-    spread = np.einsum("ab,p,q->apbq", twelve, ones, ones).reshape(12 * P, 12 * P)
-    result[: 12 * P, : 12 * P] = spread
+    spread = np.zeros((len(state.theta), len(covariance)))
+    spread[: 12 * P, :12] = np.kron(np.eye(12), ones[:, None])
+    if len(state.theta) > 12 * P and len(covariance) > 12:
+        spread[12 * P :, 12:] = np.eye(18)
+    result: FloatArray = spread @ covariance @ spread.T
     return result
 
 
 @dataclass(frozen=True)
 class Innovation:
-    """Poses against a prior.
+    """Poses against a prior, linear about the most probable parameters.
 
     Attributes
     ----------
@@ -203,11 +218,22 @@ class Innovation:
 
 
 def innovation(
-    state: State, covariance: FloatArray, poses: FieldPoses, noise: FloatArray, gravity_g: float
+    state: State,
+    covariance: FloatArray,
+    poses: FieldPoses,
+    noise: FloatArray,
+    gravity_g: float,
+    *,
+    theta: FloatArray,
 ) -> Innovation:
-    """Poses against a prior of this covariance; `noise` (n, n) is that of |a| in the poses."""
-    length, slopes = state.length(state.theta, poses)
-    return Innovation(length - gravity_g, slopes @ covariance @ slopes.T + noise)
+    """Poses against a prior of this covariance; `noise` (n, n) is that of |a| in the poses.
+
+    About the most probable `theta`, chi-square is what the update has minimised, whatever the size
+    of the change: a bias that moved by 50 mg moves |a| across it by its square, 1.25 mg.
+    """
+    length, slopes = state.length(theta, poses.readings, poses.temps_degc)
+    error = length - gravity_g + slopes @ (state.theta - theta)
+    return Innovation(error, slopes @ covariance @ slopes.T + noise)
 
 
 def updated(
@@ -217,7 +243,7 @@ def updated(
     whiten = np.linalg.inv(np.linalg.cholesky(noise))
 
     def model(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        length, slopes = state.length(theta, poses)
+        length, slopes = state.length(theta, poses.readings, poses.temps_degc)
         return whiten @ (length - gravity_g), whiten @ slopes
 
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
