@@ -94,7 +94,7 @@ def test_an_aged_bias_contradicts_and_is_named(unit: UnitDescription) -> None:
     assert second.contradicts
     assert second.en > EN_MAX
     assert second.where.startswith("U0y at")
-    # 0.2 mV over 0.5485 V/g, the sensitivity of the output; the rig's tilts add some hundredths of a mg.
+    # 0.2 mV over a sensitivity of 0.5485 V/g; the rig's tilts add some hundredths of a mg.
     assert second.bias_mg == pytest.approx(+0.365, abs=0.1)
 
 
@@ -154,7 +154,7 @@ def test_the_command(folder: Path) -> None:
 
 
 def test_calib_tells_of_a_contradiction_with_figures(folder: Path, tmp_path: Path) -> None:
-    """0.5 mV over a sensitivity of 0.5508 V/g is 0.908 mg; noise of 1 micro-g a dwell, and curves."""
+    """0.5 mV over 0.5508 V/g is 0.908 mg; noise of 1 micro-g a dwell, and curves."""
     done = CliRunner().invoke(main, ["calib", str(folder), "--build", str(tmp_path / "build")])
     assert done.exit_code == 0, done.output
     told = WARNING.fullmatch(done.stderr.strip())
