@@ -28,6 +28,7 @@ LONG = {
     "family/test_check.py",
     "family/test_converter_signs.py",
     "family/test_cross_coupling.py",
+    "family/test_cubes.py",
     "family/test_doubtful.py",
     "family/test_files.py",
     "family/test_formats.py",

@@ -9,8 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.cubes import cube_findings
 from triaxcal.fitting.core.judged import ORIENTATION, TEMPERATURE, held_out_poses
 from triaxcal.fitting.core.outliers import left_out_residuals, worst_outlier
+from triaxcal.fitting.recorded.cubes import scalar_cubes
 from triaxcal.fitting.recorded.made import Made
 from triaxcal.fitting.recorded.magnitude import fit_with_prior
 from triaxcal.fitting.recorded.prepared import Prepared, prepare
@@ -106,6 +108,7 @@ def calibrate_poses(
     why = _reason(thermal, delivered.own, turns, delivered.reason)
     findings = found.findings + _outlier(best, poses, unit.loss)
     findings += [BEYOND_1_G] if len(delivered.own.fit.model.quadratic) else []
+    findings += cube_findings([scalar_cubes(delivered.full.fit)])
     shown = climate.rates if best.trial.rate else None
     measurements = MeasurementSet(poses.source, pose_dwells(poses, found.temps, shown))
     others = [row for row in thermal if row is not best]

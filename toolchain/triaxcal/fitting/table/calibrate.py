@@ -9,6 +9,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.cubes import cube_findings
 from triaxcal.fitting.core.judged import (
     ORIENTATION,
     TEMPERATURE,
@@ -39,6 +40,7 @@ from triaxcal.fitting.table.checks import (
     refuse_open,
 )
 from triaxcal.fitting.table.choice import choose_table
+from triaxcal.fitting.table.cubes import table_cubes
 from triaxcal.fitting.table.harmonics import table_findings
 from triaxcal.fitting.table.oriented import TRACELESS, table_error_g
 from triaxcal.fitting.table.trials import trials_of
@@ -97,6 +99,7 @@ def calibrate_table(
         *poses.findings,
         *wrong_row_findings(unit, angles, poses, table=table, sign=sign, rows=wrong),
         *([BEYOND_1_G] if best.trial.parameters > 12 and best.fit.quadratic is not None else []),
+        *cube_findings(table_cubes(best, known)),
         *_shares(best),
         *temperature_findings(unit, poses.temps_degc),
         *table_findings(angles, table[near], readings[near], found[near], unit.gravity_g),
