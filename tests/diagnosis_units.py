@@ -255,6 +255,13 @@ def fault_drift(bench: Bench, size: float) -> None:
         row["extra"] = row["extra"] + np.eye(3)[axis] * size * (2 * k / (count - 1) - 1)
 
 
+def fault_settling(bench: Bench, size: float) -> None:
+    """All biases relax after switching on: most in the first quarter of the rows."""
+    bias = direction(bench, size)
+    for k, row in enumerate(bench.rows):
+        row["extra"] = row["extra"] + bias * np.exp(-4.0 * k / len(bench.rows))
+
+
 def fault_dead(bench: Bench, _size: float) -> None:
     axis = bench.rng.integers(3)
 
@@ -329,13 +336,14 @@ CAUSE_OF = {
     "unsigned": "block_temperature",
     "unit": "block_temperature",
     "blocks": "exchanged_blocks",
+    "settling": "drift",
 }
 WITHOUT_SIZE = {
     "exchanged", "half_turn", "polarity", "sign", "unsigned", "unit", "blocks", "dead", "copied",
     "scatter", "gain", "mounting", "left_handed",
 }  # fmt: skip
 """Faults of one size."""
-NEEDS_CHECKS = {"hysteresis", "drift"}
+NEEDS_CHECKS = {"hysteresis", "drift", "settling"}
 """Without check dwells these are a part of the curves of one rising pass, whatever the method."""
 
 
@@ -362,6 +370,74 @@ def unlisted_two(bench: Bench, size: float) -> None:
 def unlisted_noisy(bench: Bench, size: float) -> None:
     for row in bench.rows:
         row["extra"] = row["extra"] + bench.rng.standard_t(3, 3) * size
+
+
+def unlisted_one_bias(bench: Bench, size: float) -> None:
+    """A jump of bias and gain at one temperature, in one output."""
+    axis = bench.rng.integers(3)
+    bias, gain = direction(bench, size, 2)
+    for row in bench.of_block(bench.rng.integers(len(bench.temps))):
+        row["extra"] = row["extra"] + np.eye(3)[axis] * (bias + gain * row["force"][axis])
+
+
+def unlisted_outliers(bench: Bench, size: float) -> None:
+    """A quarter of all dwells are wrong, each in its own way."""
+    for row in bench.rows:
+        if bench.rng.random() < 0.25:
+            row["extra"] = row["extra"] + direction(bench, size * bench.rng.uniform(0.5, 2.0))
+
+
+def unlisted_growing_cross(bench: Bench, size: float) -> None:
+    """A cross sensitivity that grows with the time of measuring."""
+    a, b = bench.rng.permutation(3)[:2]
+    for k, row in enumerate(bench.rows):
+        change = size * k / len(bench.rows) * row["force"][b]
+        row["extra"] = row["extra"] + np.eye(3)[a] * change
+
+
+def unlisted_supply(bench: Bench, size: float) -> None:
+    """All sensitivities step between two dates: another supply voltage."""
+    first = bench.rng.integers(1, bench.blocks)
+    for row in bench.rows:
+        if row["block"] >= first:
+            row["extra"] = row["extra"] + size * row["force"]
+
+
+def unlisted_steps(bench: Bench, size: float) -> None:
+    """Outputs in coarse steps, with too little noise to smooth them."""
+    step = 2.0 * size
+    bench.info["after"] = lambda outputs, _bench: np.round(outputs / step) * step
+
+
+def unlisted_cubes(bench: Bench, size: float) -> None:
+    """Own-axis cubes: six positions take them for gain, check dwells do not."""
+    k3 = direction(bench, size)
+    for row in bench.rows:
+        row["extra"] = row["extra"] + k3 * row["force"] ** 3
+
+
+def unlisted_bending_rig(bench: Bench, size: float) -> None:
+    """One face of the rig tilts in proportion to the temperature."""
+    name = NAMES[bench.rng.integers(6)]
+    turn = direction(bench, size)
+    for row in bench.rows:
+        if row["name"] == name:
+            row["force"] = rotation(turn * (row["true"] - 20.0) / 40.0) @ row["force"]
+
+
+def unlisted_drift_and_dwell(bench: Bench, size: float) -> None:
+    fault_drift(bench, size)
+    fault_dwell(bench, 2.0 * size)
+
+
+def unlisted_sign_and_square(bench: Bench, size: float) -> None:
+    fault_sign(bench, size)
+    fault_own_square(bench, size)
+
+
+def unlisted_exchange_and_hysteresis(bench: Bench, size: float) -> None:
+    fault_exchanged(bench, size)
+    fault_hysteresis(bench, size)
 
 
 UNLISTED: dict[str, Fault] = {

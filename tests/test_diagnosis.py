@@ -20,6 +20,10 @@ from triaxcal.diagnosis import diagnose
 from triaxcal.diagnosis.answer import MARGIN
 from triaxcal.diagnosis.causes.registry import CAUSES
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Parameter
+from triaxcal.diagnosis.core.readings import readings_of
+from triaxcal.diagnosis.core.scales import Scales
+from triaxcal.diagnosis.core.screen import log_evidence_of_tests
+from triaxcal.diagnosis.core.sound import System
 from triaxcal.readings.measurements import MeasurementSet, write_measurements
 from triaxcal.unit.description import UnitDescription, read_unit
 
@@ -74,6 +78,28 @@ def test_of_a_sound_unit_no_refuted_cause_is_listed() -> None:
     first, *table = str(diagnose(unit, measurements)).splitlines()
     assert first == "no cause is more probable than a sound unit"
     assert [line.split()[0] for line in table[2:]] == ["0.0"]
+
+
+def test_two_causes_at_once_are_not_named_as_one() -> None:
+    unit, measurements, bench = simulated("two", 2e-3, 1)
+    best = diagnose(unit, measurements).answer[0]
+    assert best.cause == "together"
+    assert "own-axis squares of the sensor" in best.name
+    assert f"one position tilted at every temperature, {bench.info['place']}" in best.name
+    assert best.spoils
+    assert best.remaining.checks_g < 3.0 * bench.sd
+
+
+def test_the_quick_evidence_of_test_positions_is_the_careful_one() -> None:
+    unit, measurements, _ = simulated("half_turn", 0.0, 3, checks=False)
+    readings = readings_of(unit, measurements)
+    unused = np.zeros((len(readings), 3), dtype=np.bool_)
+    unused[3:8, 1] = True
+    scales = Scales(noise=1.4, tilt=40e-6)
+    for some in (None, unused):
+        careful = System(readings, None, some).fit(scales).log_evidence
+        # Both lose 16 digits on the squares of rows that are 2 g off in 20 micro-g: 1e10.
+        assert log_evidence_of_tests(readings, scales, some) == pytest.approx(careful, abs=1e-3)
 
 
 def test_a_cause_of_ones_own_competes() -> None:
@@ -167,7 +193,7 @@ def test_what_no_cause_explains_keeps_its_advice(monkeypatch: pytest.MonkeyPatch
     unit, measurements, _ = simulated("dwell", 5e-3, 4)
     refusal = RefusedError(measurements.source, "misses", expected="1 mg", remedy="measure again")
     found = diagnose(unit, measurements)
-    best = replace(found.answer[0], cause="unknown")
+    best = replace(found.answer[0], cause="unknown", symptom=True)
     monkeypatch.setattr(causes, "causes_of", lambda *_: replace(found, answer=(best,)))
     told = with_cause(refusal, unit, measurements, contradiction=True)
     assert told.remedy.startswith("measure again; no cause of the list")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis_units import ARC, CAUSE_OF, simulated
+from diagnosis_units import ARC, CAUSE_OF, UNLISTED, simulated
 from recordings import FOLDER
 from triaxcal.diagnosis import Diagnosis, diagnose
 from triaxcal.readings.measurements import MeasurementSet, read_measurements
@@ -19,7 +19,7 @@ CASES = FOLDER.parent / "cases"
 @pytest.mark.parametrize(
     "fault",
     ["dwell", "misplaced", "exchanged", "half_turn", "polarity", "own_square", "hysteresis",
-     "sign", "unsigned", "blocks",
+     "sign", "unsigned", "blocks", "settling",
      "dwells", "squareness", "lag", "drift", "dead", "copied", "saturated", "mounting",
      "left_handed"],
 )  # fmt: skip
@@ -28,6 +28,13 @@ def test_a_fault_of_two_milli_g_is_named(fault: str) -> None:
     found = diagnose(unit, measurements)
     assert CAUSE_OF[fault] in [s.cause for s in found.answer]
     assert found.doubtful
+
+
+@pytest.mark.parametrize("fault", sorted(UNLISTED))
+def test_what_is_not_in_the_list_has_no_wrong_name(fault: str) -> None:
+    unit, measurements, _ = simulated(fault, 2e-3, 11)
+    found = diagnose(unit, measurements)
+    assert not found.doubtful or found.answer[0].symptom
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -28,8 +28,6 @@ _CERTAIN = 20.0
 """Ln of the odds of a fault against a sound unit; those of sound units are below 0 in 99 of 100."""
 _USUAL_PARAMETERS = 4
 """Of a curve: a cubic follows the sensors that are known."""
-_SYMPTOMS = ("unknown", "dwells", "curve", "scatter")
-"""Causes that say how the readings look: what was advised for them stays."""
 
 
 def causes_of(
@@ -86,14 +84,12 @@ def refuse_certain_fault(
         found = causes_of(unit, measurements, calibration)
     except (RefusedError, np.linalg.LinAlgError):
         return
-    from triaxcal.diagnosis.causes.registry import CAUSES  # noqa: PLC0415
-
     if not found.answer or found.answer[0].log_evidence < _CERTAIN:
         return
     best, limit = found.answer[0], unit.limits.over_range_g
     # Amplitudes are in mg, or in mrad of a tilt, which moves a level output as many mg.
     largest = max((abs(a.value) * 1e-3 for a in best.amplitudes), default=np.inf)
-    if not CAUSES[best.cause].spoils or largest <= limit:
+    if not best.spoils or largest <= limit:
         return
     refusal = RefusedError(
         measurements.source,
@@ -148,7 +144,7 @@ def with_cause(
     if not found.doubtful:
         return refusal
     remedy = _advice(found, unit)
-    symptom = found.answer[0].cause in _SYMPTOMS
+    symptom = found.answer[0].symptom
     if refusal.remedy and (
         symptom or not (contradiction or isinstance(refusal, ContradictionError))
     ):

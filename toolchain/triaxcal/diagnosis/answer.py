@@ -8,7 +8,9 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.screentext import table
-from triaxcal.diagnosis.core.evidence import Judged, standing_force
+from triaxcal.diagnosis.core.cause import name_of
+from triaxcal.diagnosis.core.curves import standing_force
+from triaxcal.diagnosis.core.evidence import Judged
 from triaxcal.diagnosis.core.readings import Readings, readings_of
 from triaxcal.diagnosis.nextdwell import Request, next_dwell
 from triaxcal.diagnosis.ranking import Ranked, rank
@@ -73,6 +75,10 @@ class Suspect:
         Held-out errors with the mistake undone.
     apart : str
         The datum that would tell it from causes that look the same.
+    name : str
+        Label and place.
+    spoils, symptom : bool
+        Whether constants of readings with it are wrong; whether it is but how they look.
     """
 
     cause: str
@@ -84,15 +90,10 @@ class Suspect:
     amplitudes: tuple[Amplitude, ...]
     remaining: Remaining
     apart: str
+    name: str
+    spoils: bool
+    symptom: bool
     judged: Judged = field(repr=False, compare=False)
-
-    @property
-    def name(self) -> str:
-        """Label and place."""
-        if not self.place:
-            return self.label
-        comma = "" if self.place.startswith("about ") else ","
-        return f"{self.label}{comma} {self.place}"
 
     @property
     def size(self) -> str:
@@ -128,7 +129,7 @@ class Diagnosis:
     @property
     def doubtful(self) -> bool:
         """Whether the readings tell a cause from a sound unit: odds of 20 to 1 and more."""
-        return bool(self.answer) and self.answer[0].log_evidence > MARGIN
+        return bool(self.answer and self.answer[0].log_evidence > MARGIN)
 
     @property
     def sentence(self) -> str:
@@ -254,5 +255,8 @@ def _suspect(ranked: Ranked, judged: Judged, readings: Readings, base: float) ->
         amplitudes,
         remaining(mended),
         ranked.cause.apart,
+        name_of(ranked.cause, hypothesis),
+        ranked.cause.spoils or hypothesis.spoils,
+        ranked.cause.symptom,
         judged,
     )

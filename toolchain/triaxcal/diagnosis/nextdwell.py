@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.diagnosis.core.cause import Undo
+from triaxcal.diagnosis.core.curves import MEAN
 from triaxcal.diagnosis.core.evidence import Judged
 from triaxcal.diagnosis.core.readings import FORCES, POSITIONS, Readings
-from triaxcal.diagnosis.core.sound import MEAN, Added, System
+from triaxcal.diagnosis.core.sound import Added, System
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from triaxcal.diagnosis.core.curves import powers
 from triaxcal.diagnosis.core.readings import Readings
-from triaxcal.diagnosis.core.sound import powers
 from triaxcal.model.types import FloatArray
 
 _CURVES = {1: "a straight line", 2: "a quadratic", 3: "a cubic"}

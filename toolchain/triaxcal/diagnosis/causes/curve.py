@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Parameter, Undo
+from triaxcal.diagnosis.core.curves import BendFeatures
 from triaxcal.diagnosis.core.readings import Readings
-from triaxcal.diagnosis.core.sound import BendFeatures
 from triaxcal.model.types import FloatArray
 
 _LENGTHS_DEGC = 8.0, 16.0
@@ -43,4 +43,5 @@ ENTRY = Cause(
     hypotheses=_hypotheses,
     apart="a dwell at a temperature between two measured ones",
     rank=70,
+    symptom=True,
 )

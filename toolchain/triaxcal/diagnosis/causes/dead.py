@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, explained, unchanged
-from triaxcal.diagnosis.core.sound import powers
+from triaxcal.diagnosis.core.curves import powers
 from triaxcal.model.positions import AXES
 
 _ANSWER = 0.05

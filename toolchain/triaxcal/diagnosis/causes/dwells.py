@@ -37,4 +37,5 @@ ENTRY = Cause(
     hypotheses=_hypotheses,
     apart="the same dwells again",
     rank=11,
+    symptom=True,
 )

@@ -31,4 +31,5 @@ ENTRY = Cause(
     apart="one dwell repeated a few times, and the unit of the deviations",
     discrete=True,
     rank=80,
+    symptom=True,
 )

@@ -8,12 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
+from triaxcal.diagnosis.core.curves import BendFeatures, residuals
 from triaxcal.diagnosis.core.readings import Readings
-from triaxcal.diagnosis.core.sound import BendFeatures, residuals
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
 Undo = Callable[[Readings, FloatArray], Readings]
 """Readings and amplitudes (in g or rad) -> the readings without the mistake."""
+Size = float | FloatArray
+"""Prior standard deviation of all amplitudes, or one of each, shape (k,)."""
 SIZES_G = (0.5e-3, 5e-3, 50e-3, 500e-3)
 """Prior standard deviations of an amplitude; each as probable as the others."""
 _SMALL = 1e-5
@@ -56,12 +58,14 @@ class Hypothesis:
         How many places there are: each is as probable as the others.
     log_prior : float
         Logarithm of what makes this place less probable than others.
-    sizes : tuple of float
-        Prior standard deviations of the amplitudes.
+    sizes : tuple of float or of arrays, shape (k,)
+        Prior standard deviations of the amplitudes, each as probable as the others.
     noise : tuple of float
         Factors on the stated noise that are tried instead of the usual ones.
     unused : array of bool, shape (n, 3), or None
         Outputs that the cause itself explains, with `log_density` (ln g^-1).
+    spoils : bool
+        As that of `Cause`, of this place of it.
     """
 
     place: str
@@ -71,10 +75,11 @@ class Hypothesis:
     change: str = ""
     places: float = 1.0
     log_prior: float = 0.0
-    sizes: tuple[float, ...] = SIZES_G
+    sizes: tuple[Size, ...] = SIZES_G
     noise: tuple[float, ...] = ()
     unused: BoolArray | None = None
     log_density: float = 0.0
+    spoils: bool = False
 
     @property
     def blind(self) -> bool:
@@ -174,6 +179,8 @@ class Cause:
     spoils : bool
         Whether the constants of readings with it are wrong: they are refused where it is certain
         and beyond the limit, however small their residuals are.
+    symptom : bool
+        Whether it says how the readings look, and not why: general advice on them still holds.
     rank : int
         Place in lists.
     """
@@ -185,4 +192,20 @@ class Cause:
     apart: str
     discrete: bool = False
     spoils: bool = False
+    symptom: bool = False
     rank: int = 100
+
+
+def name_of(cause: Cause, hypothesis: Hypothesis) -> str:
+    """Label and place, in words."""
+    if not hypothesis.place:
+        return cause.label
+    comma = "" if hypothesis.place.startswith("about ") else ","
+    return f"{cause.label}{comma} {hypothesis.place}"
+
+
+def either(one: BoolArray | None, other: BoolArray | None) -> BoolArray | None:
+    """Outputs that one or the other explains."""
+    if one is None or other is None:
+        return other if one is None else one
+    return np.asarray(one | other)

@@ -12,137 +12,30 @@ A check dwell tells only |a| = g: one row, linear in the constants about those o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from triaxcal.diagnosis.core.curves import (
+    CURVED_SD,
+    FIXED_SD,
+    MEAN,
+    BendFeatures,
+    constants,
+    powers,
+    seen_force,
+)
 from triaxcal.diagnosis.core.readings import POSITIONS, Readings
+from triaxcal.diagnosis.core.scales import Scales, log_prior
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
-ORDERS = 5
-"""Coefficients of a curve over (T - T0) / 50 degC."""
-_SPAN_DEGC = 50.0
-_BEND_DEGC = 10.0
-"""Correlation length of what bends faster than the polynomials."""
-_SQUARE_SD = 1e-4
+SQUARE_SD = 1e-4
 """Of an own-axis square that nobody would notice, g/g^2."""
-_WIDE = 1.0
+WIDE = 1.0
 """Variance, g^2, of a row that the model does not use."""
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Standard deviations of the priors; the data choose them within priors of their own.
-
-    Attributes
-    ----------
-    noise : float
-        Of the readings, as a multiple of what is stated.
-    tilt : float
-        Of one placement, rad.
-    seat : float
-        Of a position at all temperatures (squareness and reproducible errors of the rig), rad.
-    curvature : float
-        Of the curves, as a multiple of that of a usual sensor.
-    bend : float
-        Of what no polynomial follows, g.
-    """
-
-    noise: float = 1.0
-    tilt: float = 30e-6
-    seat: float = 100e-6
-    curvature: float = 1.0
-    bend: float = 0.0
-
-
-_CHOICES: dict[str, tuple[tuple[float, ...], float, float]] = {
-    "noise": ((0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), 1.0, 0.5),
-    "tilt": ((4e-6, 10e-6, 20e-6, 40e-6, 80e-6, 160e-6), 30e-6, 0.8),
-    "seat": ((15e-6, 40e-6, 80e-6, 160e-6, 240e-6), 80e-6, 0.6),
-    "curvature": ((0.1, 0.3, 1.0, 3.0, 10.0, 30.0), 1.5, 1.5),
-    "bend": ((0.0, 50e-6, 100e-6, 200e-6), 70e-6, 0.8),
-}
-"""Values of each scale, and mean and standard deviation of its logarithm."""
-
-
-def _log_prior(scales: Scales) -> float:
-    total = 0.0
-    for name, (choices, middle, spread) in _CHOICES.items():
-        if not choices[0] <= getattr(scales, name) <= choices[-1]:
-            continue  # of a cause that is about this scale, and pays for it itself
-        value = max(getattr(scales, name), 20e-6 if name == "bend" else 0.0)
-        total -= 0.5 * (np.log(value / middle) / spread) ** 2
-    return float(total)
-
-
-def _prior_sd() -> tuple[FloatArray, FloatArray]:
-    """Of the constants, shape (3, 4, ORDERS): fixed, and to be multiplied by `curvature`."""
-    fixed, curved = np.zeros((3, 4, ORDERS)), np.zeros((3, 4, ORDERS))
-    for i in range(3):
-        fixed[i, 0, :2] = 0.5, 0.03
-        curved[i, 0, 2:] = 1e-3, 4e-4, 1.5e-4
-        for j in range(3):
-            own = i == j
-            fixed[i, 1 + j, :2] = (0.05, 0.02) if own else (0.03, 1e-3)
-            curved[i, 1 + j, 2:] = (5e-4, 2e-4, 7e-5) if own else (1e-4, 4e-5, 1.5e-5)
-    return fixed.ravel(), curved.ravel()
-
-
-_FIXED, _CURVED = _prior_sd()
-MEAN = np.zeros((3, 4, ORDERS))
-"""Prior mean of the constants: outputs are in g."""
-MEAN[(0, 1, 2), (1, 2, 3), 0] = 1.0
-
-
-def powers(temps_degc: FloatArray, t0_degc: float) -> FloatArray:
-    """Functions of temperature, shape (n, ORDERS)."""
-    x = (np.asarray(temps_degc, dtype=np.float64) - t0_degc) / _SPAN_DEGC
-    return np.asarray(x[:, None] ** np.arange(ORDERS))
-
-
-def constants(theta: FloatArray, temps_degc: FloatArray, t0_degc: float) -> FloatArray:
-    """U0 and K at temperatures, shape (n, 3, 4): column 0 is U0."""
-    curves = theta.reshape(3, 4, ORDERS)
-    return np.asarray(np.einsum("icp,np->nic", curves, powers(temps_degc, t0_degc)))
-
-
-def seen_force(readings: Readings, theta: FloatArray) -> FloatArray:
-    """Force that the unit sees with these constants, shape (n, 3), g."""
-    at = constants(theta, readings.temps_degc, readings.t0_degc)
-    free = (readings.outputs - at[:, :, 0])[:, :, None]
-    return np.asarray(np.linalg.solve(at[:, :, 1:], free)[:, :, 0])
-
-
-def residuals(readings: Readings, theta: FloatArray) -> FloatArray:
-    """Of every row: output less model in test positions, |a| - g in check positions, g."""
-    test = readings.test
-    at = constants(theta, readings.temps_degc, readings.t0_degc)
-    model = at[:, :, 0] + np.einsum("nij,nj->ni", at[:, :, 1:], readings.force)
-    own = (readings.outputs - model)[test].ravel()
-    if test.all():
-        return np.asarray(own)
-    seen = np.linalg.norm(seen_force(readings, theta)[~test], axis=1) - 1.0
-    return np.concatenate([own, seen])
-
-
-class BendFeatures:
-    """Functions of temperature with the covariance exp(-(dT / length)^2 / 2) at given ones."""
-
-    def __init__(self, temps_degc: FloatArray, length_degc: float = _BEND_DEGC) -> None:
-        self.temps = np.unique(np.round(temps_degc, 1))
-        self.length = length_degc
-        values, vectors = np.linalg.eigh(self._kernel(self.temps))
-        keep = values > 1e-3
-        self._map = vectors[:, keep] / np.sqrt(values[keep])
-        self.count = int(keep.sum())
-
-    def _kernel(self, temps_degc: FloatArray) -> FloatArray:
-        return np.asarray(np.exp(-0.5 * ((temps_degc[:, None] - self.temps) / self.length) ** 2))
-
-    def at(self, temps_degc: FloatArray) -> FloatArray:
-        """Shape (n, count)."""
-        return np.asarray(self._kernel(temps_degc) @ self._map)
+ROUNDING = 1e-8
+"""Of the squares of the rows, added and taken away again: what rounding could make negative."""
 
 
 @dataclass(frozen=True)
@@ -176,14 +69,14 @@ class Added:
     Attributes
     ----------
     columns : array, shape (n, k)
-    size : float
+    size : float or array, shape (k,)
         Prior standard deviation of the amplitudes, mean zero.
     about : array, shape (k,)
         Amplitudes that have been taken off the readings already.
     """
 
     columns: FloatArray
-    size: float
+    size: float | FloatArray
     about: FloatArray
 
 
@@ -194,21 +87,37 @@ class Fit:
     Attributes
     ----------
     log_evidence : float
-    values : array
-        Of all parameters, less their prior means; the last `added` are amplitudes.
     added : int
-    residual : array, shape (n,)
-        Of the rows in their standard deviations.
-    root, scale : arrays
-        Cholesky root of the inverse covariance of the parameters, which are divided by `scale`.
+        How many of the parameters are amplitudes: the last ones.
+    columns, observed : arrays, shapes (n, p) and (n,)
+        Of the rows in their standard deviations, and of parameters in theirs.
+    root, projected : arrays, shapes (p, p) and (p,)
+        Cholesky root L of the inverse covariance of the parameters, and L^-1 G' y.
+    scale : array, shape (p,)
+        Prior standard deviations of the parameters.
     """
 
     log_evidence: float
-    values: FloatArray
     added: int
-    residual: FloatArray
+    columns: FloatArray
+    observed: FloatArray
     root: FloatArray
+    projected: FloatArray
     scale: FloatArray
+
+    @cached_property
+    def _scaled(self) -> FloatArray:
+        return np.asarray(np.linalg.solve(self.root.T, self.projected))
+
+    @property
+    def values(self) -> FloatArray:
+        """Of all parameters, less their prior means, shape (p,)."""
+        return self._scaled * self.scale
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Of the rows in their standard deviations, shape (n,)."""
+        return self.observed - self.columns @ self._scaled
 
     @property
     def theta(self) -> FloatArray:
@@ -243,7 +152,7 @@ class System:
     def __init__(
         self, readings: Readings, theta: FloatArray | None, unused: BoolArray | None = None
     ) -> None:
-        self.readings, self.linear_about = readings, theta
+        self.readings, self.linear_about, self.unused = readings, theta, unused
         self.rows = rows = Rows.of(readings)
         test = readings.test
         tests = int(test.sum())
@@ -267,7 +176,7 @@ class System:
             used = used & ~out
         self.used = used
         self.y = np.where(used, self.y - self._G @ MEAN.ravel(), 0.0)
-        self.variance = np.where(used, self.variance, _WIDE)
+        self.variance = np.where(used, self.variance, WIDE)
         level = np.abs(self._force[np.arange(len(used)), rows.output]) < 0.5
         self._level = level & (rows.output >= 0) & used
         self._G[~used] = 0.0
@@ -281,7 +190,7 @@ class System:
         if not count:
             return
         J = np.zeros((count, self._G.shape[1]))
-        z, variance = np.zeros(count), np.full(count, _WIDE)
+        z, variance = np.zeros(count), np.full(count, WIDE)
         if theta is None:
             self.checks_used[tests:] = False
         else:
@@ -324,18 +233,24 @@ class System:
         bend = np.concatenate([per_output.reshape(n, -1), 0.5 * gains.reshape(n, -1)], axis=1)
         return np.asarray(bend * self.used[:, None])
 
+    @cached_property
+    def _straight(self) -> FloatArray:
+        return np.concatenate([self._G, self._square, self._seat], axis=1)
+
+    @cached_property
+    def _bending(self) -> FloatArray:
+        return np.concatenate([self._straight, self._bend], axis=1)
+
     def columns(self, scales: Scales) -> tuple[FloatArray, FloatArray]:
         """Columns of all parameters of a sound unit, and their prior standard deviations."""
-        parts = [self._G, self._square, self._seat]
         sds = [
-            np.sqrt(_FIXED**2 + (scales.curvature * _CURVED) ** 2),
-            np.full(3, _SQUARE_SD),
+            np.sqrt(FIXED_SD**2 + (scales.curvature * CURVED_SD) ** 2),
+            np.full(3, SQUARE_SD),
             np.full(self._seat.shape[1], scales.seat),
         ]
         if scales.bend > 0:
-            parts.append(self._bend)
             sds.append(np.full(self._bend.shape[1], scales.bend))
-        return np.concatenate(parts, axis=1), np.concatenate(sds)
+        return self._bending if scales.bend > 0 else self._straight, np.concatenate(sds)
 
     def row_variance(self, scales: Scales) -> FloatArray:
         """Of each row, shape (n,), g^2."""
@@ -354,27 +269,18 @@ class System:
             y = y + extra @ added.about
         root = 1.0 / np.sqrt(self.row_variance(scales))
         Gs, ys = (root[:, None] * G) * sd, root * y
-        A = Gs.T @ Gs
-        A.flat[:: len(A) + 1] += 1.0
-        L: FloatArray = np.linalg.cholesky(A).astype(np.float64)
-        u = np.linalg.solve(A, Gs.T @ ys)
-        rest = ys - Gs @ u
+        # The last row of the root of [[A, b], [b', y'y]] is L^-1 b, and then what is not explained.
+        p = Gs.shape[1]
+        whole = np.concatenate([Gs, ys[:, None]], axis=1)
+        A = whole.T @ whole
+        A.flat[: p * (p + 2) : p + 2] += 1.0
+        floor = ROUNDING * (1.0 + A[p, p])
+        A[p, p] += floor
+        L: FloatArray = np.linalg.cholesky(A).astype(np.float64, copy=False)
         evidence = (
-            -0.5 * (rest @ rest + u @ u)
+            -0.5 * (L[p, p] ** 2 - floor)
             + np.log(root).sum()
-            - np.log(np.diag(L)).sum()
+            - np.log(np.diag(L)[:p]).sum()
             - 0.5 * len(y) * np.log(2.0 * np.pi)
         )
-        return Fit(float(evidence) + _log_prior(scales), u * sd, k, rest, L, sd)
-
-
-def nearby(scales: Scales, name: str) -> list[Scales]:
-    """The same with the next values of one scale."""
-    values = _CHOICES[name][0]
-    value = getattr(scales, name)
-    at = int(np.argmin([abs(v - value) for v in values]))
-    ks = [k for k in (at - 1, at + 1) if 0 <= k < len(values)]
-    return [replace(scales, **{name: values[k]}) for k in ks]
-
-
-SCALE_NAMES = tuple(f.name for f in fields(Scales))
+        return Fit(float(evidence) + log_prior(scales), k, Gs, ys, L[:p, :p], L[p, :p], sd)

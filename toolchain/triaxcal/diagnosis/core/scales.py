@@ -1,0 +1,65 @@
+"""Scales of a sound unit's priors: how far its parts usually are from none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Standard deviations of the priors; the data choose them within priors of their own.
+
+    Attributes
+    ----------
+    noise : float
+        Of the readings, as a multiple of what is stated.
+    tilt : float
+        Of one placement, rad.
+    seat : float
+        Of a position at all temperatures (squareness and reproducible errors of the rig), rad.
+    curvature : float
+        Of the curves, as a multiple of that of a usual sensor.
+    bend : float
+        Of what no polynomial follows, g.
+    """
+
+    noise: float = 1.0
+    tilt: float = 30e-6
+    seat: float = 100e-6
+    curvature: float = 1.0
+    bend: float = 0.0
+
+
+_CHOICES: dict[str, tuple[tuple[float, ...], float, float]] = {
+    "noise": ((0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), 1.0, 0.5),
+    "tilt": ((4e-6, 10e-6, 20e-6, 40e-6, 80e-6, 160e-6), 30e-6, 0.8),
+    "seat": ((15e-6, 40e-6, 80e-6, 160e-6, 240e-6), 80e-6, 0.6),
+    "curvature": ((0.1, 0.3, 1.0, 3.0, 10.0, 30.0), 1.5, 1.5),
+    "bend": ((0.0, 50e-6, 100e-6, 200e-6), 70e-6, 0.8),
+}
+"""Values of each scale, and mean and standard deviation of its logarithm."""
+
+
+def log_prior(scales: Scales) -> float:
+    """Logarithm of the prior density of the scales."""
+    total = 0.0
+    for name, (choices, middle, spread) in _CHOICES.items():
+        if not choices[0] <= getattr(scales, name) <= choices[-1]:
+            continue  # of a cause that is about this scale, and pays for it itself
+        value = max(getattr(scales, name), 20e-6 if name == "bend" else 0.0)
+        total -= 0.5 * (np.log(value / middle) / spread) ** 2
+    return float(total)
+
+
+def nearby(scales: Scales, name: str) -> list[Scales]:
+    """The same with the next values of one scale."""
+    values = _CHOICES[name][0]
+    value = getattr(scales, name)
+    at = int(np.argmin([abs(v - value) for v in values]))
+    ks = [k for k in (at - 1, at + 1) if 0 <= k < len(values)]
+    return [replace(scales, **{name: values[k]}) for k in ks]
+
+
+SCALE_NAMES = tuple(f.name for f in fields(Scales))
