@@ -12,7 +12,8 @@ from triaxcal.batch.order import Order, Outcome, refused
 def record(name: str) -> dict[str, object]:
     """A record as the page needs it."""
     return {
-        "unit": name, "serial": name, "rig": None, "date": None, "shown": True, "t0_degc": 20.0,
+        "unit": name, "serial": name, "rig": None, "date": None, "t0_degc": 20.0,
+        "result": "passed", "verdict": "passed", "reading_unit": "V",
         "range_degc": [-40.0, 70.0], "thermal_model": "polynomial of order 3", "acceptance": [],
         "worst_source": "", "at_t0": [0.5] * 12, "temperature_coefficients": [[0.0, 0.0]] * 12,
         "at_t0_expanded_uncertainty": [0.0] * 12, "placement_pattern_g": [[0.0] * 3] * 3,

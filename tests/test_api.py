@@ -167,7 +167,7 @@ def test_a_budget_is_a_table_of_a_screen(cal: triaxcal.Calibration) -> None:
 
 def test_verdict_and_diagnosis(unit: triaxcal.Unit, cal: triaxcal.Calibration) -> None:
     assert cal.verdict.passed
-    assert [t.dwells for t in cal.verdict.tested] == [6, 36, 0, 66, 6, 72]
+    assert [t.dwells for t in cal.verdict.tested] == [6, 36, 0, 66, 30, 6, 72]
     assert repr(cal.verdict) == str(cal.verdict)
     assert repr(cal.diagnosis) == str(cal.diagnosis)
     assert str(cal.verdict).startswith("passed\nresidual at T0: 0.00135")

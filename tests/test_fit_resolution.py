@@ -107,7 +107,7 @@ def test_a_limit_below_half_a_code_is_refused_where_the_means_are_whole_codes():
     assert "unit.toml, [limits] at_t0_g: one code is 2.2" in message
     assert "the readings of a dwell show one code alone" in message
     wide = replace(own, limits=replace(own.limits, at_t0_g=2e-3, over_range_g=3e-3))
-    assert judge(Fitted(wide, data, "", calibrate(wide, data))).passed
+    assert judge(Fitted(wide, data, "", calibrate(wide, data))).refusal is None
 
 
 def test_little_scatter_is_rounded_whatever_the_printed_mean_is():

@@ -15,6 +15,7 @@ from triaxcal.delivery.fitted import Fitted
 from triaxcal.delivery.judgement import Verdict, judge, limits_that_apply
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import MeasurementSet
+from triaxcal.unit.limits import Limits
 from triaxcal.unit.thermal import ThermalChoice
 
 FIVE = (-40.0, -10.0, 20.0, 45.0, 70.0)
@@ -106,7 +107,7 @@ def test_a_sound_unit_with_few_temperatures_and_much_curvature_passes(temps, pow
     data = readings(truth, temps, sd_v=1e-7, count=100, spread_degc=0.05)
     own = unit()
     calibration = calibrate(own, data)
-    assert judge(Fitted(own, data, "", calibration)).passed
+    assert judge(Fitted(own, data, "", calibration)).refusal is None
     between = np.linspace(-40.0, 70.0, 56)
     missed = (calibration.thermal.constants_at(between) - truth(between))[:, 9:] / 0.55
     assert np.abs(missed).max() < 1e-3
@@ -157,13 +158,16 @@ def test_the_printed_reason_is_true(seed):
 
 def test_what_nothing_tests_is_said():
     three = readings(cubic_truth(), TABLE_TEMPS, sd_v=1e-7, count=100)
-    assert verdict(three).words == "passed at the dwells; between them not tested"
+    untested = "between the temperatures not tested"
+    wide = {"limits": Limits(0.01, 0.01)}
+    assert verdict(three, **wide).words == f"passed at the dwells; {untested}"
     at_t0 = with_checks(three, cubic_truth(), (20.0,), sd_v=1e-7, count=100)
-    assert verdict(at_t0).words == "passed at the dwells; between them not tested"
+    assert verdict(at_t0, **wide).words == f"passed at the dwells; {untested}"
     one = readings(cubic_truth(), (20.0,), sd_v=1e-7, count=100)
     assert verdict(one).words == "passed at the dwells; nothing was held out"
-    found = verdict(three)
+    found = verdict(three, **wide)
     assert found.passed
+    assert not found.shown
     assert [str(t) for t in found.tested[2:4]] == [
         "held out at T0: not tested",
         "held out over the range: not tested",
@@ -195,12 +199,49 @@ def test_checks_between_three_temperatures_test_them():
 def test_every_limit_is_shown_beside_what_it_is_held_against():
     data = readings(curved((8.0, 4.0)), FIVE, sd_v=1e-7, count=100)
     tested = verdict(data).tested
+    both = (("at T0", 3e-4), ("over the range", 1e-3))
     assert [(t.what, t.where, t.limit_g) for t in tested] == [
-        (what, where, limit)
-        for what in ("residual", "held out", "with uncertainty")
-        for where, limit in (("at T0", 3e-4), ("over the range", 1e-3))
+        *(("residual", *limit) for limit in both),
+        *(("held out", *limit) for limit in both),
+        ("held out, a component", "over the range", 1e-3),
+        *(("with uncertainty", *limit) for limit in both),
     ]
-    assert [t.dwells for t in tested] == [6, 24, 0, 18, 6, 24]
+    assert [t.dwells for t in tested] == [6, 24, 0, 18, 18, 6, 24]
+
+
+def test_an_uncertainty_beyond_a_limit_has_not_passed():
+    """All residuals and held-out errors are far within the limit, and the unit is delivered."""
+    data = readings(curved((8.0, 4.0)), FIVE, sd_v=1e-7, count=100)
+    sure = verdict(data)
+    assert (sure.result, sure.passed, sure.shown) == ("passed", True, True)
+    reached = [t.largest_g for t in sure.tested if t.what == "with uncertainty"]
+    errors = [t.largest_g for t in sure.tested if t.what != "with uncertainty" and t.dwells]
+    limit_g = reached[0] * 0.9
+    assert max(errors) < limit_g
+    found = verdict(data, limits=Limits(limit_g, 1e-3))
+    assert (found.result, found.passed, found.refusal) == ("not shown", False, None)
+    assert found.words == (
+        "not shown to be within the limits: error and uncertainty (95 %) reach "
+        f"{reached[0] * 1e3:.3g} mg at T0 (limit {limit_g * 1e3:g} mg)"
+    )
+
+
+def test_an_estimated_held_out_error_is_explained():
+    """The share of the smaller function's error that the delivered curve has is said, and why."""
+    data = readings(curved((8.0, 4.0, 1.0)), (-40.0, 0.0, 20.0, 70.0), sd_v=1e-7, count=100)
+    own = unit()
+    calibration = calibrate(own, data)
+    found = judge(Fitted(own, data, "", calibration))
+    test = calibration.held_out
+    (over,) = [t for t in found.tested if (t.what, t.where) == ("held out", "over the range")]
+    assert over.largest_g == pytest.approx(test.share * abs(test.worst.error_g))
+    assert found.note == (
+        "held out: without one temperature only a polynomial of order 2 is determined, and misses "
+        f"it by up to {abs(test.worst.error_g) * 1e3:.3g} mg; the delivered polynomial of order 3 "
+        f"is estimated to miss by {test.share:.2g} of that, as the error falls from order to order"
+    )
+    nine = readings(curved((8.0, 4.0)), NINE, sd_v=1e-7, count=100)
+    assert verdict(nine).note == ""
 
 
 def test_a_refusal_leaves_the_earlier_files_and_says_so(tmp_path: Path):

@@ -128,9 +128,10 @@ def test_a_limit_beyond_what_is_known_is_told(passports: dict[str, Passport]) ->
     assert t0.shown
     assert not over.shown
     assert over.cause == "the thermal model"
-    assert not p.shown
+    assert not p.verdict.shown
     text = " ".join(read(passport_html(p)).text.split())
-    assert "PASSED AT THE DWELLS" in text
+    assert "NOT SHOWNthe uncertainty reaches beyond a limit" in text
+    assert "Not shown to be within the limits: error and uncertainty (95 %) reach" in text
     factor = significant(over.factor, 2)
     cause = "the main cause is the thermal model; measure at one"
     assert f"reach {factor} times the limit; {cause}" in text
@@ -143,7 +144,9 @@ def test_tools_and_warnings_are_shown_and_escaped(passports: dict[str, Passport]
     assert "not run on this delivery" in read(passport_html(p)).text
     found = {"gappa": {"result": "passed", "finding": "12 <lemmas> & more"}}
     warned = replace(p.uncertainty, warnings=("a < b",))
-    page = passport_html(replace(p, tools=found, uncertainty=warned))
+    firmware = replace(p.delivery.firmware)
+    vars(firmware)["uncertainty"] = warned
+    page = passport_html(Passport(replace(p.delivery, firmware=firmware), found))
     assert b"12 &lt;lemmas&gt; &amp; more" in page
     assert b"a &lt; b" in page
     assert "not run on this delivery" not in read(page).text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,42 @@ def test_a_page_of_any_size(count: int) -> None:
     assert b"nan" not in files["series.json"].lower()
     assert "nan" not in page.split("</style>")[1]
     assert page.count("<h4>") == (36 if count else 0)
+
+
+def test_a_verdict_other_than_passed_is_counted_and_said() -> None:
+    records = drawn(30, 4)
+    words = "not shown to be within the limits: error and uncertainty (95 %) reach 2 mg"
+    records[3] |= {"result": "not shown", "verdict": words}
+    records[7] |= {"result": "passed at the dwells", "verdict": "passed at the dwells; a < b"}
+    series = series_of(records, {"U-X": "why"})
+    files = series_files(series)
+    page = files["series.html"].decode()
+    counts = "28 passed, 1 not shown, 1 passed at the dwells, 1 refused"
+    assert "<h1>28 of 31 units passed</h1>" in page
+    assert counts in page
+    assert words in page
+    assert "a &lt; b" in page
+    told = series_summary(series, 0, 1.0, 1, "p").splitlines()[0]
+    assert told == f"series          31 units: {counts}"
+    found = json.loads(files["series.json"])
+    assert (found["units"], found["made"], found["passed"]) == (31, 30, 28)
+
+
+def test_only_readings_in_one_unit_are_compared() -> None:
+    """Recordings in m/s^2 beside a tilter's volts are no outliers of them, and have their unit."""
+    volts, others = drawn(40, 5), drawn(25, 6)
+    for r in others:
+        r["unit"] = f"M{r['unit']}"
+        r["reading_unit"] = "m/s^2"
+        r["at_t0"] = [9.8 + 0.01 * v for v in r["at_t0"]]
+    page = series_files(series_of([*volts, *others], {}))["series.html"].decode()
+    assert "None: no constant or coefficient is more than" in page
+    assert page.count("<h4>") == 72
+    assert "25 units with readings in m/s^2" in page
+    assert "mm/s²/g/°C" in page
+    assert {q.unit for q in quantities(others)} == {
+        "m/s²/g", "mm/s²/g/°C", "µm/s²/g/°C²", "m/s²", "mm/s²/°C", "µm/s²/°C²",
+    }  # fmt: skip
 
 
 def test_the_same_records_give_the_same_bytes() -> None:

@@ -227,10 +227,10 @@ def test_kelvin_taken_for_degc_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("temps", "words"), [((0.0, 20.0, 50.0), "between them not tested"), (TEMPS, "")]
+    ("temps", "words"), [((0.0, 20.0, 50.0), ("between the temperatures not tested",)), (TEMPS, ())]
 )
 def test_three_temperatures_test_no_curve_between_them(
-    tmp_path: Path, temps: tuple[float, ...], words: str
+    tmp_path: Path, temps: tuple[float, ...], words: tuple[str, ...]
 ) -> None:
     """As of a tilter's unit: an inner temperature is held out where three remain."""
     folder = unit_with(tmp_path / "U", cycle(temps))

@@ -13,7 +13,7 @@ from test_recordings import calibrated
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import fit_folder
 from triaxcal.fitting.core.judged import ORIENTATION, TEMPERATURE, HeldOutPoses
-from triaxcal.fitting.route import refuse_poses_beyond_limits
+from triaxcal.fitting.recorded.acceptance import refuse_poses_beyond_limits
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from triaxcal.api.unit import Unit, read_unit
     from triaxcal.api.verification import Verification, verify_unit
     from triaxcal.base.errors import RefusedError, UsageError
-    from triaxcal.delivery.judgement import LimitCheck, Verdict
+    from triaxcal.delivery.verdict import LimitCheck, Verdict
     from triaxcal.uncertainty.budget import Budget
     from triaxcal.uncertainty.check import FieldCheck
     from triaxcal.uncertainty.updated import FieldUpdate
@@ -89,7 +89,7 @@ _MODULES = {
     "triaxcal.api.unit": ("Unit", "read_unit"),
     "triaxcal.api.verification": ("Verification", "verify_unit"),
     "triaxcal.base.errors": ("RefusedError", "UsageError"),
-    "triaxcal.delivery.judgement": ("LimitCheck", "Verdict"),
+    "triaxcal.delivery.verdict": ("LimitCheck", "Verdict"),
     "triaxcal.uncertainty.budget": ("Budget",),
     "triaxcal.uncertainty.check": ("FieldCheck",),
     "triaxcal.uncertainty.updated": ("FieldUpdate",),

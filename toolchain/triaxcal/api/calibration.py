@@ -17,8 +17,9 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import renew
 from triaxcal.delivery.causes import causes_of
 from triaxcal.delivery.fitted import Fitted, fit_columns, fit_folder
-from triaxcal.delivery.judgement import Verdict, judge
+from triaxcal.delivery.judgement import judge
 from triaxcal.delivery.saved import Saved, calibration_json, read_saved
+from triaxcal.delivery.verdict import Verdict
 from triaxcal.fitting.core.calibration import Candidate
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
 from triaxcal.model.types import FloatArray

@@ -32,6 +32,15 @@ FEWEST_UNITS = 20
 """With fewer units outliers are not searched: the MAD is uncertain by a quarter or more."""
 FEWEST_IN_RUN = 3
 _RISK = 0.05
+_SCALES = {
+    "V": ((1e3, "mV"), (1e6, "µV"), (1e9, "nV")),
+    "mV": ((1.0, "mV"), (1e3, "µV"), (1e6, "nV")),
+    "g": ((1e3, "mg"), (1e6, "µg"), (1e9, "ng")),
+    "mg": ((1.0, "mg"), (1e3, "µg"), (1e6, "ng")),
+    "m/s^2": ((1.0, "m/s²"), (1e3, "mm/s²"), (1e6, "µm/s²")),
+}
+_POWERS = ((1.0, ""), (1e3, "10⁻³ "), (1e6, "10⁻⁶ "))
+"""Of a unit without smaller ones, as counts."""
 _MAD_MARGIN = 3.5
 
 
@@ -99,16 +108,35 @@ class Run:
     told: bool
 
 
+def alike(records: Sequence[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+    """Records by the unit of their readings, the most first: only these can be compared."""
+    groups: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for r in records:
+        groups[r["reading_unit"]].append(r)
+    return sorted(groups.values(), key=len, reverse=True)
+
+
+def _scales(reading_unit: str) -> tuple[tuple[float, str], ...]:
+    """Factors and units in which constants and their two coefficients are shown."""
+    if reading_unit not in _SCALES:
+        return tuple((factor, f"{name}{reading_unit}") for factor, name in _POWERS)
+    return _SCALES[reading_unit]
+
+
 def quantities(records: Sequence[dict[str, Any]]) -> list[Quantity]:
-    """Constants at T0 in mV and their two temperature coefficients in µV and nV, 36 in all."""
-    at_t0 = np.array([r["at_t0"] for r in records]) * 1e3
-    by_temp = np.array([r["temperature_coefficients"] for r in records]) * 1e6
+    """Constants at T0 and their two temperature coefficients, 36 in all, of readings in one unit.
+
+    In mV, µV and nV where the readings are volts.
+    """
+    (f0, u0), (f1, u1), (f2, u2) = _scales(records[0]["reading_unit"])
+    at_t0 = np.array([r["at_t0"] for r in records])
+    by_temp = np.array([r["temperature_coefficients"] for r in records])
     found = []
     for c, name in enumerate(CONSTANT_NAMES):
         per = "/g" if c < 9 else ""
-        found.append(Quantity(name, f"mV{per}", at_t0[:, c]))
-        found.append(Quantity(f"{name} per °C", f"µV{per}/°C", by_temp[:, c, 0]))
-        found.append(Quantity(f"{name} per °C²", f"nV{per}/°C²", by_temp[:, c, 1] * 1e3))
+        found.append(Quantity(name, f"{u0}{per}", at_t0[:, c] * f0))
+        found.append(Quantity(f"{name} per °C", f"{u1}{per}/°C", by_temp[:, c, 0] * f1))
+        found.append(Quantity(f"{name} per °C²", f"{u2}{per}/°C²", by_temp[:, c, 1] * f2))
     return found
 
 
@@ -134,7 +162,10 @@ def outliers(records: Sequence[dict[str, Any]], found: Sequence[Quantity]) -> li
 
 
 def runs(records: Sequence[dict[str, Any]]) -> list[Run]:
-    """Runs of tilters by rig and day, each against the run before on its rig."""
+    """Runs of tilters by rig and day, each against the run before on its rig.
+
+    Of units whose readings are in one unit.
+    """
     records = [r for r in records if r["placement_pattern_g"] is not None]
     groups: dict[tuple[str, str], list[int]] = defaultdict(list)
     for k, r in enumerate(records):
@@ -163,11 +194,12 @@ def runs(records: Sequence[dict[str, Any]]) -> list[Run]:
 
 
 def _compared(records: Sequence[dict[str, Any]]) -> tuple[FloatArray, list[tuple[str, str]]]:
-    """Placement pattern in micro-g and constants at T0 in mV, (units, 21), and what they are."""
+    """Placement pattern in micro-g and constants at T0, (units, 21), and what they are."""
+    factor, unit = _scales(records[0]["reading_unit"] if records else "V")[0]
     pattern = np.array([r["placement_pattern_g"] for r in records]).reshape(-1, 9) * 1e6
-    constants = np.array([r["at_t0"] for r in records]) * 1e3
+    constants = np.array([r["at_t0"] for r in records]).reshape(-1, 12) * factor
     names = [(f"placement, {a} pair seen by {b}", "µg") for a in AXES for b in AXES]
-    names += [(name, "mV/g" if c < 9 else "mV") for c, name in enumerate(CONSTANT_NAMES)]
+    names += [(name, f"{unit}/g" if c < 9 else unit) for c, name in enumerate(CONSTANT_NAMES)]
     return np.column_stack([pattern, constants]), names
 
 

@@ -2,22 +2,43 @@
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.screentext import table
 from triaxcal.codegen.constants import Provenance
 from triaxcal.codegen.outputs.output import Job
 from triaxcal.codegen.outputs.registry import output_files
-from triaxcal.codegen.tryout import model_error_g
+from triaxcal.codegen.routines import Answers, Int32Array
+from triaxcal.codegen.tryout import model_error_g, run_on_dwells
 from triaxcal.delivery.fitted import Fitted
+from triaxcal.delivery.judgement import verdict_on
+from triaxcal.delivery.verdict import Verdict
 from triaxcal.fitting.converter import input_words
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.tilter.acceptance import dwells_in_range
+from triaxcal.fixedpoint.arithmetic import INT32_MAX
+from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan, make_plan
+from triaxcal.fixedpoint.proof import Bound, prove
+from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+from triaxcal.readings.measurements import Dwell
+from triaxcal.uncertainty.device_sources import Device
+from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
 from triaxcal.unit.description import UnitDescription
+
+_WIDTH = 92
+"""Columns of a line in the header's comment."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +47,7 @@ class Firmware:
 
     Attributes
     ----------
+    fitted : Fitted
     compensation : Compensation
         Functions of temperature, in floats.
     plan : Plan
@@ -33,14 +55,56 @@ class Firmware:
     model_error_g : float
         Largest error of the compensation against K(T)^-1 (U - U0(T)) at any temperature code and
         any raw code, in g.
-    files : dict
-        Name and content.
     """
 
+    fitted: Fitted
     compensation: Compensation
     plan: Plan
     model_error_g: float
-    files: dict[str, bytes]
+
+    @cached_property
+    def bound(self) -> Bound:
+        """Proven error of the arithmetic."""
+        return prove(self.plan)
+
+    @cached_property
+    def uncertainty(self) -> Uncertainty:
+        """Uncertainty of the unit, the device's own errors included."""
+        fitted = self.fitted
+        device = Device(self.plan.shape.output_q, self.bound.per_axis_lsb, self.model_error_g)
+        return uncertainty(fitted.unit, fitted.measurements, fitted.calibration, device)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Verdict on the unit with this firmware: what its header and all reports say."""
+        return verdict_on(self.fitted, self._errors_g(), self.uncertainty)
+
+    @cached_property
+    def files(self) -> dict[str, bytes]:
+        """Name and content."""
+        return _files(self)
+
+    def _errors_g(self) -> FloatArray:
+        """| |a| - g | at the dwells in the range by the integers, in which the C equals, (n,)."""
+        unit, calibration = self.fitted.unit, self.fitted.calibration
+        dwells = dwells_in_range(unit, calibration.range_degc, self.fitted.measurements)
+        rates = rate_codes(unit, dwells).astype(np.int64)
+
+        def routine(temp: Int32Array, raw: Int32Array) -> Answers:
+            state, flags = set_temperature(self.plan, temp.astype(np.int64), rates)
+            accel, more = apply(self.plan, state, raw.astype(np.int64))
+            return accel.astype(np.int32), (flags | more).astype(np.uint32)
+
+        source = self.fitted.measurements.source
+        tried = run_on_dwells(unit, calibration.thermal, source, dwells, {unit.method: routine})
+        return np.abs([r.error_g for r in tried[-1].residuals])
+
+
+def rate_codes(unit: UnitDescription, dwells: Sequence[Dwell]) -> Int32Array:
+    """dT/dt of the dwells in codes of the firmware, shape (n,)."""
+    code = unit.temperature_sensor.degc_per_code * 2.0**-RATE_Q
+    rates = np.rint([d.rate_k_per_s / code for d in dwells])
+    return rates.clip(-INT32_MAX, INT32_MAX).astype(np.int32)
 
 
 def make_firmware(fitted: Fitted) -> Firmware:
@@ -57,7 +121,7 @@ def make_firmware(fitted: Fitted) -> Firmware:
     plan = make_plan(compensation, unit)
     error_g = model_error_g(unit, calibration.thermal, plan)
     _refuse_model_error(unit, plan, error_g)
-    return Firmware(compensation, plan, error_g, _files(fitted, compensation, plan))
+    return Firmware(fitted, compensation, plan, error_g)
 
 
 def compensation_of(unit: UnitDescription, calibration: Calibration, method: str) -> Compensation:
@@ -72,23 +136,31 @@ def compensation_of(unit: UnitDescription, calibration: Calibration, method: str
     )
 
 
-def _files(fitted: Fitted, compensation: Compensation, plan: Plan) -> dict[str, bytes]:
+def _files(firmware: Firmware) -> dict[str, bytes]:
+    fitted, plan = firmware.fitted, firmware.plan
     unit, calibration = fitted.unit, fitted.calibration
     low, high = calibration.range_degc
     reading = calibration.reading_unit
-    method = METHODS[compensation.method].label
+    method = METHODS[firmware.compensation.method].label
     summary = (
         f"method {method}: {plan.shape.form} form, {low:g} to {high:g} degC",
         f"functions of order {plan.shape.order} on {plan.shape.segments} segment(s)",
-        f"thermal model: {calibration.shape.label}, bias estimator {calibration.estimator}",
+        f"thermal model: {calibration.shape.label}, {_fitted_to(calibration)}",
         f"raw code: {unit.adc.bits} bits for {unit.adc.full_scale_v:g} {reading} full scale",
         "code32 is a raw code left-justified to 32 bits",
         *_reading_note(unit, calibration),
+        *_constants_at_t0(calibration),
+        *_tested(firmware.verdict),
     )
-    provenance = Provenance(
-        unit.serial, fitted.inputs_sha256, (*summary, *_constants_at_t0(calibration))
-    )
+    provenance = Provenance(unit.serial, fitted.inputs_sha256, summary)
     return output_files(Job(plan, unit.temperature_sensor, provenance))
+
+
+def _fitted_to(calibration: Calibration) -> str:
+    """What the constants were fitted to, and how."""
+    if calibration.recording is None:
+        return f"bias estimator {calibration.estimator}"
+    return f"{len(calibration.recording.poses.poses)} poses, {calibration.recording.route}"
 
 
 def _reading_note(unit: UnitDescription, calibration: Calibration) -> tuple[str, ...]:
@@ -109,6 +181,12 @@ def _constants_at_t0(calibration: Calibration) -> list[str]:
         f"  {axis}  {K[i, 0]:+.9f} {K[i, 1]:+.9f} {K[i, 2]:+.9f}   {U0[i]:+.9f}"
         for i, axis in enumerate(AXES)
     ]
+
+
+def _tested(verdict: Verdict) -> list[str]:
+    """The verdict, and what was held against each limit."""
+    words = textwrap.wrap(f"verdict: {verdict.words}", _WIDTH, subsequent_indent="  ")
+    return [*words, *(f"  {line}" for line in table(verdict.heads, verdict.rows))]
 
 
 def _refuse_model_error(unit: UnitDescription, plan: Plan, error_g: float) -> None:

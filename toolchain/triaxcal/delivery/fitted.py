@@ -19,6 +19,7 @@ from triaxcal.delivery.coderange import settled_codes
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import PairTerms
+from triaxcal.fitting.recorded.acceptance import refuse_poses_beyond_limits
 from triaxcal.fitting.tilter.acceptance import refuse_unacceptable
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import (
@@ -163,6 +164,4 @@ def refuse_beyond_limits(fitted: Fitted) -> None:
         if fitted.unit.recording is None:  # faces that a hand has set are judged by their limits
             refuse_certain_fault(*parts)
         return
-    from triaxcal.fitting.route import refuse_poses_beyond_limits  # noqa: PLC0415
-
     refuse_poses_beyond_limits(fitted.unit, fitted.calibration)

@@ -1,141 +1,100 @@
-"""Whether a calibration keeps its unit's limits, and in which words that is said.
+"""Whether a calibration keeps its unit's limits.
 
 Three things are held against each limit: the residual at the fitted dwells, the error at what was
-held out, and the residual with the uncertainty of |a|. The first two refuse; the third decides
-whether the limit is shown to hold everywhere.
+held out, and the largest error with the uncertainty of |a|. The first two refuse. The third decides
+whether the unit has passed: where it reaches beyond a limit, the limit is not shown to hold.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import Fitted, refuse_beyond_limits
+from triaxcal.delivery.verdict import (
+    AT_DWELLS,
+    AT_POSES,
+    COMPONENTS,
+    HELD_OUT,
+    NOT_CHECKED,
+    NOT_SHOWN,
+    PASSED,
+    REFUSED,
+    RESIDUAL,
+    UNCERTAINTY,
+    LimitCheck,
+    Verdict,
+)
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.recorded.acceptance import held_out_errors
 from triaxcal.fitting.tilter.acceptance import dwell_errors_g, dwells_in_range, held_out_refusal
 from triaxcal.model.positions import CHECK_POSITIONS
+from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.limits import AT_T0, OVER_RANGE
 from triaxcal.unit.thermal import near_t0
 
-AT_T0, OVER_RANGE = "at T0", "over the range"
-RESIDUAL, HELD_OUT, UNCERTAINTY = "residual", "held out", "with uncertainty"
-
-
-@dataclass(frozen=True)
-class LimitCheck:
-    """One limit, and what was held against it.
-
-    Attributes
-    ----------
-    where : str
-        "at T0" or "over the range".
-    limit_g, largest_g : float
-        Limit, and the largest | |a| - g |.
-    dwells : int
-        How many; with none the limit was not tested, and `largest_g` is NaN.
-    what : str
-        "residual" of the fitted model at the dwells of the fit; "held out", at check dwells and
-        temperatures held out; "with uncertainty", the residual and the uncertainty (95 %) of |a|.
-    whole : bool
-        False where a source of the uncertainty is unknown: `largest_g` is without it.
-    """
-
-    where: str
-    limit_g: float
-    largest_g: float
-    dwells: int
-    what: str = RESIDUAL
-    whole: bool = True
-
-    @property
-    def held(self) -> bool:
-        """Whether the limit holds; what was not tested, or is not all known, does not."""
-        return self.whole and self.largest_g <= self.limit_g
-
-    def __str__(self) -> str:
-        what = f"{self.what} {self.where}"
-        if not self.dwells:
-            return f"{what}: not tested"
-        largest, limit = self.largest_g * 1e3, self.limit_g * 1e3
-        more = "" if self.whole else " and what is unknown"
-        words = f"{what}: {largest:.4g} mg{more}, limit {limit:g} mg"
-        return words if self.what == UNCERTAINTY else f"{words}, {self.dwells} dwells"
-
-
-@dataclass(frozen=True, repr=False)
-class Verdict:
-    """Whether a calibration may be delivered.
-
-    Attributes
-    ----------
-    passed : bool
-        Whether it may: no limit is missed by what was tested.
-    refusal : RefusedError or None
-        Why it did not pass: place, found, expected, remedy.
-    tested : tuple of LimitCheck
-        Residuals, then held-out errors, then residuals with their uncertainty; each at T0 and over
-        the range.
-    held_out_g : float or None
-        Rms error of the chosen functions on readings that their fit did not use.
-    checked : bool
-        Whether the readings could contradict the constants at all.
-    words : str
-        The verdict in words.
-    """
-
-    passed: bool
-    refusal: RefusedError | None
-    tested: tuple[LimitCheck, ...]
-    held_out_g: float | None
-    checked: bool
-    words: str
-
-    def __str__(self) -> str:
-        if self.refusal is not None:
-            return f"refused: {self.refusal}"
-        lines = [str(t) for t in self.tested]
-        if self.held_out_g is not None:
-            lines.append(f"held-out error: {self.held_out_g * 1e3:.4g} mg rms")
-        return "\n".join([self.words, *lines])
-
-    __repr__ = __str__
+if TYPE_CHECKING:
+    from triaxcal.uncertainty.evaluate import Uncertainty
 
 
 def judge(fitted: Fitted) -> Verdict:
-    """Verdict on a fitted model."""
-    from triaxcal.uncertainty.acceptance import length_uncertainty_g  # noqa: PLC0415
+    """Verdict on a fitted model; that of its firmware has the errors of the device besides."""
+    # Only a verdict before there is a firmware needs it here.
+    from triaxcal.uncertainty.evaluate import uncertainty  # noqa: PLC0415
 
-    refusal = None
+    unit, calibration = fitted.unit, fitted.calibration
+    dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
+    errors_g = dwell_errors_g(unit, calibration, dwells)
     try:
         refuse_beyond_limits(fitted)
-    except RefusedError as error:
-        refusal = error
-    calibration = fitted.calibration
-    checked = calibration.recording is None or calibration.recording.checked
-    tested = (*residual_checks(fitted), *held_out_checks(fitted))
-    if checked and refusal is None:
-        found, whole = length_uncertainty_g(fitted.unit, fitted.measurements, calibration)
-        residuals = _both(fitted.unit, UNCERTAINTY, _errors(fitted, checks=True))
-        tested += tuple(
-            replace(r, largest_g=r.largest_g + u, whole=whole)
-            for r, u in zip(residuals, found, strict=True)
-        )
+    except RefusedError as refusal:
+        tested = tuple(_tested(fitted, errors_g))
+        return Verdict(REFUSED, refusal, tested, (), _held_out_g(calibration))
+    found = uncertainty(unit, fitted.measurements, calibration, None)
+    return verdict_on(fitted, errors_g, found)
+
+
+def verdict_on(fitted: Fitted, errors_g: FloatArray, found: Uncertainty) -> Verdict:
+    """Verdict on what is not refused.
+
+    Parameters
+    ----------
+    errors_g : array, shape (n,)
+        | |a| - g | at the dwells in the working range, in their order.
+    found : Uncertainty
+    """
+    unit, calibration = fitted.unit, fitted.calibration
+    recording = calibration.recording
+    tested = tuple(_tested(fitted, errors_g))
+    if recording is not None and not recording.checked:
+        return Verdict(NOT_CHECKED, None, tested, (), _held_out_g(calibration))
+    tested += tuple(_with_uncertainty(fitted, errors_g, found))
+    untested = (*not_tested(unit, calibration), *_without_dwells(unit, tested))
+    unknown = [s for s in found.sources if s.unknown]
+    if not untested and unknown:
+        untested = tuple(f"{s.name} is unknown" for s in unknown)
+    result = PASSED
+    if untested:
+        result = AT_DWELLS if recording is None else AT_POSES
+    if any(t.beyond for t in tested if t.what == UNCERTAINTY):
+        result = NOT_SHOWN
+    note = _estimated(calibration)
+    return Verdict(result, None, tested, untested, _held_out_g(calibration), note)
+
+
+def _held_out_g(calibration: Calibration) -> float | None:
     chosen = next((c for c in calibration.candidates if c.chosen), None)
-    needed = limits_that_apply(fitted.unit, calibration.range_degc)
-    against = [t for t in tested if t.what == UNCERTAINTY and t.where in needed]
-    shown = all(t.held for t in against)
-    words = verdict_words(fitted.unit, calibration, checked=checked, shown=shown)
-    return Verdict(
-        refusal is None,
-        refusal,
-        tested,
-        None if chosen is None else chosen.held_out_g,
-        checked,
-        words if refusal is None else "refused",
-    )
+    return None if chosen is None else chosen.held_out_g
+
+
+def _places(unit: UnitDescription, range_degc: tuple[float, float]) -> dict[str, float]:
+    """Limits that hold at a temperature of the working range, in g, by where they do."""
+    limits = {AT_T0: unit.limits.at_t0_g, OVER_RANGE: unit.limits.over_range_g}
+    return {where: limits[where] for where in limits_that_apply(unit, range_degc)}
 
 
 def limits_that_apply(unit: UnitDescription, range_degc: tuple[float, float]) -> tuple[str, ...]:
@@ -147,85 +106,109 @@ def limits_that_apply(unit: UnitDescription, range_degc: tuple[float, float]) ->
     return (*([AT_T0] if at_t0 else []), *([OVER_RANGE] if others else []))
 
 
-def verdict_words(
-    unit: UnitDescription, calibration: Calibration, *, checked: bool, shown: bool
-) -> str:
-    """The verdict on what has not been refused: the same words on the terminal and everywhere.
-
-    `checked` is whether the readings could contradict the constants, `shown` whether the limits
-    hold with the uncertainty inside them.
-    """
-    if not checked:
-        return "not checked"
-    untested = not_tested(unit, calibration)
-    if untested:
-        return f"passed at the dwells; {untested}"
-    return "passed" if shown else "passed at the dwells, not shown everywhere"
-
-
-def not_tested(unit: UnitDescription, calibration: Calibration) -> str:
-    """What no reading outside the fit has tested, in words; empty where something has."""
+def not_tested(unit: UnitDescription, calibration: Calibration) -> tuple[str, ...]:
+    """What no reading outside the fit has tested, in words."""
     recording, test = calibration.recording, calibration.held_out
     if recording is not None:
         if not recording.tested:
-            return "not tested: nothing was held out"
+            return ("nothing was held out",)
         curved = calibration.shape.parameters > 1
-        return "between them not tested" if curved and not recording.tested_between else ""
-    if test is None:
+        return ("between the temperatures not tested",) * (curved and not recording.tested_between)
+    if test is None or test.between:
+        estimated = held_out_refusal(unit, calibration, "", 1.0) is not None
+        return ("between the temperatures estimated, not tested",) * estimated
+    one = len(calibration.points) == 1
+    return ("nothing was held out" if one else "between the temperatures not tested",)
+
+
+def _without_dwells(unit: UnitDescription, tested: Sequence[LimitCheck]) -> Iterator[str]:
+    """Limits that no dwell or pose of the range has tested."""
+    for check in tested:
+        if check.what == RESIDUAL and not check.dwells:
+            at = f" ({unit.t0_degc:g} degC)" if check.where == AT_T0 else ""
+            others = any(t.dwells for t in tested if t.where == check.where)
+            yield from () if others else (f"nothing measured {check.where}{at}",)
+
+
+def _estimated(calibration: Calibration) -> str:
+    """How the held-out error of curves that need every temperature was estimated."""
+    test = calibration.held_out
+    if test is None or test.worst is None or test.share == 1.0:
         return ""
-    if held_out_refusal(unit, calibration, "", 1.0) is not None:
-        return "between them estimated, not shown"
-    if test.between:
-        return ""
-    return "nothing was held out" if len(calibration.points) == 1 else "between them not tested"
-
-
-def residual_checks(fitted: Fitted) -> tuple[LimitCheck, ...]:
-    """Both limits against the dwells of the fit."""
-    return _both(fitted.unit, RESIDUAL, _errors(fitted, checks=False))
-
-
-def held_out_checks(fitted: Fitted) -> tuple[LimitCheck, ...]:
-    """Both limits against check dwells and the temperatures held out; none for a recording.
-
-    The latter show the curves between the calibrated temperatures: over the range, even at T0.
-    """
-    test = fitted.calibration.held_out
-    if test is None:
-        return ()
-    others = [test.share * abs(d.error_g) for d in test.dwells]
-    return _both(fitted.unit, HELD_OUT, _errors(fitted, fitted_too=False), others)
-
-
-def _errors(
-    fitted: Fitted, *, checks: bool = True, fitted_too: bool = True
-) -> list[tuple[float, float]]:
-    """Temperature and | |a| - g | of the dwells in the range, (degC, g)."""
-    unit, calibration = fitted.unit, fitted.calibration
-    dwells = [
-        d
-        for d in dwells_in_range(unit, calibration.range_degc, fitted.measurements)
-        if (checks if d.position in CHECK_POSITIONS else fitted_too)
-    ]
-    errors = dwell_errors_g(unit, calibration, dwells).tolist()
-    return list(zip([d.temp_degc for d in dwells], errors, strict=True))
-
-
-def _both(
-    unit: UnitDescription,
-    what: str,
-    found: Iterable[tuple[float, float]],
-    over_range: Iterable[float] = (),
-) -> tuple[LimitCheck, LimitCheck]:
-    """Errors at temperatures, (degC, g), held against the limit that holds there."""
-    errors: dict[bool, list[float]] = {True: [], False: [*over_range]}
-    for temp, error in found:
-        errors[near_t0(temp, unit.t0_degc)].append(error)
-    at_t0, others = (
-        LimitCheck(where, limit_g, max(own, default=np.nan), len(own), what)
-        for where, limit_g, own in (
-            (AT_T0, unit.limits.at_t0_g, errors[True]),
-            (OVER_RANGE, unit.limits.over_range_g, errors[False]),
-        )
+    return (
+        f"held out: without one temperature only a {test.function} is determined, and misses it "
+        f"by up to {abs(test.worst.error_g) * 1e3:.3g} mg; the delivered "
+        f"{calibration.shape.label} is estimated to miss by {test.share:.2g} of that, as the "
+        "error falls from order to order"
     )
-    return at_t0, others
+
+
+def _tested(fitted: Fitted, errors_g: FloatArray) -> Iterator[LimitCheck]:
+    """Residuals and held-out errors against the limits of their temperatures."""
+    unit, calibration = fitted.unit, fitted.calibration
+    for what, checks in ((RESIDUAL, False), (HELD_OUT, True)):
+        if checks and calibration.recording is not None:
+            yield from _of_recording(unit, calibration)
+            continue
+        found = _by_place(fitted, errors_g, checks=checks)
+        test = calibration.held_out
+        if checks and test is not None:
+            # They show the curves between the temperatures: over the range, even at T0.
+            found[OVER_RANGE] += [test.share * abs(d.error_g) for d in test.dwells]
+        for where, limit_g in _places(unit, calibration.range_degc).items():
+            own = found[where]
+            yield LimitCheck(where, limit_g, max(own, default=np.nan), len(own), what)
+    yield from _components(unit, calibration)
+
+
+def _by_place(
+    fitted: Fitted, errors_g: FloatArray, *, checks: bool | None
+) -> dict[str, list[float]]:
+    """Errors of test dwells, of check dwells, or (None) of all, by the limit that holds there."""
+    unit, calibration = fitted.unit, fitted.calibration
+    found: dict[str, list[float]] = {AT_T0: [], OVER_RANGE: []}
+    dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
+    for dwell, error in zip(dwells, errors_g.tolist(), strict=True):
+        if checks is None or checks == (dwell.position in CHECK_POSITIONS):
+            near = near_t0(dwell.temp_degc, unit.t0_degc)
+            found[AT_T0 if near else OVER_RANGE].append(error)
+    return found
+
+
+def _of_recording(unit: UnitDescription, calibration: Calibration) -> Iterator[LimitCheck]:
+    """Rms of |a| - g at held-out poses: the worst of what was held out in turn."""
+    assert calibration.recording is not None
+    errors = held_out_errors(unit, calibration.recording)
+    for where, limit_g in _places(unit, calibration.range_degc).items():
+        own = [e for e in errors if e.where == where and not e.components]
+        largest = max((e.rms_g for e in own), default=np.nan)
+        yield LimitCheck(where, limit_g, largest, sum(e.poses for e in own), HELD_OUT, rms=True)
+
+
+def _components(unit: UnitDescription, calibration: Calibration) -> Iterator[LimitCheck]:
+    """Rms error of a component of the force at what was held out, where its direction is known."""
+    found: list[tuple[str, float, int]] = []
+    test = calibration.held_out
+    if test is not None and test.rms_g is not None:
+        found.append((OVER_RANGE, test.share * test.rms_g, len(test.dwells)))
+    if calibration.recording is not None:
+        errors = held_out_errors(unit, calibration.recording)
+        found += [(e.where, e.rms_g, e.poses) for e in errors if e.components]
+    for where, limit_g in _places(unit, calibration.range_degc).items():
+        own = [(rms, count) for place, rms, count in found if place == where]
+        if own:
+            largest, count = max(own)[0], sum(count for _, count in own)
+            yield LimitCheck(where, limit_g, largest, count, COMPONENTS, rms=True)
+
+
+def _with_uncertainty(
+    fitted: Fitted, errors_g: FloatArray, found: Uncertainty
+) -> Iterator[LimitCheck]:
+    """The largest error at any dwell or pose, and the uncertainty (95 %) of |a| beside it."""
+    whole = not any(s.unknown for s in found.sources)
+    uncertain = dict(zip((AT_T0, OVER_RANGE), found.length_g, strict=True))
+    by_place = _by_place(fitted, errors_g, checks=None)
+    for where, limit_g in _places(fitted.unit, fitted.calibration.range_degc).items():
+        own = by_place[where]
+        largest = max(own, default=0.0) + uncertain[where]
+        yield LimitCheck(where, limit_g, largest, len(own), UNCERTAINTY, whole)

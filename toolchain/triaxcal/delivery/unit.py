@@ -6,13 +6,10 @@ Nothing is written here but in a temporary folder; `triaxcal.base.publish` puts 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from contextlib import ExitStack
 from ctypes import CDLL
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.compiler import Compilation, reference_under_way
@@ -29,16 +26,14 @@ from triaxcal.codegen.routines import (
     start_generated,
 )
 from triaxcal.codegen.tryout import MethodResult, run_on_dwells
-from triaxcal.delivery.firmware import Firmware, compensation_of, make_firmware
+from triaxcal.delivery.firmware import Firmware, compensation_of, make_firmware, rate_codes
 from triaxcal.delivery.fitted import Fitted, fit_folder, refuse_beyond_limits
+from triaxcal.delivery.verdict import Verdict
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.acceptance import dwells_in_range
-from triaxcal.fixedpoint.arithmetic import INT32_MAX
 from triaxcal.fixedpoint.plan import Plan, make_plan
-from triaxcal.fixedpoint.proof import Bound, prove
-from triaxcal.fixedpoint.rate import RATE_Q
+from triaxcal.fixedpoint.proof import Bound
 from triaxcal.model.methods.registry import METHODS
-from triaxcal.readings.measurements import Dwell
 from triaxcal.unit.description import UnitDescription, read_unit
 
 
@@ -49,8 +44,6 @@ class Delivery(Fitted):
     Attributes
     ----------
     firmware : Firmware
-    bound : Bound
-        Proven error of the arithmetic.
     check : CrossCheck
         Vectors on which three implementations agreed.
     methods : tuple of MethodResult
@@ -60,7 +53,6 @@ class Delivery(Fitted):
     """
 
     firmware: Firmware
-    bound: Bound
     check: CrossCheck
     methods: tuple[MethodResult, ...]
     compiler: str
@@ -79,6 +71,16 @@ class Delivery(Fitted):
     def model_error_g(self) -> float:
         """Largest error of the compensation against the fitted model."""
         return self.firmware.model_error_g
+
+    @property
+    def bound(self) -> Bound:
+        """Proven error of the arithmetic."""
+        return self.firmware.bound
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on the unit with its firmware."""
+        return self.firmware.verdict
 
     @property
     def files(self) -> dict[str, bytes]:
@@ -116,7 +118,7 @@ def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delive
             (work / file).write_bytes(content)
         compilation = start_generated(work, work)
         stack.callback(compilation.cancel)
-        bound = prove(plan)
+        bound = firmware.bound
         sets = vector_sets(plan)
         image = firmware.files[IMAGE_FILE]
         cases = image_cases(plan, image)
@@ -130,7 +132,7 @@ def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delive
         methods = _on_dwells(fitted, plan, ours, Reference(theirs))
         compiler = Generated(ours).compiler
     parts = unit, fitted.measurements, fitted.inputs_sha256, fitted.calibration
-    delivery = Delivery(*parts, firmware, bound, check, methods, compiler)
+    delivery = Delivery(*parts, firmware, check, methods, compiler)
     _refuse_beyond_limits(delivery)
     return delivery
 
@@ -141,18 +143,11 @@ def _on_dwells(
     """Residuals at the unit's own dwells: before, by the compiled C, and by the other methods."""
     unit, calibration = fitted.unit, fitted.calibration
     dwells = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
-    rates = _rate_codes(unit, dwells)
+    rates = rate_codes(unit, dwells)
     own = routines_of(plan.rate, generated, reference.library, rates)[0]
     routines = {unit.method: own.run, **_other_routines(unit, calibration, reference, rates)}
     source = fitted.measurements.source
     return run_on_dwells(unit, calibration.thermal, source, dwells, routines)
-
-
-def _rate_codes(unit: UnitDescription, dwells: Sequence[Dwell]) -> Int32Array:
-    """dT/dt of the dwells in codes of the firmware, shape (n,)."""
-    code = unit.temperature_sensor.degc_per_code * 2.0**-RATE_Q
-    rates = np.rint([d.rate_k_per_s / code for d in dwells])
-    return rates.clip(-INT32_MAX, INT32_MAX).astype(np.int32)
 
 
 def _other_routines(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,6 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.converter import as_converted, signs_of
 from triaxcal.fitting.core.calibration import Calibration
-from triaxcal.fitting.core.judged import TEMPERATURE
-from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.fitting.pair.cross_coupling import stated_pair
 from triaxcal.fitting.recorded.calibrate import calibrate_poses
 from triaxcal.fitting.recorded.faces import face_measurements
@@ -103,89 +101,4 @@ def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Sample
         f"a reading of {largest:.6g} {layout.acceleration_unit}, {largest / lsb:.0f} codes",
         expected=f"{adc.code_min} to {adc.code_max} codes of [adc]",
         remedy=f"set [adc] {wide}, or correct lsb, code_min and code_max",
-    )
-
-
-def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) -> None:
-    """P1 (13) at the poses and at held-out poses; the compiled C is checked again afterwards."""
-    recording = calibration.recording
-    if recording is None:
-        return
-    errors = recording.residual_g
-    poses = recording.poses.poses
-    temps = [unit.t0_degc if p.temp_degc is None else p.temp_degc for p in poses]
-    limits = np.array([unit.limits.at(t, unit.t0_degc)[0] for t in temps])
-    worst = int((np.abs(errors) / limits).argmax())
-    if abs(errors[worst]) <= limits[worst]:
-        _refuse_held_out(unit, recording, temps)
-        return
-    pose = poses[worst]
-    key = unit.limits.at(temps[worst], unit.t0_degc)[1]
-    raise RefusedError(
-        f"{recording.poses.source}, line {pose.line}",
-        f"| |a| - g | = {abs(errors[worst]) * 1e3:.4g} mg in pose {pose.number}, rms over "
-        f"the poses {recording.rms_g * 1e3:.3g} mg",
-        expected=f"at most {limits[worst] * 1e3:g} mg ({key})",
-        remedy="check that pose with `triaxcal poses`; if it is good, state the limit that "
-        "this sensor keeps",
-    )
-
-
-@dataclass(frozen=True)
-class _Missed:
-    """Poses held out that have one limit in common: their rms error, and the worst of them."""
-
-    what: str
-    limit_g: float
-    key: str
-    rms_g: float
-    worst: int
-    error_g: float
-
-
-def _held_out_groups(
-    unit: UnitDescription, recording: RecordingFit, temps: Sequence[float]
-) -> list[_Missed]:
-    """Held-out errors by the limit of their pose; temperatures held out have that over the range.
-
-    The latter show the curves between the calibrated temperatures, as those of a tilter do.
-    """
-    found = []
-    for held in recording.held_out:
-        over = unit.limits.over_range_g, "limits.over_range_g"
-        own = [
-            over if held.what == TEMPERATURE else unit.limits.at(temps[k], unit.t0_degc)
-            for k in held.poses
-        ]
-        for limit_g, key in sorted(set(own)):
-            at = [n for n, limit in enumerate(own) if limit == (limit_g, key)]
-            errors = np.abs(held.error_g[at])
-            worst = int(errors.argmax())
-            rms = float(np.sqrt(np.mean(errors**2)))
-            found.append(
-                _Missed(held.what, limit_g, key, rms, held.poses[at[worst]], float(errors[worst]))
-            )
-    return found
-
-
-def _refuse_held_out(
-    unit: UnitDescription, recording: RecordingFit, temps: Sequence[float]
-) -> None:
-    """Refuse an error at unseen poses that is beyond the limit, whatever the residual is."""
-    groups = _held_out_groups(unit, recording, temps)
-    missed = max(groups, key=lambda m: m.rms_g / m.limit_g, default=None)
-    if missed is None or missed.rms_g <= missed.limit_g:
-        return
-    pose = recording.poses.poses[missed.worst]
-    at = "" if pose.temp_degc is None else f" at {pose.temp_degc:.4g} degC"
-    remedy = "record more poses, in different orientations"
-    if missed.what == TEMPERATURE:
-        remedy = "record poses at more temperatures, or choose another function in [thermal]"
-    raise RefusedError(
-        f"{recording.poses.source}, line {pose.line}",
-        f"| |a| - g | = {missed.rms_g * 1e3:.4g} mg rms at held-out poses, with each "
-        f"{missed.what} held out in turn; the largest is {missed.error_g * 1e3:.4g} mg in pose "
-        f"{pose.number}{at}; the fit's residual is {recording.rms_g * 1e3:.3g} mg rms",
-        expected=f"at most {missed.limit_g * 1e3:g} mg ({missed.key})",
-        remedy=f"{remedy}; `triaxcal poses` shows those that there are",
     )

@@ -130,9 +130,11 @@ def _statements(data: ET.Element, p: Passport) -> None:
         found = (
             f"largest at the dwells {limit.largest_g:.3g} g, expanded uncertainty of |a| "
             f"{limit.uncertainty_g:.3g} g ({LEVEL:.0%}), main source {limit.cause}{unknown}"
+            f"{''.join(f'; {words}' for words in p.verdict.not_tested)}"
         )
         _text(statement, "declaration", found)
-        _add(statement, "conformity", "pass" if limit.shown and not unknown else "conditionalPass")
+        whole = limit.shown and not unknown and not p.verdict.not_tested
+        _add(statement, "conformity", "pass" if whole else "conditionalPass")
 
 
 def _measurement_results(root: ET.Element, p: Passport) -> None:

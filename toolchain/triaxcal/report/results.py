@@ -18,6 +18,7 @@ def verification_json(delivery: Delivery) -> bytes:
     lsb_g = 2.0**-plan.shape.output_q
     document = {
         **header(delivery),
+        "verdict": delivery.verdict.words,
         "compiler": delivery.compiler,
         "compiler_flags": list(FLAGS),
         "shape": shape_id(plan),

@@ -99,6 +99,12 @@ class Uncertainty:
         result: FloatArray = self.force_u.max(axis=1)
         return result
 
+    @property
+    def length_g(self) -> tuple[float, float]:
+        """Expanded uncertainty (95 %) of |a| at T0 and over the range, worst orientation, in g."""
+        length = self.force_u[:, :, LENGTH]
+        return float(length[self.t0_index].max()), float(length.max())
+
     def _of_constants(self) -> list[Source]:
         return [s for s in self.sources if s.constants is not None]
 

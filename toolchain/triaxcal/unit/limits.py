@@ -8,6 +8,10 @@ from triaxcal.base.keys import TableKeys, setting
 from triaxcal.base.kinds import number
 from triaxcal.unit.thermal import near_t0
 
+AT_T0, OVER_RANGE = "at T0", "over the range"
+"""Where each of both limits holds, in words."""
+WHERE = {"limits.at_t0_g": AT_T0, "limits.over_range_g": OVER_RANGE}
+
 _OF_A_RECORDING = {"default": 0.02}
 """g. The limits of P1 (13) are those of a navigation accelerometer."""
 

@@ -25,24 +25,34 @@ class HeldOutPoses:
     poses : tuple of int
         Indices of the poses.
     error_g : array, shape (n,)
+    component_g : array, shape (n,), or None
+        Rms error of the three components of the force, where their directions are known.
     """
 
     what: str
     poses: tuple[int, ...]
     error_g: FloatArray
+    component_g: FloatArray | None = None
 
 
 def held_out_poses(
-    errors_g: FloatArray | None, turns: Iterable[tuple[str, Sequence[BoolArray]]]
+    errors_g: FloatArray | None,
+    turns: Iterable[tuple[str, Sequence[BoolArray]]],
+    components_g: FloatArray | None = None,
 ) -> tuple[HeldOutPoses, ...]:
-    """Errors in the order of the turns as those of poses; masks are of the poses judged."""
+    """Errors in the order of the turns as those of poses; masks are of the poses judged.
+
+    `components_g` are rms errors of the components, in the same order.
+    """
     found: list[HeldOutPoses] = []
     start = 0
     for what, masks in turns:
         if errors_g is None or not masks:
             continue
         poses = tuple(int(k) for mask in masks for k in np.flatnonzero(mask))
-        found.append(HeldOutPoses(what, poses, errors_g[start : start + len(poses)]))
+        own = slice(start, start + len(poses))
+        of_components = None if components_g is None else components_g[own]
+        found.append(HeldOutPoses(what, poses, errors_g[own], of_components))
         start += len(poses)
     return tuple(found)
 

@@ -207,7 +207,7 @@ def _calibration(
         covariance = full.covariance
         terms = TermsCovariance(full.quadratic_covariance, full.cross)
         dof = max(1, 3 * len(temps) - round(float(full.effective.sum())))
-    held_out = _held_out_lengths(best, known, unit.gravity_g)
+    held_out = _held_out(best, known, unit.gravity_g)
     recording = RecordingFit(
         poses=poses,
         route="angles of a table known",
@@ -238,17 +238,15 @@ def _calibration(
     )
 
 
-def _held_out_lengths(
-    best: TableRow, known: TablePoses, gravity_g: float
-) -> tuple[HeldOutPoses, ...]:
-    """|a| - g of each pose held out in turn, and of the poses of each inner temperature."""
+def _held_out(best: TableRow, known: TablePoses, gravity_g: float) -> tuple[HeldOutPoses, ...]:
+    """|a| - g and components of each pose held out in turn, and of each inner temperature."""
     if best.errors_g is None:
         return ()
     masks, count = turns(known, temperature_groups(known.temps_degc)), len(known.force)
     force = np.concatenate([known.force[mask] for mask in masks]) + best.errors_g
     lengths = np.linalg.norm(force, axis=1) - gravity_g
     kinds = ((ORIENTATION, masks[:count]), (TEMPERATURE, masks[count:]))
-    return held_out_poses(lengths, kinds)
+    return held_out_poses(lengths, kinds, np.sqrt(np.mean(best.errors_g**2, axis=1)))
 
 
 def _covariance(best: TableRow, known: TablePoses) -> tuple[FloatArray, TermsCovariance]:

@@ -11,17 +11,11 @@ import numpy as np
 
 from triaxcal.codegen.tryout import Residual
 from triaxcal.delivery.causes import DOUBT, causes_of
-from triaxcal.delivery.judgement import (
-    LimitCheck,
-    held_out_checks,
-    limits_that_apply,
-    residual_checks,
-    verdict_words,
-)
+from triaxcal.delivery.judgement import limits_that_apply
 from triaxcal.delivery.unit import Delivery
+from triaxcal.delivery.verdict import UNCERTAINTY, Verdict, worst
 from triaxcal.uncertainty.budget import Budget
-from triaxcal.uncertainty.device_sources import Device
-from triaxcal.uncertainty.evaluate import LENGTH, Uncertainty, uncertainty
+from triaxcal.uncertainty.evaluate import LENGTH, Uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
 from triaxcal.unit.thermal import near_t0
 
@@ -73,8 +67,17 @@ class Passport:
     """
 
     delivery: Delivery
-    uncertainty: Uncertainty
     tools: Mapping[str, Any]
+
+    @property
+    def uncertainty(self) -> Uncertainty:
+        """Of the unit with its firmware."""
+        return self.delivery.firmware.uncertainty
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of the unit with its firmware."""
+        return self.delivery.verdict
 
     @cached_property
     def constant_budgets(self) -> tuple[Budget, ...]:
@@ -129,54 +132,26 @@ class Passport:
         needed = limits_that_apply(self.delivery.unit, self.delivery.calibration.range_degc)
         return tuple(where for where in needed if where not in checked)
 
-    @property
-    def shown(self) -> bool:
-        """Whether both limits hold with the uncertainty inside them, and nothing is unknown."""
-        checked = all(a.shown for a in self.acceptance) and not self.unchecked
-        return checked and not self.length_budget.unknown
-
-    @property
-    def words(self) -> str:
-        """The verdict in words."""
-        done = self.delivery
-        return verdict_words(done.unit, done.calibration, checked=self.checked, shown=self.shown)
-
-    @property
-    def held_out(self) -> tuple[LimitCheck, ...]:
-        """Both limits against what was held out; none for a recording."""
-        return held_out_checks(self.delivery)
-
     @cached_property
     def cause(self) -> str:
         """What would explain the readings, where a dwell is beyond half of its limit; else ""."""
         done = self.delivery
-        tested = (*residual_checks(done), *held_out_checks(done))
-        if done.calibration.recording is not None or not any(
-            t.largest_g > DOUBT * t.limit_g for t in tested
-        ):
+        errors = [t for t in self.verdict.tested if t.what != UNCERTAINTY]
+        if done.calibration.recording is not None or worst(errors) <= DOUBT:
             return ""
         found = causes_of(done.unit, done.measurements, done.calibration)
         return found.sentence if found.doubtful else ""
 
     @property
-    def checked(self) -> bool:
-        """Whether the data show the uncertainty of the constants."""
-        recording = self.delivery.calibration.recording
-        return recording is None or recording.checked
-
-    @property
     def tested(self) -> bool:
         """Whether readings that the fit did not use could contradict it."""
         recording = self.delivery.calibration.recording
-        return self.checked and (recording is None or recording.tested)
+        return self.verdict.checked and (recording is None or recording.tested)
 
 
 def passport(delivery: Delivery, tools: Mapping[str, Any]) -> Passport:
     """Passport of a delivery; `tools` is the section of that name in verification.json."""
-    bound = delivery.bound.per_axis_lsb
-    device = Device(delivery.plan.shape.output_q, bound, delivery.model_error_g)
-    found = uncertainty(delivery.unit, delivery.measurements, delivery.calibration, device)
-    return Passport(delivery, found, tools)
+    return Passport(delivery, tools)
 
 
 def _acceptance(

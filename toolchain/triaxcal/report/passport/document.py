@@ -30,7 +30,21 @@ def passport_json(p: Passport) -> bytes:
         "inputs_sha256": d.inputs_sha256,
         "coverage_probability": LEVEL,
         **({"inputs": list(d.calibration.inputs)} if d.calibration.inputs else {}),
-        "result": p.words,
+        "result": p.verdict.result,
+        "verdict": p.verdict.words,
+        "not_tested": list(p.verdict.not_tested),
+        "tested": [
+            {
+                "where": t.where,
+                "what": t.what,
+                "limit_g": t.limit_g,
+                "largest_g": t.largest_g if t.dwells else None,
+                "rms": t.rms,
+                "dwells": t.dwells,
+                "all_known": t.whole,
+            }
+            for t in p.verdict.tested
+        ],
         "acceptance": [
             {
                 "where": a.where,
@@ -42,15 +56,6 @@ def passport_json(p: Passport) -> bytes:
                 "worst_source": a.cause,
             }
             for a in p.acceptance
-        ],
-        "held_out": [
-            {
-                "where": h.where,
-                "limit_g": h.limit_g,
-                "largest_g": h.largest_g if h.dwells else None,
-                "dwells": h.dwells,
-            }
-            for h in p.held_out
         ],
         "limits_without_dwells": list(p.unchecked),
         "constants_at_t0": [

@@ -7,6 +7,7 @@ from typing import Any
 from triaxcal import __version__
 from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import MethodResult
+from triaxcal.delivery.verdict import NOT_CHECKED, NOT_SHOWN, PASSED, Verdict
 from triaxcal.fitting.converter import input_words
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
@@ -43,17 +44,9 @@ def passport_html(p: Passport) -> bytes:
     """HTML of a passport: no network, no clock, no script."""
     context = {
         "identity": _identity(p),
-        "shown": p.shown,
-        "checked": p.checked,
-        "limits_of_words": p.words.removeprefix("passed at the dwells").strip(",; "),
-        "held_out": [
-            f"Held out, {h.where}: | |a| − g | up to {g_in_words(h.largest_g)} of "
-            f"{g_in_words(h.limit_g)}, {h.dwells} dwells"
-            for h in p.held_out
-            if h.dwells
-        ]
-        or _nothing_held_out(p),
-        "acceptance": [_acceptance(a, checked=p.checked) for a in p.acceptance],
+        "badge": _badge(p.verdict),
+        "verdict": p.verdict,
+        "acceptance": [_acceptance(a, checked=p.verdict.checked) for a in p.acceptance],
         "unchecked": p.unchecked,
         "warnings": (*p.uncertainty.warnings, *_findings(p)),
         "constants": _constants(p),
@@ -76,6 +69,21 @@ def passport_html(p: Passport) -> bytes:
         "files": file_rows(p.delivery.files),
     }
     return environment().get_template("pages/passport.html.j2").render(context).encode()
+
+
+def _badge(verdict: Verdict) -> dict[str, Any]:
+    """The verdict in large letters, and what it leaves open."""
+    why = "; ".join(verdict.not_tested) or "see below"
+    small = {
+        PASSED: "residual, held-out error and uncertainty are within the limits",
+        NOT_SHOWN: "the uncertainty reaches beyond a limit",
+        NOT_CHECKED: "as many constants as poses",
+    }
+    return {
+        "good": verdict.shown,
+        "result": verdict.result.upper(),
+        "small": small.get(verdict.result, why),
+    }
 
 
 def _identity(p: Passport) -> dict[str, Any]:
@@ -110,12 +118,6 @@ def _left_out(calibration: Calibration) -> list[tuple[str, str]]:
     rms = calibration.recording.left_out_length_g
     words = "none: not tested" if rms is None else f"|a| − g {g_in_words(rms)} rms"
     return [("Held-out poses", words)]
-
-
-def _nothing_held_out(p: Passport) -> list[str]:
-    """Said of what was not tested; a recording's held-out poses stand in the head of the page."""
-    recording = p.delivery.calibration.recording
-    return [] if recording is not None and recording.tested else ["Nothing was held out"]
 
 
 def _findings(p: Passport) -> tuple[str, ...]:
@@ -157,7 +159,7 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
         name = p.uncertainty.units[c]
         scale, unit = (1e3, f"m{name}") if name.startswith("V") else (1.0, name)
         value, expanded = with_uncertainty(float(at_t0[c]), budget.expanded, scale)
-        if not p.checked:
+        if not p.verdict.checked:
             expanded = "unknown"
         worst = budget.worst
         rows.append(

@@ -18,13 +18,16 @@ from triaxcal.batch.statistics import (
     Outlier,
     Quantity,
     Run,
+    alike,
     outlier_factor,
     outliers,
     quantities,
     runs,
 )
 from triaxcal.codegen.templates import environment
+from triaxcal.delivery.verdict import PASSED
 from triaxcal.report.pictures.series import BASE, HEIGHT, WIDTH, drift, histogram
+from triaxcal.report.series.results import results
 
 PAGE_FILE, JSON_FILE = "series.html", "series.json"
 FORMAT = 1
@@ -35,18 +38,25 @@ MOST_ROWS = 30
 def series_files(series: Series) -> dict[str, bytes]:
     """The page, and the same as JSON; no clock in them."""
     records = series.records
-    found = quantities(records) if records else []
-    far, by_run = outliers(records, found), runs(records) if records else []
+    groups = [(group, quantities(group)) for group in alike(records)]
+    far = [o for group, found in groups for o in outliers(group, found)]
+    by_run = [r for group, _ in groups for r in runs(group)]
+    verdicts = results(series)
     context = {
         "version": __version__,
         "total": len(records) + len(series.refused),
-        "passed": len(records),
-        "shown": sum(bool(r["shown"]) for r in records),
+        "made": len(records),
+        "passed": dict(verdicts)[PASSED],
+        "verdicts": [{"result": result, "units": count} for result, count in verdicts if count],
+        "others": [
+            {"unit": r["unit"], "words": r["verdict"]} for r in records if r["result"] != PASSED
+        ][:MOST_ROWS],
+        "more_others": max(0, sum(r["result"] != PASSED for r in records) - MOST_ROWS),
         "refusals": [
             {"unit": name, "why": why} for name, why in sorted(series.refused.items())[:MOST_ROWS]
         ],
         "more_refusals": max(0, len(series.refused) - MOST_ROWS),
-        "yield": _percent(len(records), len(records) + len(series.refused)),
+        "yield": _percent(dict(verdicts)[PASSED], len(records) + len(series.refused)),
         "models": Counter(r["thermal_model"] for r in records).most_common(),
         "sources": Counter(r["worst_source"] for r in records).most_common(),
         "acceptance": [_acceptance(records, w) for w in ("at T0", "over the range") if records],
@@ -54,36 +64,48 @@ def series_files(series: Series) -> dict[str, bytes]:
         "width": WIDTH,
         "height": HEIGHT,
         "base": BASE,
-        "constants": [found[k : k + 3] for k in range(0, len(found), 3)],
-        "histograms": [histogram(q, records, far) for q in found],
+        "groups": [
+            {
+                "unit": group[0]["reading_unit"],
+                "units": len(group),
+                "histograms": [histogram(q, group, far) for q in found],
+            }
+            for group, found in groups
+        ],
         "outliers": [
             {**asdict(o), "value": f"{o.value:.6g}", "spreads": _spreads(o)}
             for o in far[:MOST_ROWS]
         ],
         "more_outliers": max(0, len(far) - MOST_ROWS),
-        "factor": f"{outlier_factor(len(records), 36):.2f}" if records else "",
-        "enough": len(records) >= FEWEST_UNITS,
+        "factor": f"{outlier_factor(len(groups[0][0]), 36):.2f}" if records else "",
+        "enough": bool(groups) and len(groups[0][0]) >= FEWEST_UNITS,
         "fewest": FEWEST_UNITS,
         "runs": [_run(r) for r in by_run[:60]],
         "more_runs": max(0, len(by_run) - 60),
         "drift": drift(by_run),
     }
     page = environment().get_template("pages/series.html.j2").render(context)
-    return {PAGE_FILE: page.encode(), JSON_FILE: _json(series, found, far, by_run)}
+    return {PAGE_FILE: page.encode(), JSON_FILE: _json(series, groups, far, by_run)}
 
 
 def _json(
-    series: Series, found: Sequence[Quantity], far: Sequence[Outlier], by_run: Sequence[Run]
+    series: Series,
+    groups: Sequence[tuple[list[dict[str, Any]], list[Quantity]]],
+    far: Sequence[Outlier],
+    by_run: Sequence[Run],
 ) -> bytes:
     document = {
         "format": FORMAT,
         "triaxcal": __version__,
         "units": len(series.records) + len(series.refused),
-        "passed": len(series.records),
+        "made": len(series.records),
+        "passed": dict(results(series))[PASSED],
+        "verdicts": dict(results(series)),
         "refused": dict(sorted(series.refused.items())),
         "distributions": [
             {
                 "quantity": q.name,
+                "units": len(group),
                 "unit": q.unit,
                 "median": q.median,
                 "spread": q.spread,
@@ -92,6 +114,7 @@ def _json(
                 "min": float(q.values.min()),
                 "max": float(q.values.max()),
             }
+            for group, found in groups
             for q in found
         ],
         "outliers": [

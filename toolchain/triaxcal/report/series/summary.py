@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from triaxcal.batch.run import Series
-from triaxcal.batch.statistics import outliers, quantities, runs
+from triaxcal.batch.statistics import alike, outliers, quantities, runs
+from triaxcal.report.series.results import results
 
 
 def series_summary(series: Series, kept: int, seconds: float, workers: int, where: str) -> str:
     """Yield, rate, outliers, drift and where the page is."""
     records = series.records
     total = len(records) + len(series.refused)
-    lines = [f"{'series':<16}{total} units: {len(records)} passed, {len(series.refused)} refused"]
+    verdicts = [f"{count} {result}" for result, count in results(series)]
+    lines = [f"{'series':<16}{total} units: {', '.join(verdicts)}"]
     made = f"{series.made} units"
     if series.made:
         rate = 60.0 * series.made / seconds
@@ -18,11 +20,11 @@ def series_summary(series: Series, kept: int, seconds: float, workers: int, wher
     if kept:
         made += f"; {kept} were done and unchanged"
     lines.append(f"{'made':<16}{made}")
-    far = outliers(records, quantities(records)) if records else []
+    far = [o for group in alike(records) for o in outliers(group, quantities(group))]
     names = list(dict.fromkeys(o.unit for o in far))
     if names:
         lines.append(f"{'outliers':<16}{', '.join(names)}")
-    drifted = [r for r in (runs(records) if records else []) if r.told]
+    drifted = [r for group in alike(records) for r in runs(group) if r.told]
     if drifted:
         worst = max(drifted, key=lambda r: r.z)
         lines.append(
