@@ -12,6 +12,7 @@ from test_recordings import calibrated
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import fit_folder
+from triaxcal.delivery.judgement import judge
 from triaxcal.fitting.core.judged import ORIENTATION, TEMPERATURE, HeldOutPoses
 from triaxcal.fitting.recorded.acceptance import refuse_poses_beyond_limits
 from triaxcal.model.metrological import force_from_voltage
@@ -119,3 +120,33 @@ def test_a_held_out_error_beyond_the_limit_is_refused(tmp_path: Path) -> None:
         assert f"{what} held out in turn; the largest is 600 mg in pose {pose.number}" in str(
             caught.value
         )
+
+
+def test_a_component_beyond_the_limit_at_held_out_poses_is_refused(tmp_path: Path) -> None:
+    """Stated directions 2 deg off, at random: |a| cannot show 35 mg across gravity."""
+    random = np.random.default_rng(3)
+    stated = np.cross(DIRECTIONS, random.standard_normal(DIRECTIONS.shape))
+    stated = DIRECTIONS + np.radians(2.0) * stated / np.linalg.norm(stated, axis=1, keepdims=True)
+    stated /= np.linalg.norm(stated, axis=1, keepdims=True)
+    keys = (
+        'rows = "poses"\nacceleration = ["ax", "ay", "az"]\nacceleration_unit = "m/s^2"\n'
+        'direction = ["dx", "dy", "dz"]'
+    )
+    readings = DIRECTIONS * 9.80665 + 1e-3 * random.standard_normal(DIRECTIONS.shape)
+    header = "ax,ay,az,dx,dy,dz"
+    sound = write_unit(tmp_path / "S", np.hstack([readings, DIRECTIONS]), keys, header=header)
+    folder = write_unit(tmp_path / "U", np.hstack([readings, stated]), keys, header=header)
+    done = fit_folder(read_unit(sound), sound)
+    refuse_poses_beyond_limits(done.unit, done.calibration)
+    found = judge(done)
+    (component,) = [t for t in found.tested if t.what == "held out, a component"]
+    assert component.rms
+    # 1 mm/s^2 of noise a component, a little more with the constants of the other poses.
+    assert 0.8e-4 < component.largest_g < 2e-4
+    wrong = fit_folder(read_unit(folder), folder)
+    with pytest.raises(RefusedError) as caught:
+        refuse_poses_beyond_limits(wrong.unit, wrong.calibration)
+    text = str(caught.value)
+    assert "a component of the force is off by" in text
+    assert "expected at most 20 mg (limits.at_t0_g)" in text
+    assert "check the stated angles or directions of that pose" in text
