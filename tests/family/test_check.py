@@ -153,6 +153,26 @@ def test_a_file_that_is_not_there(build: Path) -> None:
         main.main(["check", unit, "--build", str(build), "--on", "no.csv"], standalone_mode=False)
 
 
+def test_a_delivered_folder_or_its_file_is_enough(build: Path, tmp_path: Path) -> None:
+    generated = tmp_path / "generated"
+    shutil.copytree(build / "U", generated)
+    path = file_of(tmp_path, directions(8, seed=4))
+    for given in (generated, generated / "calibration.json"):
+        done = CliRunner().invoke(main, ["check", str(given), "--on", str(path)])
+        assert done.exit_code == 0, done.output
+        assert "passed" in done.output
+    told = "a file; expected a unit, a delivered folder or its calibration.json"
+    with pytest.raises(RefusedError, match=told):
+        main.main(["check", str(path), "--on", str(path)], standalone_mode=False)
+
+
+def test_columns_of_another_logger_ask_for_its_layout(build: Path, tmp_path: Path) -> None:
+    path = file_of(tmp_path, directions(8, seed=4))
+    path.write_text(path.read_text().replace("t,ax,ay,az", "time,X,Y,Z"))
+    with pytest.raises(RefusedError, match=r"no column 't'.*another form needs its own layout"):
+        triaxcal.load(build / "U" / "calibration.json").check(path)
+
+
 def test_one_pose_cannot_tell_why(cal: triaxcal.Calibration) -> None:
     found = cal.check(columns(directions(1), bias=U0 + K @ [0.0, 0.0, 0.1])).result
     assert not found.passed

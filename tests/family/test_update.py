@@ -251,6 +251,24 @@ def test_calib_keeps_an_update_that_it_replaces(top: Path, tmp_path: Path) -> No
     assert "Repeatability: unknown" in history.summary
 
 
+def test_a_delivered_folder_is_updated_without_the_unit(top: Path, tmp_path: Path) -> None:
+    generated = tmp_path / "generated"
+    shutil.copytree(top / "build" / "U", generated)
+    before = (generated / "calibration.json").read_bytes()
+    path = recorded(tmp_path, directions(6))
+    given = ["update", str(generated / "calibration.json"), "--with", str(path)]
+    done = CliRunner().invoke(main, given)
+    assert done.exit_code == 0, done.output
+    sha = json.loads(before)["inputs_sha256"][:8]
+    assert (tmp_path / f"generated.{sha}" / "calibration.json").read_bytes() == before
+    cal = triaxcal.load(generated / "calibration.json")
+    assert error_mg(cal.constants(20.0)) < 0.4
+    into = tmp_path / "out"
+    more = recorded(tmp_path, directions(6), bias=DRIFTED + K @ [3e-3, 0.0, 0.0], seed=33)
+    triaxcal.update(generated, more, into=into)
+    assert (into / "U" / "triax_calib.bin").is_file()
+
+
 def test_a_result_prints_as_its_text(cal: triaxcal.Calibration, tmp_path: Path) -> None:
     found = cal.update(recorded(tmp_path, directions(6)))
     assert str(found) == found.summary

@@ -12,6 +12,7 @@ from triaxcal.codegen.compiler import Compilation, reference_under_way
 
 if TYPE_CHECKING:
     from triaxcal.api.calibration import Calibration
+    from triaxcal.api.field import Updated
     from triaxcal.api.imu import ImuCalibration
 
 
@@ -144,12 +145,13 @@ def update(
     Parameters
     ----------
     folder : path
-        Of the unit, whose calibration is in the folder of its name below `build`.
+        Of the unit, whose calibration is in the folder of its name below `build`; or a delivered
+        folder, or its calibration.json: nothing else of the unit is needed.
     recorded : path
         Recording of one still pose or more, in the layout of the unit.
     build : path
-        The files there are replaced, all or none; those before are kept beside them in a folder of
-        the unit's name and the first eight digits of their inputs_sha256.
+        The delivered files are replaced, all or none; those before are kept beside them in a folder
+        of the same name and the first eight digits of their inputs_sha256.
     into : path or None
         Folder that receives a folder of the unit's name instead.
     layout : path or None
@@ -165,8 +167,21 @@ def update(
         When there is no calibration, the recording has no still pose or contradicts it, or the
         result is refused; nothing is written then.
     """
-    from triaxcal.api.calibration import Calibration, load  # noqa: PLC0415
+    from triaxcal.api.calibration import load  # noqa: PLC0415
     from triaxcal.api.field import bring_up_to_date  # noqa: PLC0415
+
+    source = delivered_file(Path(folder), Path(build))
+    done = load(source).fitted
+    drift = bias_drift_mg, scale_drift_ppm, axes_drift_micro_rad
+    made = bring_up_to_date(done, recorded, layout, gravity_m_per_s2, drift)
+    target = source.parent if into is None else Path(into) / done.unit.name
+    before = done.inputs_sha256[:8]
+    kept = target.with_name(f"{target.name}.{before}") if into is None else None
+    return _deliver_update(made, target, kept)
+
+
+def _deliver_update(made: Updated, target: Path, kept: Path | None) -> Delivered:
+    from triaxcal.api.calibration import Calibration  # noqa: PLC0415
     from triaxcal.api.unit import Unit  # noqa: PLC0415
     from triaxcal.base.publish import publish_beside  # noqa: PLC0415
     from triaxcal.delivery.saved import Saved  # noqa: PLC0415
@@ -176,27 +191,24 @@ def update(
     from triaxcal.report.summary import summary  # noqa: PLC0415
     from triaxcal.report.update import update_text  # noqa: PLC0415
 
-    name, unit = Path(folder).absolute().name, Path(folder)
-    done = load(delivered_file(unit, Path(build))).fitted
-    drift = bias_drift_mg, scale_drift_ppm, axes_drift_micro_rad
-    made = bring_up_to_date(done, recorded, layout, gravity_m_per_s2, drift)
     with reference_under_way() as reference:
         delivery = deliver_fitted(made.fitted, reference)
     page = passport(delivery, {})
     files = all_files(delivery, page)
-    target = Path(build if into is None else into) / name
-    kept = target.with_name(f"{name}.{done.inputs_sha256[:8]}") if into is None else None
     publish_beside(files, target, kept, SOMETIMES)
-    changed = update_text(done.unit.serial, made.found, done.calibration)
+    changed = update_text(delivery.unit.serial, made.found, made.before.calibration)
     text = f"{changed}\n\n{summary(page, files, str(target))}"
     if kept is not None:
         text += f"\n\nthe files before are kept in {kept}/"
-    calibration = Calibration(Unit.of(delivery.unit, unit), Saved.of(delivery))
+    calibration = Calibration(Unit.of(delivery.unit, None), Saved.of(delivery))
     return Delivered(target, tuple(files), calibration, text)
 
 
 def delivered_file(unit: Path, build: Path) -> Path:
     """calibration.json that was delivered for a unit.
+
+    `unit` is its folder, a delivered folder or the file itself. The folder of the unit need not be
+    there: what was delivered is whole.
 
     Raises
     ------
@@ -205,16 +217,22 @@ def delivered_file(unit: Path, build: Path) -> Path:
     """
     from triaxcal.unit.folder import find_unit  # noqa: PLC0415
 
-    find_unit(unit)
-    path = build / unit.absolute().name / "calibration.json"
-    if not path.is_file():
+    name = "calibration.json"
+    path = build / unit.absolute().name / name
+    if unit.is_file() and unit.suffix != ".json":
         raise RefusedError(
-            str(path),
-            "no such file",
-            expected="a delivered calibration",
-            remedy=f"run `triaxcal calib {unit}` first, or name its folder with --build",
+            str(unit), "a file", expected=f"a unit, a delivered folder or its {name}"
         )
-    return path
+    for found in (unit, unit / name, path):
+        if found.is_file():
+            return found
+    find_unit(unit)
+    raise RefusedError(
+        str(path),
+        "no such file",
+        expected="a delivered calibration",
+        remedy=f"run `triaxcal calib {unit}` first, or name its folder with --build",
+    )
 
 
 def _deliver_imu(unit: Path, build: Path, progress: Progress | None) -> Delivered:

@@ -4,18 +4,9 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
-import click
-
-from triaxcal.cli.options import (
-    DELIVERED,
-    UnitFolder,
-    by_option,
-    command,
-    example,
-    field_options,
-    say,
-)
+from triaxcal.cli.options import command, example, field_command, say
 
 
 @command(
@@ -23,34 +14,21 @@ from triaxcal.cli.options import (
         "triaxcal check MPU-1 --on field.csv",
         "triaxcal check MPU-1 --on field.csv --gravity 9.8321",
         "triaxcal check AT-0042 --on checks.csv --layout logger.toml",
+        "triaxcal check generated/calibration.json --on field.csv",
     )
 )
-@click.argument("unit", type=UnitFolder())
-@DELIVERED
-@click.option(
-    "--on",
-    "recorded",
-    required=True,
-    type=click.Path(path_type=Path),
-    help="Recording that was not used for the calibration.",
-)
-@field_options
-def check(
-    unit: Path, build: Path, recorded: Path, layout: Path | None, gravity: float | None
-) -> None:
+@field_command("--on", "Recording that was not used for the calibration.")
+def check(unit: Path, build: Path, recorded: Path, **stated: Any) -> None:
     """Check a delivered calibration with a new recording.
 
-    The constants are those in build/UNIT/calibration.json. At each still pose of the recording |a|
-    - g is compared with the uncertainty that is expected there and with the limits of the unit. The
-    exit code is 1 when the check fails.
+    UNIT is a unit, whose constants are those in build/UNIT/calibration.json, or a delivered folder,
+    or a calibration.json itself. At each still pose of the recording |a| - g is compared with the
+    uncertainty that is expected there and with the limits of the unit. The exit code is 1 when the
+    check fails.
     """
     import triaxcal  # noqa: PLC0415
     from triaxcal.api.delivery import delivered_file  # noqa: PLC0415
 
-    done = triaxcal.load(delivered_file(unit, build))
-    try:
-        found = done.check(recorded, layout=layout, gravity_m_per_s2=gravity)
-    except triaxcal.RefusedError as refusal:
-        raise by_option(refusal) from refusal
+    found = triaxcal.load(delivered_file(unit, build)).check(recorded, **stated)
     say(found.summary)
     sys.exit(not found.result.passed)

@@ -29,7 +29,8 @@ class UnitFolder(click.ParamType[Path]):
     name = "unit"
 
     def __init__(self, files: bool = False) -> None:
-        self.files = files  # `batch` skips files: units/* names them as well
+        # `batch` skips files: units/* names them as well; `check` takes a calibration.json.
+        self.files = files
 
     def convert(
         self, value: Any, _param: click.Parameter | None, _ctx: click.Context | None
@@ -97,25 +98,45 @@ _OPTIONS = {
 }
 
 
-def by_option(refusal: RefusedError) -> RefusedError:
+def _by_option(refusal: RefusedError) -> RefusedError:
     """The refusal of an argument of the API by the name of its option."""
     place = _OPTIONS.get(refusal.place, refusal.place)
     return type(refusal)(place, refusal.found, expected=refusal.expected, remedy=refusal.remedy)
 
 
-def field_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """--layout and --gravity of a recording from the field."""
-    layout = click.option(
-        "--layout",
-        type=click.Path(path_type=Path),
-        help="TOML file with the [recording] of the file, if it is not that of the unit.",
+def field_command(flag: str, words: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """UNIT, --build, a recording from the field by `flag`, its --layout and --gravity.
+
+    A refusal names an argument of the API as its option.
+    """
+    options = (
+        click.argument("unit", type=UnitFolder(files=True)),
+        DELIVERED,
+        click.option(flag, "recorded", required=True, type=click.Path(path_type=Path), help=words),
+        click.option(
+            "--layout",
+            type=click.Path(path_type=Path),
+            help="TOML file with the [recording] of the file, if it is not that of the unit.",
+        ),
+        click.option(
+            "--gravity",
+            "gravity_m_per_s2",
+            type=float,
+            help="Local gravity where it was recorded, m/s^2; default: that of the unit.",
+        ),
     )
-    gravity = click.option(
-        "--gravity",
-        type=float,
-        help="Local gravity where it was recorded, m/s^2; default: that of the unit.",
-    )
-    return layout(gravity(command))
+
+    def decorated(function: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(function)
+        def run(**given: Any) -> None:
+            try:
+                function(**given)
+            except RefusedError as refusal:
+                raise _by_option(refusal) from refusal
+
+        return functools.reduce(lambda command, option: option(command), reversed(options), run)
+
+    return decorated
 
 
 class WithKinds(click.Command):

@@ -2,77 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
-from triaxcal.cli.options import (
-    DELIVERED,
-    UnitFolder,
-    by_option,
-    command,
-    example,
-    field_options,
-    say,
-)
+from triaxcal.cli.options import command, example, field_command, say
+
+
+def _drift(
+    flag: str, argument: str, words: str
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    return click.option(flag, argument, type=float, help=f"Drift of {words} (sd).")
 
 
 @command(
     epilog=example(
         "triaxcal update MPU-1 --with field.csv",
         "triaxcal update MPU-1 --with field.csv --bias-drift 5 --into out",
+        "triaxcal update generated/calibration.json --with field.csv --into out",
     )
 )
-@click.argument("unit", type=UnitFolder())
-@DELIVERED
-@click.option(
-    "--with",
-    "recorded",
-    required=True,
-    type=click.Path(path_type=Path),
-    help="Recording of one still pose or more.",
-)
+@field_command("--with", "Recording of one still pose or more.")
 @click.option(
     "--into", type=click.Path(path_type=Path), help="Write here and leave the delivered unit alone."
 )
-@click.option("--bias-drift", type=float, help="Drift of a bias since then, mg (sd).")
-@click.option("--scale-drift", type=float, help="Drift of a scale since then, ppm (sd).")
-@click.option("--axes-drift", type=float, help="Drift of an angle between axes, micro-rad (sd).")
-@field_options
-def update(  # noqa: PLR0917
-    unit: Path,
-    build: Path,
-    recorded: Path,
-    into: Path | None,
-    bias_drift: float | None,
-    scale_drift: float | None,
-    axes_drift: float | None,
-    layout: Path | None,
-    gravity: float | None,
-) -> None:
+@_drift("--bias-drift", "bias_drift_mg", "a bias since then, mg")
+@_drift("--scale-drift", "scale_drift_ppm", "a scale since then, ppm")
+@_drift("--axes-drift", "axes_drift_micro_rad", "an angle between axes, micro-rad")
+def update(unit: Path, build: Path, recorded: Path, **stated: Any) -> None:
     """Update a delivered calibration with a few poses.
 
-    The constants in build/UNIT/calibration.json, their uncertainty and a drift since then are the
+    UNIT is a unit, whose constants are those in build/UNIT/calibration.json, or a delivered folder,
+    or a calibration.json itself. The constants, their uncertainty and a drift since then are the
     prior. Poses in which |a| = g give new constants and a new C. Poses that contradict the
-    calibration are refused. The files before are kept beside the new ones.
+    calibration, or tell less than it, are refused. The files before are kept beside the new ones.
 
     By default the drift follows from the limits of the unit: two standard deviations of a bias are
     its limit over the range.
     """
     import triaxcal  # noqa: PLC0415
 
-    try:
-        done = triaxcal.update(
-            unit,
-            recorded,
-            build,
-            into=into,
-            layout=layout,
-            gravity_m_per_s2=gravity,
-            bias_drift_mg=bias_drift,
-            scale_drift_ppm=scale_drift,
-            axes_drift_micro_rad=axes_drift,
-        )
-    except triaxcal.RefusedError as refusal:
-        raise by_option(refusal) from refusal
-    say(done.summary)
+    say(triaxcal.update(unit, recorded, build, **stated).summary)

@@ -100,9 +100,28 @@ def field_poses(
         raise RefusedError(
             str(recorded), "no such file", expected="a recording", remedy="check its name"
         )
-    layout = layout or unit.recording
-    if layout is None:
-        return _of_dwells(unit, recorded)
+    if layout is not None:
+        return _of_layout(unit, calibration, recorded, layout)
+    try:
+        if unit.recording is None:
+            return _of_dwells(unit, recorded)
+        return _of_layout(unit, calibration, recorded, unit.recording)
+    except RefusedError as refusal:
+        if refusal.remedy and unit.recording is not None:
+            raise
+        other = "a file of another form needs its own layout, a TOML file with [recording]"
+        remedy = f"{refusal.remedy}; {other}" if refusal.remedy else other
+        raise type(refusal)(
+            refusal.place, refusal.found, expected=refusal.expected, remedy=remedy
+        ) from refusal
+
+
+def _of_layout(
+    unit: UnitDescription,
+    calibration: Calibration,
+    recorded: Path | Mapping[str, Any],
+    layout: RecordingLayout,
+) -> FieldPoses:
     # Only |a| is judged: the file needs no angles.
     names = ("pitch", "roll", "yaw", "zenith", "tool_face", "azimuth", "direction")
     no_angles = dict.fromkeys(names)
