@@ -20,7 +20,12 @@ from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.rig import Rig, rotation
 from triaxcal.simulation.truth import Imperfections, Truth, read_truth
 from triaxcal.uncertainty.budget import budget
-from triaxcal.uncertainty.coverage import coverage_factor, effective_dof, student_within
+from triaxcal.uncertainty.coverage import (
+    coverage_factor,
+    effective_dof,
+    student_within,
+    with_offset,
+)
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
 from triaxcal.uncertainty.heldout import held_out, thermal_error
@@ -395,3 +400,25 @@ def test_fast_variances_are_the_quadratic_forms() -> None:
     W = weights(DIRECTIONS)
     expected = np.einsum("dqa,snab,dqb->sndq", W, covariance, W, optimize=True)
     np.testing.assert_allclose(force_variance(covariance, DIRECTIONS), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.03, 0.5, 1.0, 2.5, 4.0, 30.0])
+def test_an_interval_about_a_known_offset_holds_95_percent(offset: float) -> None:
+    """P(|offset + s Z| < q): with s = 1, by the normal distribution of SciPy.
+
+    The table of offsets has steps of 0.05; between them it is linear, to 3e-4 of s.
+    """
+    q = float(with_offset(np.array(stats.norm.ppf(0.975)), np.array(offset)))
+    inside = stats.norm.cdf(q - offset) - stats.norm.cdf(-q - offset)
+    assert inside == pytest.approx(0.95, abs=2e-4)
+
+
+def test_a_budget_adds_a_known_offset_as_it_is() -> None:
+    noise = Source("a", "a", "g", "", "", 1.0, NORMAL)
+    shift = Source("b", "b", "g", "", "", 10.0, NORMAL, offset=True)
+    found = budget("q", "g", [(noise, 1.0), (shift, 10.0)])
+    assert found.combined == pytest.approx(math.hypot(1.0, 10.0))
+    # Beyond it on one side: the normal quantile of 95 %.
+    assert found.expanded == pytest.approx(10.0 + stats.norm.ppf(0.95), abs=1e-4)
+    alone = budget("q", "g", [(shift, 10.0)])
+    assert alone.expanded == pytest.approx(10.0)

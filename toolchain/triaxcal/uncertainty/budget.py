@@ -6,8 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from triaxcal.base.screentext import table
-from triaxcal.uncertainty.coverage import coverage_factor, effective_dof
+from triaxcal.uncertainty.coverage import coverage_factor, effective_dof, with_offset
 from triaxcal.uncertainty.source import Source
 
 
@@ -111,10 +113,16 @@ def budget(quantity: str, unit: str, sources: Sequence[tuple[Source, float | Non
     known = [(source, u) for source, u in sources if u is not None]
     variance = math.fsum(u * u for _, u in known)
     combined = math.sqrt(variance)
-    dof = effective_dof((u, source.dof) for source, u in known)
+    dof = effective_dof((u, source.dof) for source, u in known if not source.offset)
+    factor = coverage_factor(dof)
+    offset = math.fsum(u * u for source, u in known if source.offset)
+    if offset:
+        half_width = factor * math.sqrt(max(variance - offset, 0.0))
+        expanded = with_offset(np.array(half_width), np.array(math.sqrt(offset)))
+        factor = float(expanded) / combined
     lines = [
         Line(source, u, u * u / variance if variance else 0.0)
         for source, u in sorted(known, key=lambda item: -item[1])
     ]
     unknown = [Line(source, None) for source, u in sources if u is None]
-    return Budget(quantity, unit, (*unknown, *lines), combined, dof, coverage_factor(dof))
+    return Budget(quantity, unit, (*unknown, *lines), combined, dof, factor)

@@ -6,10 +6,15 @@ import math
 from collections.abc import Iterable
 from functools import cache
 
+import numpy as np
+
+from triaxcal.model.types import FloatArray
+
 LEVEL = 0.95
 _MANY = 200
 """From here on three terms of the expansion about the normal quantile are right to 1e-8."""
 _NORMAL = 1.959963984540054
+_ROOT_2 = math.sqrt(2.0)
 
 
 def effective_dof(contributions: Iterable[tuple[float, float]]) -> float:
@@ -37,6 +42,39 @@ def coverage_factor(dof: float) -> float:
     if dof >= _MANY:
         return _expansion(_NORMAL, math.floor(dof) if math.isfinite(dof) else math.inf)
     return _student_95(max(1, math.floor(dof + 1e-9)))
+
+
+def with_offset(half_width: FloatArray, offset: FloatArray) -> FloatArray:
+    """Half the 95 % interval about a value that is off by a known offset, not corrected.
+
+    The q of P(|offset + s Z| < q) = 95 % with a normal Z, s the half-width without it / 1.96. An
+    offset squared among variances would make it 1.96 times the offset where it is large.
+
+    Parameters
+    ----------
+    half_width, offset : arrays of one shape
+        Both at least 0.
+    """
+    sd = half_width / _NORMAL
+    ratio = np.minimum(offset, 4.0 * sd) / np.maximum(sd, 1e-300)
+    result: FloatArray = offset + sd * np.interp(ratio, *_beyond_offset())
+    return result
+
+
+@cache
+def _beyond_offset() -> tuple[FloatArray, FloatArray]:
+    """Offsets, and q less them, in standard deviations; from 4 on the 1.645 of one side."""
+    offsets = np.linspace(0.0, 4.0, 81)
+    return offsets, np.array([_within(float(r)) - float(r) for r in offsets])
+
+
+def _within(offset: float) -> float:
+    low, high = 1.5, offset + 2.0
+    for _ in range(50):
+        q = 0.5 * (low + high)
+        inside = 0.5 * (math.erf((q - offset) / _ROOT_2) + math.erf((q + offset) / _ROOT_2))
+        low, high = (q, high) if inside < LEVEL else (low, q)
+    return 0.5 * (low + high)
 
 
 def _expansion(z: float, dof: float) -> float:

@@ -14,7 +14,7 @@ from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.uncertainty.budget import Budget, budget
-from triaxcal.uncertainty.coverage import coverage_factor
+from triaxcal.uncertainty.coverage import coverage_factor, with_offset
 from triaxcal.uncertainty.device_sources import Device, device_sources
 from triaxcal.uncertainty.model_sources import thermal_model
 from triaxcal.uncertainty.orientation import DIRECTIONS, QUANTITIES, force_variance, weights
@@ -63,7 +63,7 @@ class Uncertainty:
     def constants_u(self) -> FloatArray:
         """Expanded uncertainty (95 %) of the twelve constants, shape (n, 12), V/g and V."""
         each = [_sd(s.constants)[:, list(ROWS)] for s in self._of_constants()]
-        return _expanded(np.stack(each), [s.dof for s in self._of_constants()])
+        return _expanded(np.stack(each), self._of_constants())
 
     def of_constants(self, slopes: FloatArray, kept: BoolArray) -> FloatArray:
         """Expanded uncertainty (95 %) of functions of the twelve constants, shape (m, k).
@@ -80,7 +80,7 @@ class Uncertainty:
             covariance = s.constants[kept][:, order[:, None], order]
             variance = np.einsum("mka,mab,mkb->mk", slopes, covariance, slopes)
             each.append(np.sqrt(np.maximum(variance, 0.0)))
-        return _expanded(np.stack(each), [s.dof for s in self._of_constants()])
+        return _expanded(np.stack(each), self._of_constants())
 
     @cached_property
     def force_u(self) -> FloatArray:
@@ -88,10 +88,14 @@ class Uncertainty:
 
         The four are its components x, y, z and its length; directions are `DIRECTIONS`.
         """
+        return self.force_u_in(DIRECTIONS)
+
+    def force_u_in(self, directions: FloatArray) -> FloatArray:
+        """The same in other directions, unit vectors (directions, 3)."""
         sources = [s for s in self.sources if s.force is not None]
-        variance = [force_variance(s.force, DIRECTIONS) for s in sources if s.force is not None]
+        variance = [force_variance(s.force, directions) for s in sources if s.force is not None]
         each = np.sqrt(np.maximum(np.stack(variance), 0.0))
-        return _expanded(each, [s.dof for s in sources])
+        return _expanded(each, sources)
 
     @property
     def worst_over_temperature(self) -> FloatArray:
@@ -208,8 +212,16 @@ def _sd(covariance: FloatArray | None) -> FloatArray:
     return result
 
 
-def _expanded(each: FloatArray, dofs: list[float]) -> FloatArray:
-    """k u of standard uncertainties (sources, ...), by Welch-Satterthwaite."""
+def _expanded(each: FloatArray, sources: list[Source]) -> FloatArray:
+    """k u of standard uncertainties (sources, ...), by Welch-Satterthwaite; about known offsets."""
+    offsets = np.array([s.offset for s in sources])
+    half_width = _random(each[~offsets], [s.dof for s in sources if not s.offset])
+    if not offsets.any():
+        return half_width
+    return with_offset(half_width, np.sqrt((each[offsets] ** 2).sum(axis=0)))
+
+
+def _random(each: FloatArray, dofs: list[float]) -> FloatArray:
     variance = np.sum(each**2, axis=0)
     scale = float(np.max(each)) or 1.0
     # Scaled so that no fourth power underflows.

@@ -91,6 +91,8 @@ def _part(p: Curves, recording: RecordingFit, part: CovariancePart) -> Source:
     constants, force = _effects(p, part)
     effect = float(force_variance(force, DIRECTIONS)[..., :3].max())
     sd, distribution = math.sqrt(max(effect, 0.0)), NORMAL
+    if part.key == LEFT_OUT_PART:
+        distribution = "known, not corrected"
     if part.key == NOISE_PART:
         # 1.96 of it is half the 95 % interval of a noise that is itself uncertain: as a Student's
         # part of few degrees of freedom, beside others, Welch and Satterthwaite make it too small.
@@ -105,6 +107,7 @@ def _part(p: Curves, recording: RecordingFit, part: CovariancePart) -> Source:
         distribution=distribution,
         constants=constants,
         force=force,
+        offset=part.key == LEFT_OUT_PART,
     )
 
 

@@ -39,6 +39,9 @@ class Source:
     constants, force : array, shape (n, 12, 12), or None
         Covariance of [K U0] and of D (`uncertainty.propagation`) at the temperatures; None where
         the source does not act. `force` is (n, 30, 30) where D goes on with Q (3 x 6).
+    offset : bool
+        Whether its effect is a known error that is not corrected, and no standard deviation: the
+        interval is that of `coverage.with_offset`.
     """
 
     key: str
@@ -52,6 +55,7 @@ class Source:
     assumed: bool = False
     constants: FloatArray | None = None
     force: FloatArray | None = None
+    offset: bool = False
 
     @property
     def unknown(self) -> bool:

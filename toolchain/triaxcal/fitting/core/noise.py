@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,9 @@ _NODES = 90
 class NoisePrior:
     """What is known of the noise of a value of weight 1 beforehand: log-normal.
 
+    Real recordings of poses have 0.25 to 1 mg where the sensor lay still, and 3 to 7 mg where a
+    hand held it: an interval about too small a noise holds the truth too seldom.
+
     Attributes
     ----------
     median : float
@@ -26,9 +29,13 @@ class NoisePrior:
         It is not below this.
     """
 
-    median: float = 5e-4
-    spread: float = 1.1
+    median: float = 1e-3
+    spread: float = 1.2
     least: float = 1e-4
+
+    def beside(self, sd: float) -> NoisePrior:
+        """Of a value that has a known scatter of its own beside this noise."""
+        return replace(self, median=math.hypot(self.median, sd))
 
     def log_density(self, nodes: FloatArray) -> FloatArray:
         """At each ln s."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.fitting.core.noise import NOISE
 from triaxcal.fitting.recorded.checks import (
     crowd_finding,
     open_finding,
@@ -21,6 +22,9 @@ from triaxcal.poses.poses import PoseSet, orientation_groups
 from triaxcal.readings.samples import Samples
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import RecordingLayout
+
+_COMMON_G = 5e-4
+"""Noise that every pose is given beside its own scatter when poses are weighed."""
 
 
 @dataclass(frozen=True)
@@ -70,17 +74,19 @@ def prepare(
     for group in _cells(orientations, temps):
         count[group] = 1.0 / len(group)
     zero = reading_of_zero(unit.priors, rough, all_round=not left_open)
-    known = Known(unit.priors, layout.reading_of_1_g, zero)
-    data = replace(rough, weight=np.sqrt(count * _own_weights(poses, known)), count=count)
+    own, least_sd = _own_weights(poses)
+    known = Known(unit.priors, layout.reading_of_1_g, zero, NOISE.beside(least_sd))
+    data = replace(rough, weight=np.sqrt(count * own), count=count)
     return Prepared(data, temps, known, orientations, temperatures, findings, spans < 2)
 
 
-def _own_weights(poses: PoseSet, known: Known) -> FloatArray:
-    """Weights of the poses by their own scatter, beside the noise that all have, at most 1."""
+def _own_weights(poses: PoseSet) -> tuple[FloatArray, float]:
+    """Weights of the poses by their own scatter, at most 1, and the least scatter, in g."""
     sd = poses.length_sd
     if sd is None:
-        return np.ones(len(poses.poses))
-    variance = known.noise.median**2 + np.minimum(sd / poses.reading_of_1_g, 1.0) ** 2
+        return np.ones(len(poses.poses)), 0.0
+    sd = np.minimum(sd / poses.reading_of_1_g, 1.0)
+    variance = _COMMON_G**2 + sd**2
     if not np.isfinite(variance).all():
         k = int(np.flatnonzero(~np.isfinite(variance))[0])
         raise RefusedError(
@@ -89,8 +95,8 @@ def _own_weights(poses: PoseSet, known: Known) -> FloatArray:
             expected="a finite scatter",
             remedy="remove that pose",
         )
-    result: FloatArray = variance.min() / variance
-    return result
+    weights: FloatArray = variance.min() / variance
+    return weights, float(sd.min())
 
 
 def _directions(data: ScalarData) -> FloatArray:
