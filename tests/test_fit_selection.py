@@ -108,7 +108,7 @@ def test_three_temperatures_alone_take_the_two_segments_of_the_paper():
     assert row.estimator == "least-squares"
     assert all(c.held_out_g is None for c in calibration.candidates)
     assert calibration.selection_reason == (
-        "piecewise-linear, knots -40, 20, 70 degC with least-squares: nothing can be held out "
+        "piecewise-linear, knots -40, 20, 70 degC, bias by least squares: nothing can be held out "
         "(3 temperatures, no check dwells among them), so this is the simplest that the data "
         "determine exactly"
     )

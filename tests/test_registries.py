@@ -189,14 +189,17 @@ SHAPE = "Toy series over 90 degC"
 
 
 def test_the_generated_c_names_them(files: dict[str, str]) -> None:
-    assert "method Frozen at T0: inverse form" in files["triax_calib.h"]
+    assert (
+        "method Frozen at T0: K(T) and U0(T) as fitted, inverted on the device"
+        in files["triax_calib.h"]
+    )
     assert f"thermal model: {SHAPE}" in files["triax_calib.h"]
 
 
 def test_the_terminal_shows_their_labels(made: Passport) -> None:
     text = summary(made, ["a"], "build")
     words = " ".join(text.split())
-    assert f"thermal model {SHAPE} with" in words
+    assert f"thermal model {SHAPE}, bias by" in words
     assert "method Frozen at T0: K(T) and U0(T)" in words
     assert f"* {SHAPE}" in text
     head = next(line for line in text.splitlines() if line.startswith("max | |a| - g |"))

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from family_cases import COLUMNS, U0, K, directions, write_unit
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.cli.main import main
 from triaxcal.fitting.route import calibrate_recording
 from triaxcal.model.types import FloatArray
 from triaxcal.poses.poses import PoseSet, find_poses, orientation_groups
@@ -282,6 +284,13 @@ def test_unit_vectors_are_known_directions(tmp_path: Path) -> None:
     # 20 poses of 1e-4 m/s^2: three axes share them, four standard errors.
     assert np.abs(constants[:9].reshape(3, 3) - K).max() < 4.0 * 1e-4 / np.sqrt(20.0 / 3.0)
     assert np.abs(constants[9:] - U0).max() < 4.0 * 1e-4 / np.sqrt(20.0)
+
+
+def test_rows_that_are_poses_have_no_invented_times(tmp_path: Path) -> None:
+    text = CliRunner().invoke(main, ["poses", str(directed(tmp_path / "U", (1, 1, 1)))]).stdout
+    for words in ("from s", "still s", "drift mg", "at rest"):
+        assert words not in text
+    assert text.rstrip().endswith("\n20 poses")
 
 
 def directed(folder: Path, signs: tuple[int, int, int], more: str = "") -> Path:

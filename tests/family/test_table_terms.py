@@ -95,7 +95,7 @@ def test_a_quadratic_truth_is_predicted_on_p0s_own_grid(
     for seed in range(runs):
         sensor = Sensor(seed)
         calibration = fitted(tmp_path / str(seed), rows_of(sensor, temps))
-        assert chosen(calibration).startswith("all terms (13) with priors")
+        assert chosen(calibration).startswith("all terms with priors")
         squares.append(unseen(sensor, calibration, temps))
     assert np.sqrt(np.mean(squares)) < 1.3 * NOISE
     # Each axis too; of 200 values a run the rms is known to 5 %, and the fit's own part varies.
@@ -111,7 +111,7 @@ def test_a_linear_truth_stays_linear(tmp_path: Path) -> None:
 
 def test_the_case_that_was_refused_for_its_condition_number() -> None:
     calibration = calibrated(recording("../cases/table_p0_grid_quadratic").resolve())
-    assert chosen(calibration) == "all terms (13) with priors"
+    assert chosen(calibration) == "all terms with priors"
     assert calibration.recording is not None
     assert (calibration.recording.held_out_g or 1.0) < 1.3 * NOISE
     assert any("share of the readings in it" in f for f in calibration.recording.findings)

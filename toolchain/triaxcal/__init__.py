@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from triaxcal.uncertainty.check import FieldCheck
     from triaxcal.uncertainty.updated import FieldUpdate
 
-__version__ = "0.1.0"
+__version__ = "0.2.0.dev0"
 
 __all__ = [
     "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "FieldCheck",

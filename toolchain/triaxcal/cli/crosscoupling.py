@@ -77,7 +77,7 @@ def crosscoupling(file: Path | None, picture: Path | None, **options: Any) -> No
     gravity, mounting, cubic = options["gravity"], options["mounting"], options["cubic"]
     if not options["live"]:
         if file is None:
-            raise RefusedError("FILE", "missing", expected="a CSV", remedy="or use --live")
+            raise click.UsageError("Missing argument 'FILE', or option '--live'.")
         show(triaxcal.cross_coupling(file, gravity, mounting, cubic=cubic), picture)
         return
     pair = triaxcal.LivePair(gravity, mounting, options["target"], cubic=cubic)

@@ -28,6 +28,7 @@ from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.methods.compensation import Compensation, compensate
+from triaxcal.model.methods.method import DIRECT, INVERSE
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
@@ -35,8 +36,14 @@ from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
+from triaxcal.unit.choices import ESTIMATOR_WORDS
 from triaxcal.unit.description import UnitDescription
 
+_FORMS = {
+    DIRECT: "gain N(T) and offset as functions of temperature",
+    INVERSE: "K(T) and U0(T) as fitted, inverted on the device",
+}
+"""What the device evaluates."""
 _WIDTH = 92
 """Columns of a line in the header's comment."""
 
@@ -143,9 +150,9 @@ def _files(firmware: Firmware) -> dict[str, bytes]:
     reading = calibration.reading_unit
     method = METHODS[firmware.compensation.method].label
     summary = (
-        f"method {method}: {plan.shape.form} form, {low:g} to {high:g} degC",
+        f"method {method}: {_FORMS[plan.shape.form]}, {low:g} to {high:g} degC",
         f"functions of order {plan.shape.order} on {plan.shape.segments} segment(s)",
-        f"thermal model: {calibration.shape.label}, {_fitted_to(calibration)}",
+        f"thermal model: {calibration.shape.label}, fitted to {fitted_to(calibration)}",
         f"raw code: {unit.adc.bits} bits for {unit.adc.full_scale_v:g} {reading} full scale",
         "code32 is a raw code left-justified to 32 bits",
         *_reading_note(unit, calibration),
@@ -156,10 +163,10 @@ def _files(firmware: Firmware) -> dict[str, bytes]:
     return output_files(Job(plan, unit.temperature_sensor, provenance))
 
 
-def _fitted_to(calibration: Calibration) -> str:
+def fitted_to(calibration: Calibration) -> str:
     """What the constants were fitted to, and how."""
     if calibration.recording is None:
-        return f"bias estimator {calibration.estimator}"
+        return f"six positions, bias by {ESTIMATOR_WORDS[calibration.estimator]}"
     return f"{len(calibration.recording.poses.poses)} poses, {calibration.recording.route}"
 
 

@@ -12,7 +12,7 @@ from triaxcal.poses.poseset import PoseSet
 from triaxcal.readings.samples import READING, Samples
 from triaxcal.readings.table import TIME
 from triaxcal.report.pictures.line_plot import BAD, COLOURS, GOOD, Band, Line, Panel, line_plot
-from triaxcal.unit.recording import RecordingLayout
+from triaxcal.unit.recording import SAMPLES, RecordingLayout
 
 
 def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
@@ -20,14 +20,14 @@ def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
     unit, mg = layout.acceleration_unit, 1e3 / poses.reading_of_1_g
     blocks = []
     sds, shares = poses.length_sd, poses.weights
+    stretches = layout.rows == SAMPLES  # of rows that are poses no time is known
     rows = [
         [
             f"{p.number}",
             f"{p.file} {p.line}".strip(),
-            f"{p.start_s:.1f}",
-            f"{p.duration_s:.1f}",
+            *([f"{p.start_s:.1f}", f"{p.duration_s:.1f}"] if stretches else []),
             *(f"{v:.6g}" for v in p.reading),
-            *_of_one(p.scatter, p.drift, mg),
+            *(_of_one(p.scatter, p.drift, mg) if stretches else []),
             "-" if sds is None else f"{sds[k]:.2g}",
             "-" if sds is None else f"{sds[k] * mg:.2f}",
             "-" if shares is None else f"{shares[k]:.2f}",
@@ -36,8 +36,9 @@ def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
         ]
         for k, p in enumerate(poses.poses)
     ]
-    head = ["pose", "line", "from s", "still s", *(f"{a} {unit}" for a in AXES)]
-    head += ["scatter mg", "drift mg", f"sd {unit}", "sd mg", "weight", "degC", "section"]
+    head = ["pose", "line", *(["from s", "still s"] if stretches else [])]
+    head += [*(f"{a} {unit}" for a in AXES), *(["scatter mg", "drift mg"] if stretches else [])]
+    head += [f"sd {unit}", "sd mg", "weight", "degC", "section"]
     blocks.append("\n".join(table(head, rows)))
     if poses.refused:
         reasons = [f"pose {r.number} (line {r.line}): {r.reason}" for r in poses.refused]
@@ -45,7 +46,7 @@ def poses_text(poses: PoseSet, layout: RecordingLayout) -> str:
     if poses.findings:
         blocks.append("found:\n  " + "\n  ".join(poses.findings))
     count, refused = len(poses.poses), len(poses.refused)
-    blocks.append(f"{count} poses; {refused} stretches at rest refused")
+    blocks.append(f"{count} poses" + f"; {refused} stretches at rest refused" * stretches)
     return "\n\n".join(blocks)
 
 

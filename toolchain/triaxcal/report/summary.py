@@ -15,6 +15,7 @@ from triaxcal.report.words.measured import measured_words
 from triaxcal.report.words.numbers import thousands
 from triaxcal.report.words.shares import share_rows
 from triaxcal.report.words.temperatures import by_temperature, degrees
+from triaxcal.unit.choices import ESTIMATOR_WORDS
 
 _LABEL = 16
 CONDITION_SHOWN = 1e6
@@ -133,7 +134,7 @@ def _candidates(calibration: Calibration) -> str:
     rows = [
         [
             f"{'*' if c.chosen else ' '} {c.short_label}",
-            *([] if poses else [c.estimator]),
+            *([] if poses else [ESTIMATOR_WORDS[c.estimator]]),
             str(c.parameters),
             _micro_g(c.fit_residual_g),
             "-" if c.held_out_g is None else _micro_g(c.held_out_g),
@@ -141,7 +142,7 @@ def _candidates(calibration: Calibration) -> str:
         ]
         for c in calibration.candidates
     ]
-    head = ["candidates, rms micro-g", *([] if poses else ["bias estimator"])]
+    head = ["candidates, rms micro-g", *([] if poses else ["bias by"])]
     head += ["terms", "fitted", "held out", *(["condition"] if poses else [])]
     return "\n".join(table(head, rows))
 

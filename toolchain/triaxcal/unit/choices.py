@@ -10,6 +10,12 @@ from triaxcal.base.kinds import TEXT, Kind, checked, number, three, whole, word
 from triaxcal.model.methods.registry import METHODS
 
 ESTIMATORS = ("equation-10", "least-squares", "half-sum")
+ESTIMATOR_WORDS = {
+    "equation-10": "mean of 4 positions",
+    "least-squares": "least squares",
+    "half-sum": "mean of 2 positions",
+}
+"""How a bias comes from six positions, as users read it."""
 TERMS = ("auto", "linear", "quadratic")
 LOSSES = ("linear", "huber", "cauchy")
 OUTPUT_Q_RANGE = (8, 30)
@@ -22,8 +28,8 @@ class Fit:
     Attributes
     ----------
     estimator
-        How K and U0 come from six positions: P1 (10); least squares; (10) with the bias from an
-        axis' own two positions.
+        How the bias comes from six positions: least squares over all; the mean of the four in which
+        the axis is level, P1 (10) ("equation-10"); or that of its own two ("half-sum").
     terms
         Of a recording: which candidates are tried.
     loss

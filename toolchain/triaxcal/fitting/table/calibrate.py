@@ -163,7 +163,7 @@ def _angle_residuals(angles: Angles, table: FloatArray, force: FloatArray) -> st
     wrapped[:, 1] *= np.linalg.norm(angle_slopes(angles.kind, table[:, :2])[..., 1], axis=-1)
     rms = np.sqrt(np.mean(wrapped**2, axis=0))
     names = ("pitch", "roll") if angles.kind == "aircraft" else ("zenith", "tool face")
-    return "angles back from the readings (8): " + ", ".join(
+    return "angles back from the readings: " + ", ".join(
         f"{name} {value:.3g} arcsec rms" for name, value in zip(names, rms, strict=True)
     )
 
@@ -183,7 +183,7 @@ def _budget(unit: UnitDescription, angles: Angles, table: FloatArray, best: Tabl
     table_words = (
         f"table: {angle:g} arcsec an angle, {level:g} arcsec of level are {budget:.3g} micro-g rms"
     )
-    return [f"{table_words}; sqrt(eps) is {found:.3g} micro-g, {words}"]
+    return [f"{table_words}; the fit's residual is {found:.3g} micro-g, {words}"]
 
 
 def _calibration(

@@ -27,7 +27,7 @@ def choose_table(rows: Sequence[TableRow], temperatures: list[list[int]]) -> tup
     inner = len(temperatures) - 2 if len(temperatures) >= 4 else 0
     also = f" and {inner} temperatures" if inner else ""
     return best, (
-        f"{best.trial.label}, {best.trial.way}: held-out error {_micro_g(best)} a component, "
+        f"{best.trial.label}: held-out error {_micro_g(best)} a component, "
         f"each pose{also} held out in turn; {_against(best, finalists)}"
     )
 

@@ -23,6 +23,9 @@ from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.priors import AUTO, LINEAR, OWN_SQUARES, QUADRATIC_TERMS, Priors
 
+_FORCE, _READINGS = "force from readings", "readings from force"
+"""Which side of the equation a fit takes as exact: P0 (12) and (13), or (28) and (29)."""
+
 
 def trials_of(
     unit: UnitDescription, temps: FloatArray, temperatures: list[list[int]]
@@ -63,11 +66,13 @@ def _priors(unit: UnitDescription) -> Priors:
 def one_temperature_trials(shape: ThermalShape, priors: Priors) -> list[TableTrial]:
     """The forms of P0; simpler ones first."""
     return [
-        TableTrial("linear (12)", "inverse form", shape, inverse_linear, 12),
-        TableTrial("linear (28)", "forward form", shape, _forward, 12),
+        TableTrial(f"linear, {_FORCE}", _FORCE, shape, inverse_linear, 12),
+        TableTrial(f"linear, {_READINGS}", _READINGS, shape, _forward, 12),
         TableTrial("nine constants and the turn to the table", "|a| = g", shape, _scalar, 12),
-        TableTrial("quadratic (13)", "inverse form", shape, inverse_quadratic, 27, quadratic=True),
-        TableTrial("quadratic (29)", "forward form", shape, _forward_quadratic, 27, quadratic=True),
+        TableTrial(f"quadratic, {_FORCE}", _FORCE, shape, inverse_quadratic, 27, quadratic=True),
+        TableTrial(
+            f"quadratic, {_READINGS}", _READINGS, shape, _forward_quadratic, 27, quadratic=True
+        ),
         _with_priors(shape, 1, priors, ""),
     ]
 
@@ -76,16 +81,16 @@ def thermal_trials(shape: ThermalShape, priors: Priors) -> list[TableTrial]:
     """The forward form with a thermal function, and K with fewer functions; the same with Q."""
     gains = [(n, f"; {detail(shape, n)}") for n in gain_functions(shape)]
     return [
-        *(TableTrial(f"linear (28){d}", "forward form", shape, None, 0, n) for n, d in gains),
+        *(TableTrial(f"linear, {_READINGS}{d}", _READINGS, shape, None, 0, n) for n, d in gains),
         *(_with_priors(shape, n, priors, d) for n, d in gains),
     ]
 
 
 def _with_priors(shape: ThermalShape, gains: int, priors: Priors, functions: str) -> TableTrial:
-    terms = "all terms (13)" if priors.product_g_per_g2 > 0.0 else "own squares"
+    terms = "all terms" if priors.product_g_per_g2 > 0.0 else "own squares"
     return TableTrial(
         f"{terms} with priors{functions}",
-        "inverse form",
+        _FORCE,
         shape,
         None,
         0,

@@ -40,6 +40,7 @@ from triaxcal.fitting.tilter.heldout import (
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.readings.measurements import Dwell
+from triaxcal.unit.choices import ESTIMATOR_WORDS
 
 _ROUNDING_G = 1e-12
 """Errors below are the rounding of floats."""
@@ -109,7 +110,7 @@ class _Row:
 
     @property
     def title(self) -> str:
-        return f"{self.shape.label} with {self.estimator}"
+        return f"{self.shape.label}, bias by {ESTIMATOR_WORDS[self.estimator]}"
 
     def candidate(self, *, chosen: bool) -> Candidate:
         shape = self.shape

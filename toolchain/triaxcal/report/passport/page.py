@@ -7,6 +7,7 @@ from typing import Any
 from triaxcal import __version__
 from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import MethodResult
+from triaxcal.delivery.firmware import fitted_to
 from triaxcal.delivery.verdict import NOT_CHECKED, NOT_SHOWN, PASSED, Verdict
 from triaxcal.fitting.converter import input_words
 from triaxcal.fitting.core.calibration import Calibration
@@ -35,6 +36,7 @@ from triaxcal.report.words.numbers import (
 )
 from triaxcal.report.words.shares import ShareRow, share_rows
 from triaxcal.uncertainty.budget import Budget, Line
+from triaxcal.unit.choices import ESTIMATOR_WORDS
 
 _NEGLIGIBLE = 1e-9
 """Of the variance: no sensitivity is shown beside it."""
@@ -63,6 +65,7 @@ def passport_html(p: Passport) -> bytes:
         ],
         "shares": [_share(s) for s in share_rows(p.delivery.calibration)],
         "candidates": _candidates(p),
+        "fit_head": "bias by" if p.delivery.calibration.recording is None else "fit",
         "selection_reason": p.delivery.calibration.selection_reason,
         "verification": _verification(p),
         "tools": tool_rows(p.tools),
@@ -100,7 +103,7 @@ def _identity(p: Passport) -> dict[str, Any]:
             *_left_out(d.calibration),
             ("Local gravity", f"{d.unit.gravity_g * 9.80665:.6g} m/s²"),
             ("Thermal model", f"{signed(d.calibration.shape.label.replace('degC', '°C'))}"),
-            ("Bias estimator", d.calibration.estimator),
+            ("Fitted to", fitted_to(d.calibration)),
             (
                 "Compensation",
                 f"{d.chosen.method.label}, LSB 2{superscript(-d.plan.shape.output_q)} g",
@@ -241,7 +244,7 @@ def _candidates(p: Passport) -> list[dict[str, Any]]:
     return [
         {
             "label": signed(c.short_label.replace("degC", "°C")),
-            "estimator": c.estimator,
+            "estimator": ESTIMATOR_WORDS.get(c.estimator, c.estimator),
             "parameters": c.parameters,
             "fitted": g_in_words(c.fit_residual_g),
             "held_out": g_in_words(c.held_out_g) if c.held_out_g is not None else "none",

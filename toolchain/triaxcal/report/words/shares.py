@@ -12,7 +12,10 @@ _OWN_SQUARES = ("Qx.xx", "Qy.yy", "Qz.zz")
 
 @dataclass(frozen=True)
 class ShareRow:
-    """One row, in words."""
+    """One row, in words; `value` is of squares and products alone.
+
+    K and U0 stand above as the C has them, which differ a little from the fit with all terms.
+    """
 
     name: str
     value: str
@@ -37,8 +40,8 @@ def share_rows(calibration: Calibration) -> tuple[ShareRow, ...]:
                 f"up to {max(abs(s.value) for s in products) * 1e3:.2g} mg/g^2",
                 f"{max(s.sd for s in products) * 1e3:.2g} mg/g^2",
                 f"{max(s.prior_sd for s in products) * 1e3:.2g} mg/g^2",
-                f"{worst:.0%} to {best:.0%}",
-                f"{1.0 - best:.0%} to {1.0 - worst:.0%}",
+                _between(worst, best),
+                _between(1.0 - best, 1.0 - worst),
             )
         )
     return tuple(rows)
@@ -49,12 +52,17 @@ def _row(share: ConstantShare) -> ShareRow:
     value, sd, prior_sd = (scale * v for v in (share.value, share.sd, share.prior_sd))
     return ShareRow(
         share.name,
-        f"{value:+.6g} {unit}",
-        f"{sd:.2g}",
-        f"{prior_sd:.2g}",
+        f"{value:+.3g} {unit}" if share.name[0] == "Q" else "above",
+        f"{sd:.2g} {unit}",
+        f"{prior_sd:.2g} {unit}",
         _percent(share.data),
         _percent(1.0 - share.data),
     )
+
+
+def _between(low: float, high: float) -> str:
+    ends = [f"{low:.0%}", f"{high:.0%}"]
+    return " to ".join(dict.fromkeys(ends))
 
 
 def _percent(share: float) -> str:
