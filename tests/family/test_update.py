@@ -343,3 +343,12 @@ def test_a_refused_option_is_named_as_it_was_typed(top: Path, tmp_path: Path) ->
     ):
         with pytest.raises(RefusedError, match=f"^{option}: found {value}; expected"):
             main.main([*command, str(path), option, value], standalone_mode=False)
+
+
+def test_a_delivered_update_says_each_finding_once(top: Path, tmp_path: Path) -> None:
+    path = recorded(tmp_path, directions(6))
+    done = triaxcal.update(top / "units" / "U", path, top / "build", into=tmp_path / "out")
+    findings = [line for line in done.summary.splitlines() if line.startswith("found ")]
+    assert len(findings) == len({line.split(maxsplit=1)[1] for line in findings}) >= 2
+    study = triaxcal.load(top / "build" / "U" / "calibration.json").update(path)
+    assert "found        |a| shows no rotation" in study.summary

@@ -189,14 +189,14 @@ def _deliver_update(made: Updated, target: Path, kept: Path | None) -> Delivered
     from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415
-    from triaxcal.report.update import update_text  # noqa: PLC0415
+    from triaxcal.report.update import changed_text  # noqa: PLC0415
 
     with reference_under_way() as reference:
         delivery = deliver_fitted(made.fitted, reference)
     page = passport(delivery, {})
     files = all_files(delivery, page)
     publish_beside(files, target, kept, SOMETIMES)
-    changed = update_text(delivery.unit.serial, made.found, made.before.calibration)
+    changed = changed_text(delivery.unit.serial, made.found, made.before.calibration)
     text = f"{changed}\n\n{summary(page, files, str(target))}"
     if kept is not None:
         text += f"\n\nthe files before are kept in {kept}/"

@@ -16,24 +16,32 @@ _K = 2.0
 
 
 def update_text(serial: str, found: FieldUpdate, before: Calibration) -> str:
+    """What changed, and what was found; the summary of a delivery has the findings itself."""
+    recording = found.calibration.recording
+    findings = () if recording is None else recording.findings
+    changed = changed_text(serial, found, before)
+    return "\n".join([changed, *(f"found        {finding}" for finding in findings)])
+
+
+def changed_text(serial: str, found: FieldUpdate, before: Calibration) -> str:
     """Changes of the nine frame-free constants against their uncertainty, and the poses."""
     t0 = before.thermal.t0_degc
     name = PurePath(found.poses.source.replace("\\", "/")).name
     count = len(found.poses)
+    poses = f"{count} pose{'s' * (count != 1)}"
     before_mg, now_mg = (_rms(e) for e in (found.error_before_g, found.error_after_g))
-    lines = [
-        f"{serial} updated by {count} pose{'s' * (count != 1)} of {name}; constants at {t0:g} degC",
-        "",
-        *_table(found, before),
-        "  +- is two standard uncertainties (95 %); the options of a drift are one",
-        "",
-        _length(found),
-        f"chi-square   {found.chi_square:.1f}, {count} expected: the poses against the prior",
-        f"|a| - g      {before_mg} mg rms at these poses before, {now_mg} mg now",
-    ]
-    recording = found.calibration.recording
-    findings = () if recording is None else recording.findings
-    return "\n".join([*lines, *(f"found        {finding}" for finding in findings)])
+    return "\n".join(
+        [
+            f"{serial} updated by {poses} of {name}; constants at {t0:g} degC",
+            "",
+            *_table(found, before),
+            "  +- is two standard uncertainties (95 %); the options of a drift are one",
+            "",
+            _length(found),
+            f"chi-square   {found.chi_square:.1f}, {count} expected: the poses against the prior",
+            f"|a| - g      {before_mg} mg rms at these poses before, {now_mg} mg now",
+        ]
+    )
 
 
 def _length(found: FieldUpdate) -> str:

@@ -65,7 +65,7 @@ def _fit(p: Curves, recording: RecordingFit) -> list[Source]:
     key, name, _, advice = _ORIGINS[NOISE_PART]
     origin = "|a| - g at the poses, per degree of freedom"
     if p.calibration.update:
-        name, origin = "the constants after the update", p.calibration.covariance_source
+        name, origin = "the update", p.calibration.covariance_source
     if not recording.checked:
         unknown = "unknown: as many constants as poses"
         return [Source(key=key, name=name, unit="g", advice=advice, origin=unknown)]
