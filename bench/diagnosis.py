@@ -69,7 +69,7 @@ def cells(given: argparse.Namespace, fault: str) -> list[tuple[str, int, bool]]:
     """Sizes, numbers of temperatures and checks of a fault."""
     one = fault in WITHOUT_SIZE or fault == "none"
     sides = {"yes": [True], "no": [False], "both": [True, False]}[given.checks]
-    sides = [True] if fault in NEEDS_CHECKS else sides
+    sides = [side for side in sides if side or fault not in NEEDS_CHECKS]
     return list(product([ONE_SIZE] if one else given.sizes, given.temps, sides))
 
 

@@ -133,7 +133,7 @@ def with_cause(
     It takes the place of general advice where the readings contradict each other (always with
     `contradiction`), and is added to the advice on rows that are missing or doubled, or where the
     cause is but a symptom. The refusal is as it was where it is not about the readings, or no cause
-    is told from a sound unit.
+    is clearly more probable than a sound unit.
     """
     if not refusal.place.startswith(measurements.source) or refusal.exit_code != 1:
         return refusal

@@ -1,4 +1,4 @@
-"""`diagnose`: which cause explains contradictory readings, and what the data cannot tell apart."""
+"""`diagnose`: which cause explains contradictory readings, and what else it may be."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ class Diagnosis:
         if others:
             text += f"; the readings cannot tell it from {' or '.join(others)}"
             data = dict.fromkeys(s.apart for s in (best, *self.answer[1:]))
-            text += f"; to tell them apart: {'; or '.join(data)}"
+            text += f"; to distinguish them: {'; or '.join(data)}"
         return text
 
     @property

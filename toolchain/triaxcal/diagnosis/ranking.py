@@ -29,6 +29,10 @@ _ODD = 8
 """Dwells of which one may be wrong: the others stand out less."""
 _SEVERAL = 6
 """Dwells that may be wrong at once."""
+_USUAL = {"noise": 1.4, "tilt": 40e-6, "seat": 100e-6, "curvature": 3.0, "bend": 50e-6}
+"""Scales that a sound unit mostly has at the most."""
+_SCATTER = 2.0
+"""Of a sum of squares, in its standard deviations."""
 _FIRSTS = 4
 """Causes that are tried with a second one, where the best does not explain everything."""
 _SECONDS = 3
@@ -102,7 +106,7 @@ def _together(found: list[Ranked], sound: Sound, nominal: Nominal) -> list[Ranke
     The best cause may be the wrong one of two: then the next ones are tried with a second as well.
     """
     readings, best = sound.readings, found[0]
-    if best.best.log_evidence < sound.fit.log_evidence or best.cause.name in _LOOSE:
+    if best.best.log_evidence < sound.fit.log_evidence or _explains_everything(best.best):
         return []
     pairs: dict[str, Judged] = {}
     for ranked in found[:_FIRSTS]:
@@ -123,6 +127,15 @@ def _together(found: list[Ranked], sound: Sound, nominal: Nominal) -> list[Ranke
             return []
     places = sorted(pairs.values(), key=lambda j: -j.log_evidence)
     return [Ranked(CAUSES[TOGETHER], tuple(places))]
+
+
+def _explains_everything(judged: Judged) -> bool:
+    """Whether what is left is no more than of most sound units: no second cause need be sought."""
+    rows = float(judged.system.used.sum())
+    usual = all(
+        getattr(judged.scales, name) <= value * (1.0 + 1e-9) for name, value in _USUAL.items()
+    )
+    return usual and judged.fit.squares < rows + _SCATTER * np.sqrt(2.0 * rows)
 
 
 def _pairs(ranked: Ranked, readings: Readings, nominal: Nominal) -> list[Pair]:

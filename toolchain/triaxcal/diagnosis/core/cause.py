@@ -100,7 +100,7 @@ class Hypothesis:
 
 
 def unchanged(readings: Readings, _amplitudes: FloatArray) -> Readings:
-    """Undo nothing: the cause explains some outputs, or the noise, by itself."""
+    """Undo nothing: the cause is about outputs that are not used, or about the noise."""
     return readings
 
 

@@ -35,7 +35,7 @@ class Scales:
 _CHOICES: dict[str, tuple[tuple[float, ...], float, float]] = {
     "noise": ((0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), 1.0, 0.5),
     "tilt": ((4e-6, 10e-6, 20e-6, 40e-6, 80e-6, 160e-6), 30e-6, 0.8),
-    "seat": ((15e-6, 40e-6, 80e-6, 160e-6, 240e-6), 80e-6, 0.6),
+    "seat": ((15e-6, 40e-6, 80e-6, 160e-6), 80e-6, 0.6),  # 33": what is more is squareness
     "curvature": ((0.1, 0.3, 1.0, 3.0, 10.0, 30.0), 1.5, 1.5),
     "bend": ((0.0, 50e-6, 100e-6, 200e-6), 70e-6, 0.8),
 }

@@ -87,6 +87,8 @@ class Fit:
     Attributes
     ----------
     log_evidence : float
+    squares : float
+        y' C^-1 y with the covariance C of the rows: as many as there are rows, on average.
     added : int
         How many of the parameters are amplitudes: the last ones.
     columns, observed : arrays, shapes (n, p) and (n,)
@@ -98,6 +100,7 @@ class Fit:
     """
 
     log_evidence: float
+    squares: float
     added: int
     columns: FloatArray
     observed: FloatArray
@@ -277,10 +280,11 @@ class System:
         floor = ROUNDING * (1.0 + A[p, p])
         A[p, p] += floor
         L: FloatArray = np.linalg.cholesky(A).astype(np.float64, copy=False)
+        squares = float(L[p, p] ** 2 - floor)
         evidence = (
-            -0.5 * (L[p, p] ** 2 - floor)
+            -0.5 * squares
             + np.log(root).sum()
             - np.log(np.diag(L)[:p]).sum()
             - 0.5 * len(y) * np.log(2.0 * np.pi)
         )
-        return Fit(float(evidence) + log_prior(scales), k, Gs, ys, L[:p, :p], L[p, :p], sd)
+        return Fit(float(evidence) + log_prior(scales), squares, k, Gs, ys, L[:p, :p], L[p, :p], sd)
