@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from plans import SENSOR
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import render_routine
-from triaxcal.codegen.routines import Generated
+from triaxcal.codegen.routines import Generated, start_generated
 from triaxcal.fixedpoint.plan import Plan
 
 UNITS = Path(__file__).parent.parent / "units"
@@ -36,3 +37,17 @@ class Built:
     @property
     def image(self) -> bytes:
         return image_bytes(self.plan)
+
+
+class Builds(dict[str, Built]):
+    """Plans by name, each compiled when it is first asked for."""
+
+    def __init__(self, plans: Mapping[str, Plan], folder: Path) -> None:
+        super().__init__()
+        self.plans, self._folder = plans, folder
+
+    def __missing__(self, name: str) -> Built:
+        plan, folder = self.plans[name], self._folder / name
+        write_generated(plan, folder)
+        self[name] = Built(plan, folder, Generated(start_generated(folder, folder).load()))
+        return self[name]

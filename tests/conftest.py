@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Generator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from random import Random
 
 import pytest
 
-from builds import UNITS, Built, write_generated
+from builds import UNITS, Builds
 from plans import COVERING, GOLDEN, random_plan
 from recordings import ABSENT, FOLDER
 from triaxcal.codegen.compiler import start_reference
-from triaxcal.codegen.routines import Generated, Reference, start_generated
+from triaxcal.codegen.routines import Reference
 from triaxcal.delivery.unit import Delivery, deliver
 
 
@@ -109,19 +108,10 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Built]:
-    """Every covering shape with random constants, and the golden plans, compiled."""
+def built(tmp_path_factory: pytest.TempPathFactory) -> Builds:
+    """Every covering shape with random constants, and the golden plans."""
     plans = {name: random_plan(Random(name), shape) for name, shape in COVERING.items()}
-    plans |= GOLDEN
-    top = tmp_path_factory.mktemp("generated")
-
-    def build(name: str) -> Built:
-        folder = top / name
-        write_generated(plans[name], folder)
-        return Built(plans[name], folder, Generated(start_generated(folder, folder).load()))
-
-    with ThreadPoolExecutor(2) as pool:
-        return dict(zip(plans, pool.map(build, plans), strict=True))
+    return Builds(plans | GOLDEN, tmp_path_factory.mktemp("generated"))
 
 
 @pytest.fixture(scope="session")

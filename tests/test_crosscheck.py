@@ -297,6 +297,7 @@ def test_a_fault_of_the_integer_model_is_refused(
         )
 
 
+@pytest.mark.long
 def test_covering_shapes_agree_on_random_int32(
     built: dict[str, Built], reference: Reference
 ) -> None:

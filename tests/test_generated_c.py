@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from random import Random
 
@@ -43,7 +43,8 @@ BUILDS = {
     "limbs": [*SANITIZERS, "-DTRIAX_ARITHMETIC=1"],
 }
 JOBS = [
-    (shape, build)
+    # Most of the time of this file is the compiler's: the golden shapes stand for the others.
+    pytest.param(shape, build, marks=[] if shape in GOLDEN else pytest.mark.long)
     for shape in (*COVERING, *GOLDEN)
     for build in BUILDS
     # "sanitized" is -O0 too, so -O0 alone and -Os run the golden shapes only: it saves seconds.
@@ -98,14 +99,22 @@ def compile_program(folder: Path, name: str, flags: Sequence[str]) -> Path:
     return program
 
 
+Programs = Callable[[str, str], Path]
+
+
 @pytest.fixture(scope="module")
-def programs(built: dict[str, Built], reference: Reference) -> dict[tuple[str, str], Path]:
-    """Every shape in every build, with its input file beside it."""
-    for name, b in built.items():
-        (b.folder / "vectors.bin").write_bytes(input_file(b.plan, reference, Random(name)))
-    with ThreadPoolExecutor(2) as pool:
-        made = pool.map(lambda j: compile_program(built[j[0]].folder, j[1], BUILDS[j[1]]), JOBS)
-        return dict(zip(JOBS, made, strict=True))
+def programs(built: dict[str, Built], reference: Reference) -> Programs:
+    """A shape in a build, compiled when it is asked for, with its input file beside it."""
+
+    @cache
+    def program(name: str, build: str) -> Path:
+        b = built[name]
+        inputs = b.folder / "vectors.bin"
+        if not inputs.exists():
+            inputs.write_bytes(input_file(b.plan, reference, Random(name)))
+        return compile_program(b.folder, build, BUILDS[build])
+
+    return program
 
 
 def run_program(program: Path, vectors_file: Path) -> subprocess.CompletedProcess[str]:
@@ -114,18 +123,14 @@ def run_program(program: Path, vectors_file: Path) -> subprocess.CompletedProces
 
 
 @pytest.mark.parametrize(("name", "build"), JOBS)
-def test_every_shape_runs_right_in_every_build(
-    programs: dict[tuple[str, str], Path], name: str, build: str
-) -> None:
-    program = programs[name, build]
+def test_every_shape_runs_right_in_every_build(programs: Programs, name: str, build: str) -> None:
+    program = programs(name, build)
     done = run_program(program, program.parent / "vectors.bin")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-def test_the_program_notices_a_wrong_vector(
-    programs: dict[tuple[str, str], Path], tmp_path: Path
-) -> None:
-    program = programs["direct-checked", "sanitized"]
+def test_the_program_notices_a_wrong_vector(programs: Programs, tmp_path: Path) -> None:
+    program = programs("direct-checked", "sanitized")
     words = np.frombuffer((program.parent / "vectors.bin").read_bytes(), dtype=np.int32).copy()
     words[1 + 8 * 7 + 5] += 1  # accel[1] of the eighth vector
     (tmp_path / "vectors.bin").write_bytes(words.tobytes())
