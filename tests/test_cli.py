@@ -9,9 +9,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
+
+from triaxcal.cli.main import run as run_command
 
 ROOT = Path(__file__).resolve().parents[1]
 TRIAXCAL = [sys.executable, "-m", "triaxcal"]
@@ -36,17 +42,37 @@ def bench(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def run(
-    *arguments: str, cwd: Path, environment: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*TRIAXCAL, *arguments],
-        cwd=cwd,
-        env=os.environ | (environment or {}),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+@dataclass(frozen=True)
+class Done:
+    """What a command left: its exit code and what it printed."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def run(*arguments: str, cwd: Path, environment: dict[str, str] | None = None) -> Done:
+    """The command in this process: Python and its imports take longer than most commands."""
+    printed, complained, code = StringIO(), StringIO(), 0
+    with (
+        chdir(cwd),
+        patch.dict(os.environ, environment or {}),
+        patch.object(sys, "argv", ["triaxcal", *arguments]),
+        redirect_stdout(printed),
+        redirect_stderr(complained),
+    ):
+        try:
+            run_command()
+        except SystemExit as leaving:
+            code = leaving.code if isinstance(leaving.code, int) else 0
+    return Done(code, printed.getvalue(), complained.getvalue())
+
+
+def run_alone(*arguments: str, cwd: Path) -> Done:
+    """The command as a process of its own."""
+    command = [*TRIAXCAL, *arguments]
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    return Done(done.returncode, done.stdout, done.stderr)
 
 
 def refused(cwd: Path, *arguments: str, environment: dict[str, str] | None = None) -> str:
@@ -194,6 +220,12 @@ def test_bad_input_is_refused_in_one_line(bench: Path, case: str) -> None:
         assert word in line
 
 
+def test_a_process_of_its_own_says_the_same(bench: Path) -> None:
+    edit(bench, MEASUREMENTS, cell("nan"))
+    for arguments in (("calib", "units/AT-CHERNIAK"), ("calib", "units/NOPE"), ("--version",)):
+        assert run_alone(*arguments, cwd=bench) == run(*arguments, cwd=bench)
+
+
 @pytest.mark.parametrize(
     ("unit", "words"),
     [
@@ -230,7 +262,7 @@ def test_usage_is_exit_code_2(bench: Path) -> None:
 
 
 def test_summary_and_files(bench: Path) -> None:
-    result = run("calib", "units/AT-CHERNIAK", cwd=bench)
+    result = run_alone("calib", "units/AT-CHERNIAK", cwd=bench)
     assert result.returncode == 0, result.stderr
     assert result.stderr == ""
     assert sorted(p.name for p in (bench / "build" / "AT-CHERNIAK").iterdir()) == FILES

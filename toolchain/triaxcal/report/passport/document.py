@@ -20,8 +20,7 @@ FORMAT = 1
 
 def passport_json(p: Passport) -> bytes:
     """JSON of a passport; without a clock, so equal inputs give equal bytes."""
-    d, u = p.delivery, p.uncertainty
-    t0 = d.calibration.thermal.t0_degc
+    d = p.delivery
     document = {
         "format": FORMAT,
         "triaxcal": __version__,
@@ -30,6 +29,18 @@ def passport_json(p: Passport) -> bytes:
         "inputs_sha256": d.inputs_sha256,
         "coverage_probability": LEVEL,
         **({"inputs": list(d.calibration.inputs)} if d.calibration.inputs else {}),
+        **_judged(p),
+        **_known(p),
+        "warnings": [*p.uncertainty.warnings, *filter(None, [p.cause])],
+        "files_sha256": {n: hashlib.sha256(c).hexdigest() for n, c in d.files.items()},
+        "tools": dict(p.tools),
+    }
+    return json_bytes(document)
+
+
+def _judged(p: Passport) -> dict[str, Any]:
+    """The verdict, and the limits that it rests on."""
+    return {
         "result": p.verdict.result,
         "verdict": p.verdict.words,
         "not_tested": list(p.verdict.not_tested),
@@ -58,13 +69,17 @@ def passport_json(p: Passport) -> bytes:
             for a in p.acceptance
         ],
         "limits_without_dwells": list(p.unchecked),
+    }
+
+
+def _known(p: Passport) -> dict[str, Any]:
+    """Constants and compensated acceleration with their uncertainty, at T0 and over temperature."""
+    u, thermal = p.uncertainty, p.delivery.calibration.thermal
+    at_t0 = thermal.constants_at(thermal.t0_degc)
+    return {
         "constants_at_t0": [
-            {
-                "name": CONSTANT_NAMES[c],
-                "value": float(d.calibration.thermal.constants_at(t0)[c]),
-                **_budget(p.constant_budgets[c]),
-            }
-            for c in range(12)
+            {"name": name, "value": float(at_t0[c]), **_budget(p.constant_budgets[c])}
+            for c, name in enumerate(CONSTANT_NAMES)
         ],
         "acceleration": {
             "worst_component": {
@@ -75,15 +90,11 @@ def passport_json(p: Passport) -> bytes:
         },
         "over_temperature": {
             "temp_degc": u.temps_degc.tolist(),
-            "constants": d.calibration.thermal.constants_at(u.temps_degc).tolist(),
+            "constants": thermal.constants_at(u.temps_degc).tolist(),
             "constants_expanded_uncertainty": u.constants_u.tolist(),
             "acceleration_expanded_uncertainty_g": u.worst_over_temperature.tolist(),
         },
-        "warnings": [*u.warnings, *filter(None, [p.cause])],
-        "files_sha256": {n: hashlib.sha256(c).hexdigest() for n, c in d.files.items()},
-        "tools": dict(p.tools),
     }
-    return json_bytes(document)
 
 
 def _budget(b: Budget) -> dict[str, Any]:
