@@ -130,7 +130,7 @@ def test_a_limit_beyond_what_is_known_is_told(passports: dict[str, Passport]) ->
     assert over.cause == "the thermal model"
     assert not p.verdict.shown
     text = " ".join(read(passport_html(p)).text.split())
-    assert "NOT SHOWNthe uncertainty reaches beyond a limit" in text
+    assert "NOT SHOWN TO PASSthe uncertainty reaches beyond a limit" in text
     assert "Not shown to be within the limits: error and uncertainty (95 %) reach" in text
     factor = significant(over.factor, 2)
     cause = "the main cause is the thermal model; measure at one"

@@ -126,6 +126,8 @@ def test_only_readings_in_one_unit_are_compared() -> None:
     assert page.count("<h4>") == 72
     assert "25 units with readings in m/s^2" in page
     assert "mm/s²/g/°C" in page
+    assert "e+0" not in page
+    assert "−" in page  # a true minus
     assert {q.unit for q in quantities(others)} == {
         "m/s²/g", "mm/s²/g/°C", "µm/s²/g/°C²", "m/s²", "mm/s²/°C", "µm/s²/°C²",
     }  # fmt: skip

@@ -34,6 +34,11 @@ def test_a_passport_does_not_deny_the_held_out_poses_of_its_head(tmp_path: Path)
     page = passport_html(made).decode()
     assert "Held-out poses" in page
     assert "nothing was held out" not in page.lower()
+    # One temperature: no curves over it; the limit is not called kept with all the uncertainty.
+    assert "Constants over temperature" not in page
+    assert "the whole uncertainty included" not in page
+    assert "with what is known; not in it: the change with temperature" in page
+    assert "m/s^2" not in page
 
 
 def header_words(header: bytes) -> str:

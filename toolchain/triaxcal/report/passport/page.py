@@ -29,6 +29,7 @@ from triaxcal.report.words.numbers import (
     handy,
     in_unit,
     percent,
+    raised,
     signed,
     significant,
     superscript,
@@ -48,11 +49,12 @@ def passport_html(p: Passport) -> bytes:
         "identity": _identity(p),
         "badge": _badge(p.verdict),
         "verdict": p.verdict,
-        "acceptance": [_acceptance(a, checked=p.verdict.checked) for a in p.acceptance],
+        "acceptance": [_acceptance(a, p) for a in p.acceptance],
         "unchecked": p.unchecked,
         "warnings": (*p.uncertainty.warnings, *_findings(p)),
         "constants": _constants(p),
         "t0": signed(f"{p.delivery.calibration.thermal.t0_degc:g}"),
+        "curved": p.delivery.calibration.shape.parameters > 1,
         "panels": curve_panels(p.delivery.calibration, p.uncertainty),
         "panel": {"width": WIDTH, "height": HEIGHT, "left": LEFT, "right": WIDTH - RIGHT},
         "residuals": residual_panels(p.delivery),
@@ -77,16 +79,12 @@ def passport_html(p: Passport) -> bytes:
 def _badge(verdict: Verdict) -> dict[str, Any]:
     """The verdict in large letters, and what it leaves open."""
     why = "; ".join(verdict.not_tested) or "see below"
-    small = {
-        PASSED: "residual, held-out error and uncertainty are within the limits",
-        NOT_SHOWN: "the uncertainty reaches beyond a limit",
-        NOT_CHECKED: "as many constants as poses",
-    }
-    return {
-        "good": verdict.shown,
-        "result": verdict.result.upper(),
-        "small": small.get(verdict.result, why),
-    }
+    result, small = {
+        PASSED: (PASSED, "residual, held-out error and uncertainty are within the limits"),
+        NOT_SHOWN: ("not shown to pass", "the uncertainty reaches beyond a limit"),
+        NOT_CHECKED: (NOT_CHECKED, "as many constants as poses"),
+    }.get(verdict.result, (verdict.result, why))
+    return {"good": verdict.shown, "result": result.upper(), "small": small}
 
 
 def _identity(p: Passport) -> dict[str, Any]:
@@ -126,13 +124,17 @@ def _left_out(calibration: Calibration) -> list[tuple[str, str]]:
 def _findings(p: Passport) -> tuple[str, ...]:
     """What was found in the readings, for the top of the page."""
     found = [*p.delivery.calibration.findings, *filter(None, [p.cause])]
-    return tuple(signed(f[0].upper() + f[1:].replace("degC", "°C")) for f in found)
+    return tuple(raised(signed(f[0].upper() + f[1:].replace("degC", "°C"))) for f in found)
 
 
-def _acceptance(a: Acceptance, *, checked: bool) -> dict[str, Any]:
+def _acceptance(a: Acceptance, p: Passport) -> dict[str, Any]:
+    checked = p.verdict.checked
+    unknown = [line.source.name for line in p.length_budget.unknown]
     factor = significant(a.factor, 2)
     if not checked:
         text = "not checked: there are as many constants as poses, so the residuals are 0"
+    elif a.shown and unknown:
+        text = f"within the limit, with what is known; not in it: {', '.join(unknown)}"
     elif a.shown:
         text = "the limit holds, the whole uncertainty included"
     else:
@@ -146,7 +148,7 @@ def _acceptance(a: Acceptance, *, checked: bool) -> dict[str, Any]:
         "limit": g_in_words(a.limit_g),
         "largest": g_in_words(a.largest_g),
         "uncertainty": g_in_words(a.uncertainty_g) if checked else "unknown",
-        "shown": a.shown and checked,
+        "shown": a.shown and checked and not unknown,
         "text": text,
         "largest_width": round(100 * a.largest_g / scale, 2),
         "uncertainty_width": round(100 * a.uncertainty_g / scale, 2),
@@ -160,7 +162,7 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
     rows = []
     for c, budget in enumerate(p.constant_budgets):
         name = p.uncertainty.units[c]
-        scale, unit = (1e3, f"m{name}") if name.startswith("V") else (1.0, name)
+        scale, unit = (1e3, f"m{name}") if name.startswith("V") else (1.0, raised(name))
         value, expanded = with_uncertainty(float(at_t0[c]), budget.expanded, scale)
         if not p.verdict.checked:
             expanded = "unknown"
@@ -184,9 +186,9 @@ def _constants(p: Passport) -> list[dict[str, Any]]:
 def _share(row: ShareRow) -> dict[str, str]:
     return {
         "name": row.name,
-        "value": signed(row.value),
-        "sd": row.sd,
-        "prior_sd": row.prior_sd,
+        "value": raised(signed(row.value)),
+        "sd": raised(row.sd),
+        "prior_sd": raised(row.prior_sd),
         "data": row.data,
         "prior": row.prior,
     }

@@ -11,6 +11,7 @@ import numpy as np
 
 from triaxcal.batch.statistics import Outlier, Quantity, Run
 from triaxcal.report.pictures.curves import ticks
+from triaxcal.report.words.numbers import signed
 
 WIDTH, HEIGHT, BASE = 232.0, 96.0, 74.0
 RUN_WIDTH, RUN_HEIGHT = 700.0, 190.0
@@ -49,14 +50,14 @@ def histogram(
                     }
                 )
     labels: list[dict[str, Any]] = [
-        {"x": round(6 + (WIDTH - 12) * (t - low) / (high - low), 2), "label": f"{t:.6g}"}
+        {"x": round(6 + (WIDTH - 12) * (t - low) / (high - low), 2), "label": signed(f"{t:.6g}")}
         for t in ticks(low, high, 3)
     ]
     return {
         "name": q.name,
         "unit": q.unit,
         "median": _rounded(q.median, q.spread),
-        "spread": f"{q.spread:.2g}",
+        "spread": _rounded(q.spread, q.spread),
         "bars": bars,
         "labels": [x for x in labels if 22 <= x["x"] <= WIDTH - 22],
     }
@@ -65,8 +66,10 @@ def histogram(
 def _rounded(value: float, spread: float) -> str:
     """Value to the second digit of its spread."""
     if spread <= 0.0:
-        return f"{value:.6g}"
-    return f"{value:.{max(0, 1 - math.floor(math.log10(spread)))}f}"
+        return signed(f"{value:.6g}")
+    places = 1 - math.floor(math.log10(spread))
+    # The sign of a negative value that is rounded to 0 goes.
+    return signed(f"{round(value, places) + 0.0:.{max(0, places)}f}")
 
 
 def drift(by_run: Sequence[Run]) -> list[dict[str, Any]]:

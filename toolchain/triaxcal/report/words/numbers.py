@@ -54,9 +54,14 @@ def g_in_words(value_g: float) -> str:
     return f"{significant(value_g * 1e9)} ng" if abs(value_g) >= _NOTHING_G else "0 ng"
 
 
+def raised(text: str) -> str:
+    """Text whose units have raised exponents."""
+    return re.sub(r"\b(s|g)\^2", r"\1²", text)
+
+
 def handy(unit: str) -> tuple[str, float]:
     """Unit in which a budget shows quantities of `unit`, and how many of it are one."""
-    return _HANDY.get(unit, (unit, 1.0))
+    return _HANDY.get(unit, (raised(unit), 1.0))
 
 
 def in_unit(value: float, unit: str) -> str:
