@@ -152,7 +152,8 @@ class Diagnosis:
         """The best cause, and what it leaves where that is not what there was before."""
         best = self.answer[0]
         if best.cause == UNKNOWN:
-            return "something that is not in the list of causes"
+            where = f", {best.place}" if best.place else ""
+            return f"something that is not in the list of causes{where}"
         text = f"{best.name}{best.size}: {best.change}"
         return text if str(best.remaining) == str(self.sound) else f"{text}, {best.remaining}"
 

@@ -189,6 +189,9 @@ def _careful(
     cause: Cause, screened: list[Screened], readings: Readings, theta: FloatArray
 ) -> Ranked:
     best = screened[0].log_evidence
-    near = [s for s in screened[:2] if s.log_evidence > best - _BEHIND]
+    # Those with the same words are the same place with another strength.
+    distinct = {s.hypothesis.place: s for s in reversed(screened)}
+    places = [s for s in screened if distinct[s.hypothesis.place] is s]
+    near = [s for s in places[:2] if s.log_evidence > best - _BEHIND]
     judged = [judge(s.hypothesis, readings, s.scales, theta) for s in near]
     return Ranked(cause, tuple(sorted(judged, key=lambda j: -j.log_evidence)))

@@ -31,7 +31,8 @@ class Pair:
     @property
     def names(self) -> str:
         """Both, in words."""
-        return " and ".join(self._names)
+        first, second = self._names
+        return f"(1) {first}, and (2) {second}"
 
     @property
     def _names(self) -> list[str]:
@@ -62,7 +63,7 @@ class Pair:
             self._undo,
             first.parameters + second.parameters,
             rows if len(first.rows) and len(second.rows) else rows[:0],
-            "; ".join(h.change for h in (first, second) if h.change != "nothing"),
+            " and ".join(h.change for h in (first, second) if h.change != "nothing"),
             places=first.places * second.places * _ways(first),
             # What makes the second more probable than others has made the first so, too.
             log_prior=first.log_prior + min(second.log_prior, 0.0) + FAULT_LOG_ODDS,
