@@ -20,6 +20,7 @@ from triaxcal.cli.main import main
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.unit import write_simulated_unit
+from triaxcal.unit.description import unit_of_text
 
 G = 9.80665
 
@@ -291,6 +292,23 @@ def test_a_unit_that_was_not_delivered(build: Path, tmp_path: Path) -> None:
     unit = str(build.parent / "units" / "U")
     with pytest.raises(RefusedError, match=r"no such file; expected a delivered calibration; run"):
         main.main(["check", unit, "--build", str(tmp_path), "--on", "x.csv"], standalone_mode=False)
+
+
+def test_poses_outside_of_the_range_are_left_out_or_refused(cal: triaxcal.Calibration) -> None:
+    """The unit is calibrated at 19.5 to 20.5 degC; the log has a thermometer."""
+    unit = cal.fitted.unit
+    assert unit.recording is not None
+    toml = unit.toml.replace('time = "t"', 'time = "t"\ntemperature = "T"')
+    warm = unit_of_text("U", toml, "U")
+    fitted = replace(cal.fitted, unit=replace(unit, recording=warm.recording))
+    given = columns(directions(8, seed=4))
+    outside = {**given, "T": np.full(len(given["t"]), 35.0)}
+    with pytest.raises(RefusedError, match=r"no pose of 8 is within: 35 degC; expected 19.5 to"):
+        InTheFieldOf(fitted).check(outside)
+    half = {**given, "T": np.where(given["t"] < 14.0, 20.0, 35.0)}
+    found = InTheFieldOf(fitted).check(half).result
+    assert 2 <= len(found.poses) < 8
+    assert any("outside of 19.5 to 20.5 degC and not used" in f for f in found.poses.findings)
 
 
 def test_a_tilters_unit_against_its_check_positions_of_another_day(tmp_path: Path) -> None:

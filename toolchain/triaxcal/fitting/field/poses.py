@@ -218,9 +218,10 @@ def inside_range(found: FieldPoses, range_degc: tuple[float, float]) -> FieldPos
         return found
     coldest, warmest = float(found.temps_degc.min()), float(found.temps_degc.max())
     if not inside.any():
+        at = " to ".join(dict.fromkeys((f"{coldest:.4g}", f"{warmest:.4g}")))
         raise RefusedError(
             found.source,
-            f"all {len(found)} poses are at {coldest:.4g} to {warmest:.4g} degC",
+            f"no pose of {len(found)} is within: {at} degC",
             expected=f"{low:g} to {high:g} degC, the range of the calibration",
             remedy="record within the range, or calibrate over a wider one",
         )
