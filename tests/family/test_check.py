@@ -194,6 +194,16 @@ def test_readings_in_g_where_the_calibration_has_metres(cal: triaxcal.Calibratio
     assert "multiplied by 9.80665" in found.suspicions[0]
 
 
+def test_codes_where_the_calibration_has_metres(cal: triaxcal.Calibration) -> None:
+    """417.3 codes in a m/s^2: no factor of a unit."""
+    found = cal.check(columns(directions(14, seed=4), gain=417.3 * K, bias=417.3 * U0)).result
+    assert not found.passed
+    assert found.explanations == ()
+    (only,) = found.suspicions
+    factor = float(only.partition("multiplied by ")[2].partition(":")[0])
+    assert factor == pytest.approx(1.0 / 417.3, rel=0.01)
+
+
 @pytest.mark.parametrize(("order", "told"), [((1, 0, 2), "y, x, z"), ((2, 0, 1), "y, z, x")])
 def test_exchanged_columns_are_recognised(
     cal: triaxcal.Calibration, order: tuple[int, ...], told: str

@@ -37,6 +37,7 @@ _STEP_MOST = 0.3
 _DIFFERENCE = 1e-6
 _FACTORS = (9.80665, 1e3, 9806.65, 1e6, 2.0, 4.0, 8.0, 16.0, 256.0, 65536.0)
 """Of readings in another unit: m/s^2, mg, mm/s^2, micro-g for g; full scales and shifts."""
+_FACTOR_STEPS = 8
 _GROSS = 0.3
 """Relative rms error of |a| from which readings in another unit are tried."""
 _HEALED = 0.2
@@ -207,19 +208,28 @@ def _disturbed(found: Expected, poses: FieldPoses) -> Explanation | None:
 
 
 def _factor(calibration: Calibration, poses: FieldPoses, gravity_g: float, relative: float) -> str:
-    """Readings in another unit: a known factor after which |a| is near g in all poses."""
-    best, ratio = min(_GROSS, _HEALED * relative), 0.0
-    for known in itertools.chain(_FACTORS, (1.0 / f for f in _FACTORS)):
-        scaled = replace(poses, readings=poses.readings * known, sd=poses.sd * known)
-        rms = _rms(calibration, scaled, gravity_g)
-        if rms < best:
-            best, ratio = rms, known
-    if not ratio:
-        return ""
-    return (
-        f"|a| is near g if the readings are multiplied by {ratio:.6g}: they are in another unit, "
-        "or of another full scale"
-    )
+    """Readings in another unit: a factor after which |a| is near g in all poses, a known one first.
+
+    Codes have any factor: that which brings the median of |a| to g, for U0 in a few steps.
+    """
+
+    def scaled(factor: float) -> FieldPoses:
+        return replace(poses, readings=poses.readings * factor, sd=poses.sd * factor)
+
+    any_factor = 1.0
+    for _ in range(_FACTOR_STEPS):
+        own = scaled(any_factor)
+        force, _ = force_and_slopes(calibration, own.readings, own.temps_degc)
+        any_factor *= gravity_g / float(np.median(np.linalg.norm(force, axis=1)))
+    known = (*_FACTORS, *(1.0 / f for f in _FACTORS))
+    best = min(known, key=lambda f: _rms(calibration, scaled(f), gravity_g))
+    for factor in (best, any_factor):
+        if _rms(calibration, scaled(factor), gravity_g) < min(_GROSS, _HEALED * relative):
+            return (
+                f"|a| is near g if the readings are multiplied by {factor:.6g}: they are in "
+                "another unit, or of another full scale"
+            )
+    return ""
 
 
 def _turned(expects: Expectation, poses: FieldPoses, gravity_g: float, relative: float) -> str:
