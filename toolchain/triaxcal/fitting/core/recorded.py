@@ -138,6 +138,8 @@ class RecordingFit:
         Rms error that the fit expects of what is held out, its noise included.
     held_out_poses : int
         Of how many poses `left_out_length_g` is.
+    contradicted : tuple of str
+        Those of `findings` that name standard deviations of [priors] which the poses contradict.
     shares : tuple of ConstantShare
     held_out : tuple of HeldOutPoses
         Errors of orientations and of temperatures held out.
@@ -160,6 +162,7 @@ class RecordingFit:
     noise_95_g: float = math.nan
     expected_g: float | None = None
     held_out_poses: int = 0
+    contradicted: tuple[str, ...] = ()
     shares: tuple[ConstantShare, ...] = ()
     held_out: tuple[HeldOutPoses, ...] = ()
 

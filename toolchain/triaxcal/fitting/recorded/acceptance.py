@@ -24,6 +24,10 @@ from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.limits import WHERE
 
+_CHECK_POSE = (
+    "check that pose with `triaxcal poses`; if it is good, state the limit that this sensor keeps"
+)
+
 
 @dataclass(frozen=True)
 class HeldOutError:
@@ -85,8 +89,7 @@ def refuse_poses_beyond_limits(unit: UnitDescription, calibration: Calibration) 
         f"| |a| - g | = {abs(errors[worst]) * 1e3:.4g} mg in pose {pose.number}, rms over "
         f"the poses {recording.rms_g * 1e3:.3g} mg",
         expected=f"at most {limits[worst] * 1e3:g} mg ({key})",
-        remedy="check that pose with `triaxcal poses`; if it is good, state the limit that "
-        "this sensor keeps",
+        remedy=next(iter(recording.contradicted), _CHECK_POSE),
     )
 
 
@@ -149,7 +152,8 @@ def _refuse_held_out(unit: UnitDescription, recording: RecordingFit) -> None:
         f"out in turn; the largest is {missed.error_g * 1e3:.4g} mg in pose {pose.number}{at}; "
         f"the fit's residual is {recording.rms_g * 1e3:.3g} mg rms",
         expected=f"at most {missed.limit_g * 1e3:g} mg ({missed.key})",
-        remedy=f"{_remedy(missed)}; `triaxcal poses` shows those that there are",
+        remedy=next(iter(recording.contradicted), "")
+        or f"{_remedy(missed)}; `triaxcal poses` shows those that there are",
     )
 
 

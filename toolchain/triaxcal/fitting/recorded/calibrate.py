@@ -12,6 +12,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.cubes import cube_findings
 from triaxcal.fitting.core.judged import ORIENTATION, TEMPERATURE, held_out_poses
 from triaxcal.fitting.core.outliers import left_out_residuals, worst_outlier
+from triaxcal.fitting.recorded.contradicted import contradicted
 from triaxcal.fitting.recorded.cubes import scalar_cubes
 from triaxcal.fitting.recorded.made import Made
 from triaxcal.fitting.recorded.magnitude import fit_with_prior
@@ -106,7 +107,8 @@ def calibrate_poses(
     delivered = choose_terms(unit, rows)
     plain = _plain_rows(unit, found, climate, replace(base, known=None), turns)
     why = _reason(thermal, delivered.own, turns, delivered.reason)
-    findings = found.findings + _outlier(best, poses, unit.loss)
+    outlier = _outlier(best, poses, unit.loss)
+    findings = found.findings + outlier
     findings += [BEYOND_1_G] if len(delivered.own.fit.model.quadratic) else []
     findings += cube_findings([scalar_cubes(delivered.full.fit)])
     shown = climate.rates if best.trial.rate else None
@@ -124,6 +126,8 @@ def calibrate_poses(
         held_out_poses(delivered.own.errors_g, turns.judged),
         why,
         findings,
+        # An outlier would contradict priors as well.
+        [] if outlier else contradicted(delivered.full, unit.t0_degc),
     )
     return measurements, made.calibration()
 

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from triaxcal.fitting.core.noise import Linearised, noise_of
 from triaxcal.fitting.recorded.calibrate import fit_of_all_terms
+from triaxcal.fitting.recorded.contradicted import log_evidence
 from triaxcal.fitting.recorded.prior import Known
 from triaxcal.fitting.recorded.solution import ScalarFit
 from triaxcal.model.types import FloatArray
@@ -55,17 +55,7 @@ class UnitPoses:
 
     def log_evidence(self, priors: Priors) -> float:
         """Ln of the probability of the poses under other priors, but for a constant."""
-        fit, posterior = self.fit, self.fit.posterior
-        assert posterior is not None
-        known = replace(self.known, priors=priors)
-        prior = known.of(fit.model, fit.data, fit.gain_functions)
-        own = posterior.weight / fit.data.weight
-        slopes = fit.jacobian * own[:, None]
-        at_mean = posterior.weight * fit.residual_g + slopes @ (prior.mean - fit.theta)
-        values = fit.data.values
-        count = float((posterior.weight**2).sum()) if values is None else values
-        at = Linearised.about(slopes @ prior.factor, at_mean, count)
-        return noise_of(at, known.noise).log_evidence
+        return log_evidence(self.fit, self.known, priors)
 
 
 @dataclass(frozen=True)

@@ -63,12 +63,13 @@ class Made:
     held_out: tuple[HeldOutPoses, ...]
     why: str
     findings: list[str]
+    contradicted: list[str]
 
     def calibration(self) -> Calibration:
         """The calibration, in the frame of the layout."""
         own, rotation = self.delivered.own, None
         constants, quadratic = own.fit.constants(), own.fit.quadratic
-        findings = list(self.findings)
+        findings = [*self.contradicted, *self.findings]
         if self.layout.frame == CASE:
             force = force_from_voltage(own.fit.data.basis @ constants.T, self.poses.readings)
             rotation, finding = case_rotation(self.poses.source, force)
@@ -122,6 +123,7 @@ class Made:
             weakest=self.linear.fit.unseen(),
             residual_g=own.fit.residual_g,
             findings=tuple(findings),
+            contradicted=tuple(self.contradicted),
             terms=_sum([part.terms for part in parts], rate_g2),
             parts=parts,
             noise_95_g=posterior.half_width,
