@@ -7,8 +7,9 @@ INSTALLED := $(VENV)/.installed
 DEVELOPER := $(VENV)/.developer
 WRITER := $(VENV)/.writer
 
-# A file stays on one core, so that its compiled fixtures are made once.
-PYTEST := $(BIN)/pytest -q -n auto --dist loadfile
+# A file stays on one core, so that its compiled fixtures are made once. The tests start the command
+# a hundred times: with bytecode of the sources as they are, also where Python writes none itself.
+PYTEST := $(BIN)/python -m compileall -q toolchain && $(BIN)/pytest -q -n auto --dist loadfile
 
 export UNIT EVERY
 

@@ -85,8 +85,10 @@ def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[Vector
     shape = plan.shape
     low, high = plan.temp_min_code, plan.temp_max_code
     # Sorted temperatures: set_temperature runs once for equal codes, as on the device.
+    codes = np.arange(low, high + 1, dtype=np.int32)
+    each = rng.multinomial(random_vectors, np.full(len(codes), 1.0 / len(codes)))
     in_range = (
-        np.sort(rng.integers(low, high, random_vectors, dtype=np.int32, endpoint=True)),
+        np.repeat(codes, each),
         rng.integers(
             shape.raw_min, shape.raw_max, (random_vectors, 3), dtype=np.int32, endpoint=True
         ),
