@@ -80,7 +80,7 @@ def _badge(verdict: Verdict) -> dict[str, Any]:
     """The verdict in large letters, and what it leaves open."""
     why = "; ".join(verdict.not_tested) or "see below"
     result, small = {
-        PASSED: (PASSED, "residual, held-out error and uncertainty are within the limits"),
+        PASSED: (PASSED, "within the limits, uncertainty included"),
         NOT_SHOWN: ("not shown to pass", "the uncertainty reaches beyond a limit"),
         NOT_CHECKED: (NOT_CHECKED, "as many constants as poses"),
     }.get(verdict.result, (verdict.result, why))
