@@ -4,9 +4,10 @@
 own-axis squares, other products, biases. Poses see only some combinations of the products, so the
 prior is kept in all 18 of them: what |a| cannot see keeps it, and what |a| sees gets the right one.
 
-Over temperature a constant's function f = sum c_p phi_p(T) has, besides the same standard deviation
-for its constant part, c ~ N(0, sd^2 (Phi^T Phi / n)^-1): its mean variance over the poses is sd^2
-for each function, whatever functions it is written in.
+Over temperature a constant's function f = sum c_p phi_p(T) has the standard deviation sd for its
+mean over the poses. What varies about that mean has, over the poses, the mean variance sd^2 as
+well, in equal parts of the other P - 1 functions, whatever functions it is written in: with more
+of them a constant varies no more.
 """
 
 from __future__ import annotations
@@ -109,10 +110,12 @@ def _over_temperature(
     constant: FloatArray, varying: FloatArray, basis: FloatArray, ones: FloatArray
 ) -> FloatArray:
     """Covariance of functions, constant by constant: their constant part, and what varies."""
-    of_constant = np.kron(constant, np.outer(ones, ones))
+    level = np.outer(ones, ones)
+    of_constant = np.kron(constant, level)
     if basis.shape[1] == 1:
         return np.asarray(of_constant, dtype=np.float64)
-    spread = np.linalg.pinv(basis.T @ basis / len(basis))
+    # Of functions that are orthonormal over the poses, all but the constant 1.
+    spread = (np.linalg.pinv(basis.T @ basis / len(basis)) - level) / (basis.shape[1] - 1)
     return np.asarray(of_constant + np.kron(varying, spread), dtype=np.float64)
 
 
