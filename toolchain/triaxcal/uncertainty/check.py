@@ -6,8 +6,8 @@ passes where
     r^T cov(r)^-1 r / n    is no larger than Fisher's F with n and nu degrees of freedom gives once
                            in 1 / CHANCE checks of a sound unit, and
     |r_i|                  is beyond the unit's limit in no pose, by the C as by the model, by more
-                           than its noise: than the quantile of a normal distribution that the
-                           noise of any of the n poses exceeds once in 1 / CHANCE checks.
+                           than its noise: than the quantile of Student's t, with nu degrees of
+                           freedom, that any of n poses exceeds once in 1 / CHANCE checks.
 
 Where it fails, causes of one kind are fitted (`uncertainty.explain`): those that leave an ordinary
 chi-square are named, all of them, with as few values as any needs.
@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from triaxcal.fitting.core.outliers import CHANCE
 from triaxcal.fitting.field.poses import FieldPoses, inside_range
 from triaxcal.fixedpoint.integer_model import STATUS_RAW_RANGE, STATUS_SATURATED
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
-from triaxcal.uncertainty.expected import Expected, chance_of, expectation
+from triaxcal.uncertainty.expected import Expected, chance_of, exceeded_with, expectation
 from triaxcal.uncertainty.explain import Explanation, Parts, why
 
 _POWER = 1.645
@@ -88,8 +87,8 @@ class FieldCheck:
     @property
     def noise_g(self) -> FloatArray:
         """What the noise of each of the n poses exceeds once in 1 / `CHANCE` checks, shape (n,)."""
-        quantile = NormalDist().inv_cdf(1.0 - CHANCE / len(self.poses))
-        result: FloatArray = quantile * self.expected.own_sd_g
+        square = exceeded_with(2.0 * CHANCE / len(self.poses), 1, self.expected.dof)
+        result: FloatArray = math.sqrt(square) * self.expected.own_sd_g
         return result
 
     @property
@@ -184,12 +183,8 @@ def _seen_bias(found: Expected) -> FloatArray:
     """
     u = found.force_g / np.linalg.norm(found.force_g, axis=1, keepdims=True)
     information = (u * found.solve(u)).sum(axis=0)
-    count, low, high = len(u), 1.0, 1e6
-    for _ in range(60):
-        middle = math.sqrt(low * high)
-        over = chance_of(middle * count, count, found.dof) >= CHANCE
-        low, high = (middle, high) if over else (low, middle)
-    quantile, h = high * count, 0.0
+    count, h = len(u), 0.0
+    quantile = exceeded_with(CHANCE, count, found.dof)
     for _ in range(50):
         h = quantile - count + _POWER * math.sqrt(2.0 * count + 4.0 * h)
     seen = np.sqrt(h / np.maximum(information, 1e-300))

@@ -14,7 +14,7 @@ taken by the formula of Woodbury, linear in the number of poses.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -52,7 +52,8 @@ class Expected:
     factor_g : array, shape (n, m)
         F of all sources beside each other.
     dof : int
-        Effective degrees of freedom of the variances.
+        Effective degrees of freedom of chi-square, by Welch and Satterthwaite: a source has the
+        share tr(cov(r)^-1 cov_s) / n of it.
     """
 
     error_g: FloatArray
@@ -110,6 +111,16 @@ def chance_of(chi_square: float, count: int, dof: int) -> float:
     return fisher_tail(count, dof, chi_square / count)
 
 
+def exceeded_with(chance: float, count: int, dof: int) -> float:
+    """Chi-square of `count` values that is exceeded with a chance (`chance_of`)."""
+    low, high = 1.0, 1e6
+    for _ in range(60):
+        middle = math.sqrt(low * high)
+        over = chance_of(middle * count, count, dof) >= chance
+        low, high = (middle, high) if over else (low, middle)
+    return high * count
+
+
 @dataclass(frozen=True)
 class Expectation:
     """What a calibration leads one to expect at some temperatures, whatever the readings are.
@@ -139,17 +150,19 @@ class Expectation:
         length = np.linalg.norm(force, axis=1)
         factors = [self.factor(key, poses, force) for key in self.roots]
         own, own_dof = _own_variance(self.unit, calibration, self.known, poses, slopes)
-        each = [float((f**2).sum()) for f in factors] + [float(own.sum())]
-        dofs = (*self.dofs, own_dof)
-        loss = math.fsum(v * v / d for v, d in zip(each, dofs, strict=True))
-        dof = math.fsum(each) ** 2 / loss if loss else math.inf
-        return Expected(
+        found = Expected(
             error_g=length - gravity_g,
             force_g=force,
             own_sd_g=np.sqrt(own),
             factor_g=np.concatenate([*factors, np.zeros((len(own), 1))], axis=1),
-            dof=max(1, int(min(dof, _DOF_MAX))),
+            dof=_DOF_MAX,
         )
+        shares = [float((F * found.solve(F)).sum()) / len(own) for F in factors]
+        dofs = (*self.dofs, own_dof)
+        loss = math.fsum(
+            share**2 / dof for share, dof in zip((*shares, 1.0 - sum(shares)), dofs, strict=True)
+        )
+        return replace(found, dof=max(1, int(1.0 / max(loss, 1.0 / _DOF_MAX))))
 
     def factor(self, key: str, poses: FieldPoses, force_g: FloatArray) -> FloatArray:
         """F of a source: rows of the poses by the roots of its covariances, (n, 12 or 30)."""

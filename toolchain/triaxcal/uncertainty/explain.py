@@ -65,7 +65,10 @@ class Explanation:
 
 @dataclass(frozen=True)
 class _Outputs:
-    """K, U0 and the outputs' sensitivities at each pose, as `model.framefree` has them."""
+    """K and U0 at each pose, and the outputs' sensitivities at T0, as `model.framefree` has them.
+
+    A bias that changed is the same in the reading's unit at all temperatures, as a drift is.
+    """
 
     K: FloatArray
     U0: FloatArray
@@ -73,8 +76,10 @@ class _Outputs:
 
     @staticmethod
     def of(calibration: Calibration, poses: FieldPoses) -> _Outputs:
-        K, U0 = unpack_constants(calibration.thermal.constants_at(poses.temps_degc))
-        return _Outputs(K, U0, np.linalg.norm(K, axis=2))
+        thermal = calibration.thermal
+        K, U0 = unpack_constants(thermal.constants_at(poses.temps_degc))
+        at_t0 = unpack_constants(thermal.constants_at(thermal.t0_degc))[0]
+        return _Outputs(K, U0, np.linalg.norm(at_t0, axis=1))
 
 
 @dataclass(frozen=True)
