@@ -343,7 +343,9 @@ WITHOUT_SIZE = {
     "scatter", "gain", "mounting", "left_handed",
 }  # fmt: skip
 """Faults of one size."""
-NEEDS_CHECKS = {"hysteresis", "drift", "settling"}
+NEEDS_CHECKS = {
+    "hysteresis", "drift", "settling", "cubes", "drift_and_dwell", "exchange_and_hysteresis",
+}  # fmt: skip
 """Without check dwells these are a part of the curves of one rising pass, whatever the method."""
 
 

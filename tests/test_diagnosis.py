@@ -205,3 +205,10 @@ def test_a_folder_is_diagnosed_as_its_unit_is(tmp_path: Path) -> None:
     found = triaxcal.diagnose(folder)
     assert found.sentence == triaxcal.diagnose(triaxcal.read_unit(folder)).sentence
     assert triaxcal.diagnose(str(folder)).answer[0].cause == "dwell"
+
+
+def test_without_check_dwells_squares_and_squareness_are_one_answer() -> None:
+    unit, measurements, _ = simulated("other_squares", 2e-3, 1, checks=False)
+    assert {"squareness", "other_squares"} <= {s.cause for s in diagnose(unit, measurements).answer}
+    unit, measurements, _ = simulated("squareness", 2e-3, 1)
+    assert [s.cause for s in diagnose(unit, measurements).answer] == ["squareness"]

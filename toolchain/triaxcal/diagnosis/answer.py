@@ -13,7 +13,7 @@ from triaxcal.diagnosis.core.curves import standing_force
 from triaxcal.diagnosis.core.evidence import Judged
 from triaxcal.diagnosis.core.readings import Readings, readings_of
 from triaxcal.diagnosis.nextdwell import Request, next_dwell
-from triaxcal.diagnosis.ranking import Ranked, rank
+from triaxcal.diagnosis.ranking import TOGETHER, Ranked, rank
 from triaxcal.diagnosis.remaining import Remaining, remaining
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.readings.measurements import MeasurementSet
@@ -25,6 +25,8 @@ _EQUIVALENT = 0.5
 """Difference of log likelihood below which readings cannot tell two causes at all."""
 _PLACES = 8.0
 """Log evidence that numbers of places can differ by."""
+_ALIKE = 12.0
+"""Log evidence that causes which explain the same readings can differ by, having other priors."""
 _FAR_BEHIND = 12.0
 """Log evidence behind the best, beyond which no dwell is asked for to tell a second cause."""
 UNKNOWN = "unknown"
@@ -79,6 +81,8 @@ class Suspect:
         Label and place.
     spoils, symptom : bool
         Whether constants of readings with it are wrong; whether it is but how they look.
+    alike : tuple of str
+        Causes that explain the same readings, where there are no check dwells.
     """
 
     cause: str
@@ -93,6 +97,7 @@ class Suspect:
     name: str
     spoils: bool
     symptom: bool
+    alike: tuple[str, ...]
     judged: Judged = field(repr=False, compare=False)
 
     @property
@@ -204,12 +209,16 @@ def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
     readings = sound.readings
     base = sound.fit.log_evidence
     suspects = [_suspect(r, j, readings, base) for r in ranked for j in r.places]
-    suspects.sort(key=lambda s: -s.log_evidence)
+    # Two causes go first only where they are clearly more probable than one.
+    suspects.sort(key=lambda s: (MARGIN if s.cause == TOGETHER else 0.0) - s.log_evidence)
     best = suspects[0]
+    checks = not readings.test.all()
     answer = [
         s
         for s in suspects
-        if s.log_evidence > best.log_evidence - MARGIN or _equivalent(s.judged, best.judged)
+        if s.log_evidence > best.log_evidence - MARGIN
+        or _equivalent(s.judged, best.judged)
+        or (not checks and s.cause in best.alike and s.log_evidence > best.log_evidence - _ALIKE)
     ]
     if best.log_evidence <= 0.0:
         answer = []
@@ -259,5 +268,6 @@ def _suspect(ranked: Ranked, judged: Judged, readings: Readings, base: float) ->
         name_of(ranked.cause, hypothesis),
         ranked.cause.spoils or hypothesis.spoils,
         ranked.cause.symptom,
+        ranked.cause.alike,
         judged,
     )

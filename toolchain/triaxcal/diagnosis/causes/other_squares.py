@@ -41,5 +41,6 @@ ENTRY = Cause(
     doc="The sensor is not linear: its outputs have terms in the squares of the other axes.",
     hypotheses=_hypotheses,
     apart="more than 1 g from own-axis squares, the unit turned on its face from a tilt of the rig",
+    alike=("squareness",),
     rank=42,
 )

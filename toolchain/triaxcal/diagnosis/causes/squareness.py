@@ -43,5 +43,6 @@ ENTRY = Cause(
     doc="The faces of the rig are not square: each position is tilted, at every temperature.",
     hypotheses=_hypotheses,
     apart="the angles of the rig's faces; the unit turned on its face",
+    alike=("other_squares", "own_square"),
     rank=21,
 )

@@ -179,6 +179,8 @@ class Cause:
     spoils : bool
         Whether the constants of readings with it are wrong: they are refused where it is certain
         and beyond the limit, however small their residuals are.
+    alike : tuple of str
+        Causes that explain the same readings, where there are no check dwells.
     symptom : bool
         Whether it says how the readings look, and not why: general advice on them still holds.
     rank : int
@@ -192,6 +194,7 @@ class Cause:
     apart: str
     discrete: bool = False
     spoils: bool = False
+    alike: tuple[str, ...] = ()
     symptom: bool = False
     rank: int = 100
 
