@@ -202,6 +202,8 @@ def test_what_is_written_and_said(ran: Ran) -> None:
     assert f"inputs sha256 {stated['inputs_sha256'][:16]}." in header
     assert "accelerometer code: 21 bits for 10.48576 g full scale" in header
     assert "not corrected: delay of the accelerometers behind the gyros" in header
+    assert "verdict of the filter: innovations" in header
+    assert "not tested: nothing was held out, and no limit is stated for an IMU" in header
 
 
 def test_the_page_warns_of_what_was_left_out(ran: Ran) -> None:

@@ -17,6 +17,7 @@ from triaxcal.codegen.compiler import find_compiler
 from triaxcal.codegen.constants import Provenance
 from triaxcal.codegen.imu import ImuBuild, build_imu
 from triaxcal.delivery.inputs import files_sha256
+from triaxcal.dynamic.consistency import verdict
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.device import Device
 from triaxcal.dynamic.imumodel import imu_model, left_out
@@ -140,6 +141,8 @@ def _provenance(
             *turned_columns(done.unit),
             "V below stands for g in the accelerometer, for rad/s in the gyro",
             *(f"not corrected: {title}" for title in omitted),
+            f"verdict of the filter: {verdict(done.result)}",
+            "not tested: nothing was held out, and no limit is stated for an IMU",
         ),
     )
 

@@ -13,9 +13,10 @@ from triaxcal import __version__
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.consistency import verdict
 from triaxcal.dynamic.observability import Observability
 from triaxcal.dynamic.unit import DynamicUnit
-from triaxcal.report.dynamicpage import digits, dynamic_page, verdict, weak_words
+from triaxcal.report.dynamicpage import digits, dynamic_page, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
 
 FORMAT = 1

@@ -12,6 +12,7 @@ from triaxcal import __version__
 from triaxcal.codegen.templates import environment
 from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.consistency import consistent, verdict
 from triaxcal.dynamic.observability import Weak
 from triaxcal.report.imuc import NO_C, imu_verification
 from triaxcal.report.words.firmware import file_rows, tool_rows
@@ -20,23 +21,7 @@ from triaxcal.report.words.numbers import signed, superscript, thousands
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
 BAND = 10.0
 """Panels show so many final standard deviations on each side."""
-LEAST_RATIO, MOST_RATIO = 0.5, 1.1
-"""Mean square of the innovations over that of the stated noise, where they agree."""
 PLOT_LEFT, PLOT_WIDTH = 30.0, 670.0
-
-
-def verdict(result: DynamicResult) -> str:
-    """Whether the innovations are what the stated noise gives; one sentence."""
-    last = result.passes[-1]
-    ratio = last.chi_square / last.freedom
-    if ratio > MOST_RATIO:
-        return (
-            f"innovations {math.sqrt(ratio):.2f} times the stated noise: an effect is missing, or "
-            "there is more noise than stated"
-        )
-    if ratio < LEAST_RATIO:
-        return f"innovations {math.sqrt(ratio):.2f} times the stated noise: less noise than stated"
-    return f"innovations {math.sqrt(ratio):.2f} times the stated noise: consistent"
 
 
 def digits(value: float, sd: float) -> str:
@@ -54,12 +39,6 @@ def weak_words(weak: Weak) -> str:
         f"{digits(weak.sd_next, weak.sd_next)} {weak.unit} or less"
     )
     return f"{text}: {weak.why}." if weak.why else f"{text}."
-
-
-def consistent(result: DynamicResult) -> bool:
-    """Whether the innovations are what the stated noise gives."""
-    last = result.passes[-1]
-    return LEAST_RATIO <= last.chi_square / last.freedom <= MOST_RATIO
 
 
 def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> bytes:
