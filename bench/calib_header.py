@@ -47,7 +47,7 @@ def measure(unit: str) -> None:
         floor = [
             [sys.executable, "-c", "import numpy, scipy, jinja2"],
             [find_compiler(), *FLAGS, "-shared", "-fPIC", "-o", "floor.so",
-             f"-I{generated}", str(generated / "triax_comp.c"),
+             f"-I{generated}", str(generated / "triax_comp.c"), str(generated / "triax_calib.c"),
              str(ROOT / "firmware_ref" / "triax_batch.c")],
         ]  # fmt: skip
         rounds = [(timed(ours, folder), timed(floor, folder)) for _ in range(ROUNDS)]

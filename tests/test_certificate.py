@@ -14,6 +14,7 @@ import pytest
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.constants import function_format
+from triaxcal.codegen.names import names_of
 from triaxcal.delivery.unit import Delivery
 from triaxcal.report.a2l import calib_a2l, calib_words
 from triaxcal.report.dcc import DCC, SI, certificate_xml
@@ -304,7 +305,7 @@ def test_a2l_blocks_nest_and_refer_to_each_other(delivered: dict[str, Delivery])
             assert stack.pop() == tokens[i + 1]
     assert stack == []
     assert used == methods
-    assert {name for name, _ in symbols} == {'"TRIAX_CALIB"'}
+    assert {name for name, _ in symbols} == {f'"{names_of(delivery.plan).linked}_calib_constants"'}
     assert [offset for _, offset in symbols] == [w.offset for w in calib_words(delivery)]
 
 

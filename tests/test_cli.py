@@ -28,6 +28,7 @@ FILES = [
     "residuals.svg",
     "triax_calib.a2l",
     "triax_calib.bin",
+    "triax_calib.c",
     "triax_calib.h",
     "triax_comp.c",
     "triax_comp.h",

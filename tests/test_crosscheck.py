@@ -169,7 +169,7 @@ def parse(refusal: RefusedError) -> tuple[int, list[int], list[int], int, list[i
     return int(temp), triple(raw), triple(out), int(status), triple(expected), int(good)
 
 
-def test_a_corrupted_constant_of_the_header_is_refused(
+def test_a_corrupted_constant_is_refused(
     built: dict[str, Built],
     reference: Reference,
     sets: dict[str, list[VectorSet]],
@@ -177,10 +177,10 @@ def test_a_corrupted_constant_of_the_header_is_refused(
 ) -> None:
     b = built["direct-checked"]
     write_generated(b.plan, tmp_path)
-    header = tmp_path / "triax_calib.h"
-    text = header.read_text(encoding="utf-8")
+    constants = tmp_path / "triax_calib.c"
+    text = constants.read_text(encoding="utf-8")
     assert text.count("-1223585409,") == 1  # Nyy
-    header.write_text(text.replace("-1223585409,", "-1223585408,"), encoding="utf-8")
+    constants.write_text(text.replace("-1223585409,", "-1223585408,"), encoding="utf-8")
     wrong = Generated(start_generated(tmp_path, tmp_path).load())
     with pytest.raises(RefusedError) as refusal:
         cross_check(

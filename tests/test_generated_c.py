@@ -91,7 +91,8 @@ def input_file(plan: Plan, reference: Reference, rng: Random) -> bytes:
 
 def compile_program(folder: Path, name: str, flags: Sequence[str]) -> Path:
     program = folder / f"run-{name}"
-    command = ["gcc", *STRICT, *flags, f"-I{folder}", str(folder / "triax_comp.c"), str(MAIN)]
+    command = ["gcc", *STRICT, *flags, f"-I{folder}", str(MAIN)]
+    command += [str(folder / name) for name in ("triax_comp.c", "triax_calib.c")]
     done = subprocess.run(
         [*command, "-o", str(program)], capture_output=True, text=True, check=False
     )
@@ -201,7 +202,8 @@ def mutant_library(folder: Path, batch: Path, mutant: Mutant) -> ctypes.CDLL:
     assert mutant.old in text, "this text is no longer in the routine: write the mutant anew"
     source = folder / "triax_comp.c"
     source.write_text(text.replace(mutant.old, mutant.new, 1), encoding="utf-8")
-    gcc(source, batch.parent, str(batch), "-shared", "-o", str(folder / "mutant.so"))
+    more = [str(batch), str(batch.parent / "triax_calib.c")]
+    gcc(source, batch.parent, *more, "-shared", "-o", str(folder / "mutant.so"))
     return ctypes.CDLL(str(folder / "mutant.so"))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from builds import PROVENANCE
 from plans import GOLDEN, SENSOR
-from triaxcal.codegen.constants import CONSTANTS_FILE, render_constants
+from triaxcal.codegen.constants import CONSTANTS_FILES, render_constants
 from triaxcal.codegen.render import ROUTINE_FILES, render_routine
 
 FOLDER = Path(__file__).parent / "golden"
@@ -44,7 +44,7 @@ def compare_or_update(found: str, golden: Path, *, update: bool) -> None:
     pytest.fail("\n".join([*list(difference)[:60], REMEDY]), pytrace=False)
 
 
-@pytest.mark.parametrize("file", [*ROUTINE_FILES, CONSTANTS_FILE])
+@pytest.mark.parametrize("file", [*ROUTINE_FILES, *CONSTANTS_FILES])
 @pytest.mark.parametrize("name", GOLDEN)
 def test_generated_c_is_as_it_was(name: str, file: str, request: pytest.FixtureRequest) -> None:
     update = bool(request.config.getoption("--update-golden"))

@@ -10,15 +10,14 @@ typedef floating_calib_t subject_calib_t;
 #define subject_apply floating_apply
 #define SUBJECT_CALIB (&FLOATING_CALIB)
 #elif defined(BENCH_GYRO)
-#include "triax_gyro_comp.h"
+#include "triax_gyro_calib.h"
 typedef triax_gyro_state_t subject_state_t;
 typedef triax_gyro_calib_t subject_calib_t;
 #define subject_set_temperature triax_gyro_set_temperature
 #define subject_apply triax_gyro_apply
-extern const triax_gyro_calib_t TRIAX_GYRO_CALIB;
 #define SUBJECT_CALIB (&TRIAX_GYRO_CALIB)
 #else
-#include "triax_comp.h"
+#include "triax_calib.h"
 typedef triax_state_t subject_state_t;
 typedef triax_calib_t subject_calib_t;
 #if defined(TRIAX_RATE_Q)
@@ -27,7 +26,6 @@ typedef triax_calib_t subject_calib_t;
 #define subject_set_temperature triax_set_temperature
 #endif
 #define subject_apply triax_apply
-extern const triax_calib_t TRIAX_CALIB;
 #define SUBJECT_CALIB (&TRIAX_CALIB)
 #endif
 

@@ -7,7 +7,11 @@
  * No heap, no floats, no library calls.
  * Every int32_t is a legal raw or temperature code.
  */
-#ifndef TRIAX_COMP_H
+#ifdef TRIAX_COMP_H
+#if TRIAX_SHAPE != 0x85FE3418u
+#error "two triax_comp.h of different shapes in one file: give each sensor its own [firmware] prefix"
+#endif
+#else
 #define TRIAX_COMP_H
 
 #include <stddef.h>
@@ -40,6 +44,15 @@ extern "C" {
 #define TRIAX_STATUS_RAW_RANGE 4u  /* a raw code outside TRIAX_RAW_MIN to TRIAX_RAW_MAX was clamped */
 #define TRIAX_STATUS_SATURATED 8u  /* a result did not fit int32_t and was saturated */
 #define TRIAX_STATUS_BAD_IMAGE 16u /* the image or the constants were refused */
+
+/*
+ * Link names carry the shape: what was compiled with this header links to the routine of this shape
+ * and to no other.
+ */
+#define TRIAX_SHAPE 0x85FE3418u
+#define triax_set_temperature triax_85fe3418_set_temperature
+#define triax_apply triax_85fe3418_apply
+#define triax_calib_load triax_85fe3418_calib_load
 
 /* What this routine was generated for; an image of another shape is refused. */
 #define TRIAX_SEGMENTS 1

@@ -129,7 +129,7 @@ class Firmware:
             folder = Path(name)
             for file, content in self.files.items():
                 (folder / file).write_bytes(content)
-            yield CompiledFirmware(self, start_generated(folder, folder).load())
+            yield CompiledFirmware(self, start_generated(folder, folder, self.plan.prefix).load())
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:
         """Write the C and the image, all of them or none, into a folder of their own.

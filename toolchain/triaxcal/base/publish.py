@@ -7,6 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Collection, Mapping
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError, refused_by_system
@@ -16,7 +17,7 @@ def publish(files: Mapping[str, bytes], target: Path, sometimes: Collection[str]
     """Make the folder `target` hold exactly these files.
 
     They are written to a folder beside it, which takes its place when it is complete. `sometimes`
-    names files that an earlier delivery may have had besides.
+    names files that an earlier delivery may have had besides; * stands for any text.
 
     Raises
     ------
@@ -110,7 +111,11 @@ def _refuse_foreign(target: Path, files: Collection[str]) -> None:
     if not target.is_dir():
         return
     try:
-        foreign = sorted(path.name for path in target.iterdir() if path.name not in files)
+        foreign = sorted(
+            path.name
+            for path in target.iterdir()
+            if not any(fnmatchcase(path.name, file) for file in files)
+        )
     except OSError as error:
         raise _refusal(target, error) from error
     if foreign:

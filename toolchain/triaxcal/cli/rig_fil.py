@@ -62,7 +62,7 @@ def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
     sources = [
         *(ours / name for name in NODE_SOURCES),
         folder / "tilter.c",
-        folder / "triax_comp.c",
+        *(folder / name for name in files if name.endswith(".c")),
     ]
     command = [find_compiler(), *FLAGS, f"-I{folder}", f"-I{ours}", "-o", str(program)]
     done = subprocess.run(

@@ -1,12 +1,12 @@
-"""triax_calib.h: each constant with its physical value, format and rounding."""
+"""triax_calib.h and .c: each constant with its physical value, format and rounding."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-from triaxcal.codegen.render import shape_id
-from triaxcal.codegen.templates import int32_literal, names_of, render
+from triaxcal.codegen.names import names_of
+from triaxcal.codegen.templates import int32_literal, render
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.gyro import SENSITIVITY_NAMES, sensitivity_log2
 from triaxcal.fixedpoint.plan import Plan
@@ -16,7 +16,7 @@ from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unit.thermometer import TemperatureSensor
 
-CONSTANTS_FILE = "triax_calib.h"
+CONSTANTS_FILES = ("triax_calib.h", "triax_calib.c")
 
 
 @dataclass(frozen=True)
@@ -41,21 +41,20 @@ class Provenance:
 def render_constants(
     plan: Plan, sensor: TemperatureSensor, provenance: Provenance
 ) -> dict[str, str]:
-    """Text of triax_calib.h, or of a gyro's triax_gyro_calib.h, by its name."""
-    source = f"shape {shape_id(plan)}, inputs sha256 {provenance.inputs_sha256[:16]}"
-    name, text = render(
-        CONSTANTS_FILE,
-        source,
-        names_of(plan.shape),
-        serial=provenance.serial,
-        summary=provenance.summary,
-        temp_min=_code(plan.temp_min_code, sensor),
-        temp_max=_code(plan.temp_max_code, sensor),
-        segments=[_segment_context(plan, s, sensor) for s in range(len(plan.segments))],
-        rate=_rate_context(plan, sensor),
+    """Texts of `CONSTANTS_FILES`, or a gyro's, by name."""
+    names = names_of(plan)
+    source = f"shape {names.shape}, inputs sha256 {provenance.inputs_sha256[:16]}"
+    context = {
+        "serial": provenance.serial,
+        "summary": provenance.summary,
+        "inputs_word": f"0x{provenance.inputs_sha256[:8].upper()}u",
+        "temp_min": _code(plan.temp_min_code, sensor),
+        "temp_max": _code(plan.temp_max_code, sensor),
+        "segments": [_segment_context(plan, s, sensor) for s in range(len(plan.segments))],
+        "rate": _rate_context(plan, sensor),
         **_terms_context(plan),
-    )
-    return {name: text}
+    }
+    return dict(render(name, source, names, **context) for name in CONSTANTS_FILES)
 
 
 def _terms_context(plan: Plan) -> dict[str, Any]:

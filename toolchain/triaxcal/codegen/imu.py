@@ -14,7 +14,8 @@ from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.crosscheck import RANDOM_VECTORS, CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images, image_cases
-from triaxcal.codegen.render import render_routine, shape_id
+from triaxcal.codegen.names import imu_context, names_of
+from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.routines import (
     Generated,
     GeneratedImu,
@@ -92,12 +93,14 @@ def build_imu(
         for file, content in files.items():
             (folder / file).write_bytes(content)
         reference = start_reference(folder).load()
-        library = start_generated_imu(folder, folder).load()
+        library = start_generated_imu(folder, folder, accel.prefix).load()
         checks = (
             _check(accel, routines_of(accel.rate, library, reference), random_vectors),
             _check(gyro, (GyroGenerated(library), GyroReference(reference)), random_vectors),
         )
-        vectors = _check_both(accel, gyro, GeneratedImu(library), files[IMU_IMAGE_FILE])
+        vectors = _check_both(
+            accel, gyro, GeneratedImu(library), image_bytes(accel) + image_bytes(gyro)
+        )
     for what, bound, check in zip(("accelerometer", "gyro"), bounds, checks, strict=True):
         if check.largest_error_lsb > bound.lsb:
             raise RefusedError(
@@ -117,10 +120,11 @@ def render_imu(
     texts = {**render_routine(accel), **render_routine(gyro)}
     for plan, triad in zip((accel, gyro), triads, strict=True):
         texts |= render_constants(plan, triad.temperature_sensor, provenance)
-    shapes = f"shapes {shape_id(accel)} and {shape_id(gyro)}"
-    texts |= dict(render(name, shapes) for name in IMU_FILES)
+    names, context = names_of(accel), imu_context(accel, gyro)
+    shapes = f"shapes {names.shape} and {names_of(gyro).shape}"
+    texts |= dict(render(name, shapes, names, **context) for name in IMU_FILES)
     files = {name: text.encode() for name, text in texts.items()}
-    files[IMU_IMAGE_FILE] = image_bytes(accel) + image_bytes(gyro)
+    files[names.file(IMU_IMAGE_FILE)] = image_bytes(accel) + image_bytes(gyro)
     return files
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import zlib
 from typing import Any
 
 from triaxcal.codegen.forms import assembly, forms_using, limb_split
 from triaxcal.codegen.image import header_names, header_words, image_size
-from triaxcal.codegen.templates import macro_literal, names_of, render
+from triaxcal.codegen.names import names_of
+from triaxcal.codegen.templates import macro_literal, render
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.gyro import SENSITIVITY_LIMIT
 from triaxcal.fixedpoint.plan import Plan
@@ -23,17 +23,11 @@ _TERM_TABLES = (
 """The table of terms of an accelerometer and of a gyro."""
 
 
-def shape_id(plan: Plan) -> str:
-    """Eight hex digits of the shape: equal exactly when the generated routine is equal."""
-    words = header_words(plan)
-    return f"{zlib.crc32(b''.join(w.to_bytes(4, 'little') for w in words)):08x}"
-
-
 def render_routine(plan: Plan) -> dict[str, str]:
     """Texts of `ROUTINE_FILES`, or a gyro's, by name; they depend on the plan's shape only."""
     context = _routine_context(plan)
-    source = f"shape {shape_id(plan)}"
-    return dict(render(n, source, names_of(plan.shape), **context) for n in ROUTINE_FILES)
+    names = names_of(plan)
+    return dict(render(n, f"shape {names.shape}", names, **context) for n in ROUTINE_FILES)
 
 
 def _routine_context(plan: Plan) -> dict[str, Any]:

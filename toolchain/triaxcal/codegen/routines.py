@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -15,7 +15,9 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import Compilation, compile_library
 from triaxcal.codegen.forces import forces_of, rates_of
+from triaxcal.codegen.shim import write_shim
 from triaxcal.fixedpoint.rate import RatePlan
+from triaxcal.unit.prefix import DEFAULT_PREFIX
 
 Int32Array = npt.NDArray[np.int32]
 UInt32Array = npt.NDArray[np.uint32]
@@ -46,26 +48,26 @@ def difference(found: Answers, expected: Answers) -> Difference | None:
     return Difference(i, int(differs.sum()), *words)
 
 
-def start_generated(folder: Path, target: Path) -> Compilation:
-    """Start compiling the generated files in `folder` with the batch entry."""
-    source = shipped("firmware_ref")
-    return compile_library(
-        [folder / "triax_comp.c", source / "triax_batch.c"],
-        target / "triax_comp.so",
-        include=[folder, source],
-    )
+def start_generated(folder: Path, target: Path, prefix: str = DEFAULT_PREFIX) -> Compilation:
+    """Start compiling the generated files in `folder` with the batch entry, into `target`."""
+    return _start(folder, target, prefix, ("comp", "calib"), ("batch",))
 
 
-def start_generated_imu(folder: Path, target: Path) -> Compilation:
+def start_generated_imu(folder: Path, target: Path, prefix: str = DEFAULT_PREFIX) -> Compilation:
     """Start compiling the generated files of an IMU in `folder` with the batch entries."""
+    names = ("comp", "calib", "gyro_comp", "gyro_calib", "imu")
+    return _start(folder, target, prefix, names, ("batch", "gyro_batch", "imu_batch"))
+
+
+def _start(
+    folder: Path, target: Path, prefix: str, names: Sequence[str], batches: Sequence[str]
+) -> Compilation:
     source = shipped("firmware_ref")
-    names = ("triax_comp.c", "triax_gyro_comp.c", "triax_imu.c")
-    batches = ("triax_batch.c", "triax_gyro_batch.c", "triax_imu_batch.c")
-    return compile_library(
-        [*(folder / name for name in names), *(source / name for name in batches)],
-        target / "triax_imu.so",
-        include=[folder, source],
-    )
+    shim = write_shim(target / "names", prefix)
+    sources = [folder / f"{prefix}_{name}.c" for name in names]
+    sources += [source / f"{DEFAULT_PREFIX}_{name}.c" for name in batches]
+    library = target / f"{prefix}_{names[-1]}.so"
+    return compile_library(sources, library, include=[folder, *shim, source])
 
 
 @dataclass(frozen=True)

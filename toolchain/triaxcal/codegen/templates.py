@@ -1,8 +1,7 @@
-"""The templates: their environment, and the names that the C of a triad has in them."""
+"""The templates: their environment, and what every C file begins with."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -10,43 +9,7 @@ import jinja2
 
 from triaxcal import __version__
 from triaxcal.base.shipped import shipped
-from triaxcal.fixedpoint.shape import Shape
-
-
-@dataclass(frozen=True)
-class Names:
-    """Names in the C of a triad; status bits and TRIAX_ARITHMETIC are common to all.
-
-    Attributes
-    ----------
-    triad : str
-        What the names of functions, types and files begin with.
-    result : str
-        Name of what triax_apply gives.
-    """
-
-    triad: str
-    result: str
-
-    def file(self, name: str) -> str:
-        """Name of this triad's file, from an accelerometer's: triax_comp.c, triax_gyro_comp.c."""
-        return self.triad + name.removeprefix(ACCEL_NAMES.triad)
-
-    @property
-    def context(self) -> dict[str, str]:
-        """The names as the templates know them."""
-        prefix = self.triad.upper()
-        output_q = f"{prefix}_{self.result.upper()}_Q"
-        return {"triad": self.triad, "TRIAD": prefix, "result": self.result, "OUTPUT_Q": output_q}
-
-
-ACCEL_NAMES = Names("triax", "accel")
-GYRO_NAMES = Names("triax_gyro", "rate")
-
-
-def names_of(shape: Shape) -> Names:
-    """Names in the C of a shape."""
-    return GYRO_NAMES if shape.gyro else ACCEL_NAMES
+from triaxcal.codegen.names import Names
 
 
 @cache
@@ -71,11 +34,13 @@ def _bytecode_cache() -> jinja2.BytecodeCache | None:
         return None
 
 
-def render(name: str, source: str, names: Names = ACCEL_NAMES, **context: Any) -> tuple[str, str]:
+def render(name: str, source: str, names: Names, **context: Any) -> tuple[str, str]:
     """Name and text of a C file, from the template of the accelerometer's.
 
     Parameters
     ----------
+    name : str
+        Of the template.
     source : str
         What the file was made from, for its banner.
     """

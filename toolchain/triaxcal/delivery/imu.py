@@ -115,8 +115,8 @@ def _imu_c(done: DynamicUnit, device: Device, inputs: str) -> ImuC:
     )
     name, sensor = done.unit.name, device.temperature_sensor
     triads = (
-        TriadDescription(name, adcs[0], sensor, device.accel_q),
-        TriadDescription(name, adcs[1], sensor, device.gyro_rate_q),
+        TriadDescription(name, adcs[0], sensor, device.accel_q, device.prefix),
+        TriadDescription(name, adcs[1], sensor, device.gyro_rate_q, device.prefix),
     )
     omitted = left_out(done.result)
     build = build_imu(functions, triads, _provenance(done, device, inputs, omitted))

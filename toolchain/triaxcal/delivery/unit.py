@@ -16,7 +16,6 @@ from triaxcal.codegen.compiler import Compilation, reference_under_way
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images, image_cases
-from triaxcal.codegen.outputs.image import IMAGE_FILE
 from triaxcal.codegen.routines import (
     Generated,
     Int32Array,
@@ -116,11 +115,11 @@ def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delive
         plan = firmware.plan
         for file, content in firmware.files.items():
             (work / file).write_bytes(content)
-        compilation = start_generated(work, work)
+        compilation = start_generated(work, work, plan.prefix)
         stack.callback(compilation.cancel)
         bound = firmware.bound
         sets = vector_sets(plan)
-        image = firmware.files[IMAGE_FILE]
+        image = image_bytes(plan)
         cases = image_cases(plan, image)
         # The compiler was at work meanwhile.
         ours = compilation.load()

@@ -10,6 +10,7 @@ from triaxcal.base.kinds import interval, number, whole
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.unit.adc import Adc, whole_adc
 from triaxcal.unit.choices import OUTPUT_Q_RANGE
+from triaxcal.unit.prefix import DEFAULT_PREFIX, PREFIX
 from triaxcal.unit.thermometer import TemperatureSensor
 
 
@@ -33,6 +34,9 @@ class Device:
         LSB of an acceleration: 2^-accel_q g.
     gyro_rate_q
         LSB of a rate: 2^-gyro_rate_q deg/s.
+    prefix
+        What the names of functions, types, macros and files in the C begin with. Give each sensor
+        of a program its own.
     """
 
     temperature_sensor: TemperatureSensor
@@ -45,6 +49,7 @@ class Device:
     )
     accel_q: int = setting(whole(*OUTPUT_Q_RANGE), 24)
     gyro_rate_q: int = setting(whole(*OUTPUT_Q_RANGE), 19)
+    prefix: str = setting(PREFIX, DEFAULT_PREFIX)
 
     @property
     def accel_adc(self) -> Adc:

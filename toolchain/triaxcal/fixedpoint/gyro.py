@@ -17,6 +17,7 @@ from triaxcal.model.methods.imu import ImuCompensation
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.adc import Adc
+from triaxcal.unit.prefix import DEFAULT_PREFIX
 from triaxcal.unit.thermometer import TemperatureSensor
 
 SENSITIVITY_LIMIT = 2**29
@@ -35,6 +36,7 @@ class TriadDescription:
     adc: Adc
     temperature_sensor: TemperatureSensor
     output_q: int
+    prefix: str = DEFAULT_PREFIX
 
 
 def make_gyro_plan(imu: ImuCompensation, unit: Triad, accel_q: int) -> Plan:

@@ -28,6 +28,7 @@ from triaxcal.model.methods.compensation import Compensation
 from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unit.adc import Adc
+from triaxcal.unit.prefix import DEFAULT_PREFIX
 from triaxcal.unit.thermometer import TemperatureSensor
 
 MAX_TEMPERATURE_CODES = 2**17
@@ -72,6 +73,8 @@ class Plan:
         Of a gyro: LSB of the specific force that it takes is 2^-force_q g.
     rate : RatePlan or None
         The term in dT/dt.
+    prefix : str
+        What the names in its C begin with.
     """
 
     shape: Shape
@@ -86,6 +89,7 @@ class Plan:
     real_sensitivity: FloatArray | None = None
     force_q: int = 0
     rate: RatePlan | None = None
+    prefix: str = DEFAULT_PREFIX
 
     @property
     def temp_codes(self) -> IntArray:
@@ -132,6 +136,10 @@ class Triad(Protocol):
     def output_q(self) -> int:
         """Result's LSB is 2^-output_q."""
 
+    @property
+    def prefix(self) -> str:
+        """What the names in the C of the unit begin with."""
+
 
 def make_plan(compensation: Compensation, unit: Triad) -> Plan:
     """Turn a compensation into integers that provably cannot overflow.
@@ -173,7 +181,7 @@ def triad_plan(compensation: Compensation, unit: Triad, *, gyro: bool) -> Plan:
         rate=compensation.terms.rate is not None,
         gyro=gyro,
     )
-    plan = Plan(shape, low, high, tuple(frames), real, volts_per_lsb)
+    plan = Plan(shape, low, high, tuple(frames), real, volts_per_lsb, prefix=unit.prefix)
     terms = compensation.terms
     room = np.zeros(3)
     if terms.rate is not None:

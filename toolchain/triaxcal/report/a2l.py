@@ -1,7 +1,7 @@
 """triax_calib.a2l: the constants for XCP tools, as ASAM MCD-2 MC (ASAP2) 1.7.
 
 A CHARACTERISTIC for each word of `triax_calib_t`: the temperature range, where each segment starts
-and has its origin, and each coefficient. They stand at SYMBOL_LINK "TRIAX_CALIB" with their byte
+and has its origin, and each coefficient. They stand at SYMBOL_LINK of the constants with their byte
 offset; the tool that includes the fragment fills in the address from the linked program's map. The
 COMPU_METHODs are linear and give the value that the coefficient of x^k stands for: 1/2 for the
 floor after it and the preloaded half LSB of the output are taken off (fixed-point.md).
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from triaxcal import __version__
 from triaxcal.codegen.constants import function_format
+from triaxcal.codegen.names import names_of
 from triaxcal.codegen.templates import environment
 from triaxcal.delivery.unit import Delivery
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
@@ -23,7 +24,6 @@ from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.positions import AXES
 from triaxcal.unit.thermometer import TemperatureSensor
 
-SYMBOL = "TRIAX_CALIB"
 _WORD = 4
 _HEAD_WORDS, _SEGMENT_HEAD_WORDS = 2, 3
 
@@ -62,7 +62,7 @@ def calib_a2l(delivery: Delivery) -> bytes:
         "version": __version__,
         "inputs": delivery.inputs_sha256[:16],
         "serial": delivery.unit.serial,
-        "symbol": SYMBOL,
+        "symbol": f"{names_of(delivery.plan).linked}_calib_constants",
         "words": words,
         "methods": list({w.method.name: w.method for w in words}.values()),
     }

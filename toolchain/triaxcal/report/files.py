@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from triaxcal.codegen.names import names_of
 from triaxcal.delivery.saved import calibration_json
 from triaxcal.delivery.unit import Delivery
 from triaxcal.report.a2l import calib_a2l
@@ -12,8 +13,10 @@ from triaxcal.report.pictures.residual_plot import residuals_svg
 from triaxcal.report.results import verification_json
 
 CERTIFICATE = "certificate.dcc.xml"
-SOMETIMES = (CERTIFICATE,)
-"""Files that a delivery may or may not have."""
+SOMETIMES = (
+    CERTIFICATE, "*_comp.h", "*_comp.c", "*_calib.h", "*_calib.c", "*_calib.bin", "*_calib.a2l",
+)  # fmt: skip
+"""Files that an earlier delivery may have had besides; the prefix may have been another."""
 
 
 def passport_files(made: Passport) -> dict[str, bytes]:
@@ -38,6 +41,6 @@ def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, byt
         "verification.json": verification_json(delivery),
         "residuals.svg": residuals_svg(delivery),
         **passport_files(unit_passport),
-        "triax_calib.a2l": calib_a2l(delivery),
+        names_of(delivery.plan).file("triax_calib.a2l"): calib_a2l(delivery),
         **certificate,
     }

@@ -9,7 +9,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import CrossCheck
-from triaxcal.codegen.render import shape_id
+from triaxcal.codegen.names import shape_id
 from triaxcal.delivery.imu import METHOD, ImuC, ImuDelivery
 from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.device import REQUIRED
@@ -20,10 +20,10 @@ from triaxcal.report.words.numbers import g_in_words, significant, thousands
 
 VERIFICATION_FILE = "verification.json"
 C_FILES = (
-    "triax_comp.h", "triax_comp.c", "triax_calib.h", "triax_gyro_comp.h", "triax_gyro_comp.c",
-    "triax_gyro_calib.h", "triax_imu.h", "triax_imu.c", "triax_imu.bin", VERIFICATION_FILE,
+    "*_comp.h", "*_comp.c", "*_calib.h", "*_calib.c", "*_imu.h", "*_imu.c", "*_imu.bin",
+    VERIFICATION_FILE,
 )  # fmt: skip
-"""What a unit with [device] receives besides."""
+"""What a unit with [device] receives besides; * is its prefix."""
 NO_C = "none: unit.toml has no [device]; add it with " + ", ".join(REQUIRED)
 FORMAT = 1
 

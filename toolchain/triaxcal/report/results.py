@@ -6,7 +6,7 @@ import hashlib
 
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.codegen.compiler import FLAGS
-from triaxcal.codegen.render import shape_id
+from triaxcal.codegen.names import shape_id
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.delivery.saved import header
 from triaxcal.delivery.unit import Delivery

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.forms import assembly
+from triaxcal.codegen.names import Names
+from triaxcal.codegen.shim import write_shim
 from triaxcal.targets.bench_case import case_header, floating_macros, floating_tables
 from triaxcal.targets.build import TargetError, Toolset, build, in_parallel, run
 from triaxcal.targets.cores.core import Core
@@ -44,11 +46,9 @@ class Subject:
         return f"{self.case.name}, {kind}"
 
     @property
-    def prefix(self) -> str:
-        """What the names of its functions begin with."""
-        if self.real:
-            return "floating"
-        return "triax_gyro" if self.case.plan.shape.gyro else "triax"
+    def names(self) -> Names | None:
+        """Names in its C; None for a baseline."""
+        return None if self.real else self.case.names
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def cost_of(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
         build(toolset, [*sources, *harness], include, program)
         counts = measure(core, program, plugin)
         small = Toolset(core, "gcc", SIZE_OPTIMISATION, subject.arithmetic, defines)
-        flash = flash_of(small, sources, include, work / "small", prefix=subject.prefix)
+        flash = flash_of(small, sources, include, work / "small", names=subject.names)
     except TargetError as error:
         return Cost(subject, core, None, None, str(error))
     return Cost(subject, core, counts, flash, "")
@@ -166,4 +166,5 @@ def _write_subject(subject: Subject, work: Path) -> tuple[list[Path], list[Path]
     for name, text in case.files.items():
         (work / name).write_text(text)
     defines = ("-DBENCH_GYRO",) if case.plan.shape.gyro else ()
-    return [work / case.routine, target / "bench_tables.c"], [work], defines
+    include = [work, *write_shim(work / "names", case.plan.prefix)]
+    return [work / name for name in case.sources], include, defines

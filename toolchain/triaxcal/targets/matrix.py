@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from triaxcal.base.shipped import shipped
+from triaxcal.codegen.shim import write_shim
 from triaxcal.targets.build import TargetError, Toolset, build, emulate, in_parallel
 from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
 from triaxcal.targets.shapes import CUBIC, Case
@@ -119,14 +120,15 @@ def _outcome(planned: Build, folder: Path, expected: dict[str, int], place: Path
         return Outcome(planned, NOT_DONE, detail)
     firmware = shipped("firmware_ref")
     sources = [
-        folder / planned.case.routine,
+        *(folder / name for name in planned.case.sources),
         firmware / "triax_ref.c",
         firmware / "triax_ref_image.c",
         firmware / "target" / "test_main.c",
     ]
     program = place / "program.elf"
     try:
-        build(toolset, sources, [folder, firmware], program)
+        shim = write_shim(folder / "names", planned.case.plan.prefix)
+        build(toolset, sources, [folder, *shim, firmware], program)
         complaint = compare(emulate(toolset.core, program), expected)
     except TargetError as error:
         complaint = str(error)

@@ -10,6 +10,7 @@ from pathlib import Path
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.names import Names, names_of
 from triaxcal.codegen.render import render_routine
 from triaxcal.delivery.firmware import compensation_of
 from triaxcal.delivery.inputs import inputs_sha256
@@ -34,7 +35,7 @@ class Case:
     note : str
         What is particular about it.
     files : dict
-        triax_comp.h, triax_comp.c and triax_calib.h.
+        triax_comp.h and .c, triax_calib.h and .c.
     """
 
     name: str
@@ -44,9 +45,14 @@ class Case:
     image: bytes
 
     @property
-    def routine(self) -> str:
-        """Name of the routine's file."""
-        return next(name for name in self.files if name.endswith("_comp.c"))
+    def sources(self) -> list[str]:
+        """Names of the C files, the routine first."""
+        return sorted((n for n in self.files if n.endswith(".c")), reverse=True)
+
+    @property
+    def names(self) -> Names:
+        """Names in the C."""
+        return names_of(self.plan)
 
 
 Change = Callable[[UnitDescription], UnitDescription]

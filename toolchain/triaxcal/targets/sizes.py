@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from triaxcal.codegen.names import Names
 from triaxcal.targets.build import Toolset, compiled, link_command, run
 
 
@@ -38,20 +39,21 @@ def flash_of(
     include: Sequence[Path],
     work: Path,
     *,
-    prefix: str,
+    names: Names | None,
 ) -> Flash:
     """Link the routine alone, without start-up code, and take its sections apart.
 
-    `prefix` is that of its names: "triax", "triax_gyro" or "floating".
+    `names` are those in its C; None for a baseline.
     """
     objects = compiled(toolset, sources, include, work)
-    roots = [f"{prefix}_set_temperature", f"{prefix}_apply"]
-    tables_root = f"{prefix.upper()}_CALIB"
+    linked = "floating" if names is None else names.linked
+    roots = [f"{linked}_set_temperature", f"{linked}_apply"]
+    tables_root = "FLOATING_CALIB" if names is None else f"{linked}_calib_in_use"
     code, helpers = _text(toolset, objects, roots, work / "routine.elf")
     _, tables = _text(toolset, objects, [tables_root], work / "tables.elf")
     loader = 0
-    if prefix != "floating":
-        whole = _text(toolset, objects, [*roots, f"{prefix}_calib_load"], work / "whole.elf")
+    if names is not None:
+        whole = _text(toolset, objects, [*roots, f"{linked}_calib_load"], work / "whole.elf")
         loader = sum(whole) - code - helpers
     return Flash(code, tables, helpers, loader)
 

@@ -26,6 +26,7 @@ from triaxcal.unit.gravity import gravity_difference_m_per_s2, refuse_wrong_grav
 from triaxcal.unit.limits import LIMITS, RECORDED_LIMITS, Limits
 from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.pair import QUADRATIC, PairSource, pair_source
+from triaxcal.unit.prefix import DEFAULT_PREFIX
 from triaxcal.unit.priors import (
     AUTO,
     FIRMWARE,
@@ -99,6 +100,8 @@ class UnitDescription:
     priors : Priors
     firmware_terms : str
         One of `unit.priors.FIRMWARE_TERMS`.
+    prefix : str
+        What the names in the C begin with.
     source : str
         Path of its unit.toml, for messages.
     toml : str
@@ -128,6 +131,7 @@ class UnitDescription:
     pair: PairSource | None = None
     priors: Priors = field(default_factory=Priors)
     firmware_terms: str = AUTO
+    prefix: str = DEFAULT_PREFIX
     nominal_v_per_g: tuple[float, float, float] | None = None
     nominal_tolerance: float = 0.2
     gravity_difference_m_per_s2: float | None = None
@@ -177,6 +181,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
     _ = tables[""][DESCRIPTION]  # not used, but checked
     adc, site = tables["adc"], tables["site"].record(PlacedSite)
     refuse_wrong_gravity(site, tables["site"].file)
+    firmware = tables["firmware"].record(FirmwareChoice)
     sensor = tables["sensor"].record(Sensor)
     _refuse_inapplicable(tables, sensor)
     return UnitDescription(
@@ -202,7 +207,8 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         adc_open=recording is not None and not adc,
         pair=pair_source(tables["quadratic"]),
         priors=tables["priors"].record(Priors),
-        firmware_terms=tables["firmware"].record(FirmwareChoice).terms,
+        firmware_terms=firmware.terms,
+        prefix=firmware.prefix,
         nominal_v_per_g=sensor.nominal_v_per_g,
         nominal_tolerance=sensor.nominal_tolerance,
         gravity_difference_m_per_s2=gravity_difference_m_per_s2(site),

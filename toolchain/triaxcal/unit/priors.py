@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from triaxcal.base.keys import TableKeys, setting
 from triaxcal.base.kinds import number, word
+from triaxcal.unit.prefix import DEFAULT_PREFIX, PREFIX
 
 AUTO, LINEAR, OWN_SQUARES, QUADRATIC_TERMS = "auto", "linear", "own-squares", "quadratic"
 FIRMWARE_TERMS = (AUTO, LINEAR, OWN_SQUARES, QUADRATIC_TERMS)
@@ -53,9 +54,13 @@ class FirmwareChoice:
         matters against the uncertainty. linear: none. own-squares: the square of each axis' own
         acceleration. quadratic: all products; not on a tilter. State it so that all units of a
         series run one routine.
+    prefix
+        What the names of functions, types, macros and files in the C begin with. Give each sensor
+        of a program its own.
     """
 
     terms: str = setting(word(FIRMWARE_TERMS), AUTO)
+    prefix: str = setting(PREFIX, DEFAULT_PREFIX)
 
 
 PRIORS, FIRMWARE = TableKeys.of(Priors), TableKeys.of(FirmwareChoice)

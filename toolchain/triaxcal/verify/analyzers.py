@@ -11,10 +11,11 @@ import numpy as np
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
+from triaxcal.codegen.names import names_of
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.rows import rows_of
 from triaxcal.verify.tools import Answer, MissingToolError, Tool, run
-from triaxcal.verify.workspace import FORMS, IMAGE, ROUTINE, Workspace
+from triaxcal.verify.workspace import CONSTANTS, FORMS, IMAGE, ROUTINE, SHIM, Workspace
 
 GCC = Tool("gcc", "gcc libc6-dev")
 CLANG = Tool("clang", "clang libclang-rt-dev")
@@ -90,11 +91,13 @@ def check_sanitizer(work: Workspace, sanitizer: Sanitizer) -> Outcome:
     """
     vectors = vector_sets(work.plan, RANDOM_VECTORS)
     count = sum(len(v.temp) for v in vectors)
-    batch = shipped("firmware_ref") / work.named("triax_batch.c")
+    names = names_of(work.plan)
+    batch = shipped("firmware_ref") / names.default_file("triax_batch.c")
+    default = {"triad": Path(names.default_file("triax.c")).stem}
     subject = Subject(
         work.folder,
-        work.render(f"verify_{sanitizer.key}.c", "verify/driver.c.j2", {}),
-        (work.named(ROUTINE), str(batch)),
+        work.render(f"verify_{sanitizer.key}.c", "verify/driver.c.j2", default),
+        (work.named(ROUTINE), work.named(CONSTANTS), str(batch)),
         work.named(IMAGE),
         b"".join(rows_of(work.plan, v) for v in vectors),
         _expected(work, vectors),
@@ -147,7 +150,7 @@ def _run_form(subject: Subject, sanitizer: Sanitizer, form: tuple[str, ...]) -> 
     given.write_bytes(subject.vectors)
     command = [
         sanitizer.tool.find(), "-std=c99", "-O1", "-g", *form, *sanitizer.flags,
-        f"-I{folder}", f"-I{shipped('firmware_ref')}",
+        f"-I{folder}", f"-I{folder / SHIM}", f"-I{shipped('firmware_ref')}",
         "-o", str(program), subject.driver.name, *subject.sources,
     ]  # fmt: skip
     built = run(command, folder)

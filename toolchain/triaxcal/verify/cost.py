@@ -14,10 +14,10 @@ from triaxcal.targets.matrix import ARITHMETIC_NAMES
 from triaxcal.targets.shapes import Case
 from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
 from triaxcal.verify.tools import BrokenToolError
-from triaxcal.verify.workspace import CONSTANTS, ROUTINE, Workspace
+from triaxcal.verify.workspace import CONSTANTS, HEADERS, ROUTINE, Workspace
 
 _KEY, _TITLE = "cost", "instructions a call"
-_FILES = (ROUTINE, "triax_comp.h", CONSTANTS)
+_FILES = (ROUTINE, CONSTANTS, *HEADERS)
 
 
 def check(work: Workspace) -> Outcome:

@@ -14,7 +14,6 @@ from triaxcal.verify.workspace import CONSTANTS, ROUTINE, Workspace
 
 CPPCHECK = Tool("cppcheck", "cppcheck")
 DEVIATIONS = Path(__file__).with_name("misra_deviations.toml")
-USER = "verify_user.c"
 OPTIONS = (
     "--std=c99", "--addon=misra", "--enable=warning,style,performance,portability", "--quiet",
     "--template={file}\t{line}\t{id}\t{message}", "--error-exitcode=0",
@@ -62,7 +61,7 @@ class Deviation:
 
 
 def check(work: Workspace) -> Outcome:
-    """The routine, and a file that includes the constants as firmware does."""
+    """The routine and the constants."""
     return judge(find_all(work))
 
 
@@ -100,20 +99,19 @@ def find_all(work: Workspace) -> list[Finding]:
     ------
     MissingToolError, BrokenToolError
     """
-    return find_in(work.folder, work.named(ROUTINE), (work.named(CONSTANTS),))
+    return find_in(work.folder, (work.named(ROUTINE), work.named(CONSTANTS)))
 
 
-def find_in(folder: Path, routine: str, constants: Sequence[str]) -> list[Finding]:
-    """Every complaint about a routine of a folder, and about the constants as firmware sees them.
+def find_in(folder: Path, sources: Sequence[str]) -> list[Finding]:
+    """Every complaint about C files of a folder.
 
     Raises
     ------
     MissingToolError, BrokenToolError
     """
-    (folder / USER).write_text("".join(f'#include "{name}"\n' for name in constants))
     lines: dict[str, None] = {}
     for form in FORMS:
-        answer = run([CPPCHECK.find(), *OPTIONS, *form, routine, USER], folder)
+        answer = run([CPPCHECK.find(), *OPTIONS, *form, *sources], folder)
         if answer.code:
             raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
         lines |= dict.fromkeys(answer.text.splitlines())
@@ -122,8 +120,6 @@ def find_in(folder: Path, routine: str, constants: Sequence[str]) -> list[Findin
         file, number, identity, text = [*line.split("\t", 3), "", "", ""][:4]
         if not number.isdigit():
             raise BrokenToolError(f"cppcheck: {line[:200]}")
-        if file == USER:
-            continue
         rule = _RULE.fullmatch(identity)
         source = (folder / file).read_text().splitlines()
         place = place_of(source, int(number))

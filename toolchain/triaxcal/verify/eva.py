@@ -21,7 +21,7 @@ from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.tools import BrokenToolError, Tool, run
-from triaxcal.verify.workspace import LIMBS, PORTABLE, ROUTINE, Workspace
+from triaxcal.verify.workspace import CONSTANTS, LIMBS, PORTABLE, ROUTINE, Workspace
 
 FRAMA_C = Tool("frama-c", "frama-c-base", "-version")
 DRIVER = "verify_eva.c"
@@ -72,7 +72,7 @@ def _check(work: Workspace, key: str, title: str, entry: str, form: tuple[str, .
     driver = work.render(
         f"{key}_{DRIVER}", "verify/eva.c.j2", {"ranges": range_literals(work.plan)}
     )
-    sources = (work.named(ROUTINE), driver.name)
+    sources = (work.named(ROUTINE), work.named(CONSTANTS), driver.name)
     return analyse(work.folder, Analysis(key, title, entry, ENTRIES[entry], sources, form))
 
 

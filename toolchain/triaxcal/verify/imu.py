@@ -15,15 +15,16 @@ import numpy as np
 
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.imu import IMU_FILES, IMU_IMAGE_FILE, ImuBuild, imu_answers, imu_vectors
-from triaxcal.codegen.templates import GYRO_NAMES, environment
+from triaxcal.codegen.names import names_of
+from triaxcal.codegen.shim import write_shim
+from triaxcal.codegen.templates import environment
 from triaxcal.verify import analyzers, cppcheck, eva
 from triaxcal.verify.campaign import delivery_outcomes, guarded, verify_files
 from triaxcal.verify.image_reader import image_length
 from triaxcal.verify.outcome import Outcome
-from triaxcal.verify.workspace import CONSTANTS, IMAGE, LIMBS, PORTABLE, ROUTINE
+from triaxcal.verify.workspace import CONSTANTS, IMAGE, LIMBS, PORTABLE, ROUTINE, SHIM
 
 ACCELEROMETER, GYRO, BOTH = "accelerometer", "gyro", "both_triads"
-ROUTINES = ("triax_imu.c", ROUTINE, GYRO_NAMES.file(ROUTINE))
 _DRIVER = "verify_eva_imu.c"
 
 
@@ -40,13 +41,22 @@ class Both:
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in build.files.items():
             (folder / name).write_bytes(content)
+        write_shim(folder / SHIM, build.accel.prefix)
         return cls(folder, build)
 
     def render(self, name: str, template: str, context: Mapping[str, object]) -> Path:
         """Write a template's text under `name` and return its path."""
         path = self.folder / name
-        path.write_text(environment().get_template(template).render(context))
+        known = {**names_of(self.build.accel).context, **context}
+        path.write_text(environment().get_template(template).render(known))
         return path
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the C files, that of both triads first."""
+        triads = [names_of(self.build.accel), names_of(self.build.gyro)]
+        own = triads[0].file("triax_imu.c")
+        return own, *(names.file(name) for names in triads for name in (ROUTINE, CONSTANTS))
 
 
 def verify_imu(folder: Path, build: ImuBuild) -> dict[str, tuple[Outcome, ...]]:
@@ -57,10 +67,10 @@ def verify_imu(folder: Path, build: ImuBuild) -> dict[str, tuple[Outcome, ...]]:
     dict
         Outcomes of `ACCELEROMETER`, `GYRO` and `BOTH`.
     """
-    image = build.files[IMU_IMAGE_FILE]
+    image = build.files[names_of(build.accel).file(IMU_IMAGE_FILE)]
     length = image_length(image)
-    accel = {**build.files, IMAGE: image[:length]}
-    gyro = {**build.files, GYRO_NAMES.file(IMAGE): image[length:]}
+    accel = {**build.files, names_of(build.accel).file(IMAGE): image[:length]}
+    gyro = {**build.files, names_of(build.gyro).file(IMAGE): image[length:]}
     return {
         ACCELEROMETER: verify_files(folder / "accel", accel, build.accel, build.accel_bound),
         GYRO: verify_files(folder / "gyro", gyro, build.gyro, build.gyro_bound),
@@ -86,7 +96,7 @@ def _verify_both(folder: Path, build: ImuBuild) -> tuple[Outcome, ...]:
 def _eva(work: Both, key: str, title: str, entry: str, form: tuple[str, ...]) -> Outcome:
     driver = work.render(f"{key}_{_DRIVER}", "verify/eva_imu.c.j2", _ranges(work.build))
     ends = {entry, "sample" if entry == "verify_imu_codes" else "accepted"}
-    asked = eva.Analysis(key, title, entry, ends, (*ROUTINES, driver.name), form)
+    asked = eva.Analysis(key, title, entry, ends, (*work.sources, driver.name), form)
     return eva.analyse(work.folder, asked)
 
 
@@ -100,9 +110,9 @@ def _ranges(build: ImuBuild) -> dict[str, object]:
 
 def _cppcheck(work: Both) -> Outcome:
     """triax_imu.c and its header; the findings in the files of the triads are theirs."""
-    constants = (CONSTANTS, GYRO_NAMES.file(CONSTANTS))
-    found = cppcheck.find_in(work.folder, ROUTINES[0], constants)
-    return cppcheck.judge([finding for finding in found if finding.file in IMU_FILES])
+    own = {names_of(work.build.accel).file(name) for name in IMU_FILES}
+    found = cppcheck.find_in(work.folder, work.sources)
+    return cppcheck.judge([finding for finding in found if finding.file in own])
 
 
 def _sanitizer(work: Both, sanitizer: analyzers.Sanitizer) -> Outcome:
@@ -113,8 +123,8 @@ def _sanitizer(work: Both, sanitizer: analyzers.Sanitizer) -> Outcome:
     subject = analyzers.Subject(
         work.folder,
         work.render(f"verify_{sanitizer.key}.c", "verify/driver_imu.c.j2", {}),
-        (*ROUTINES, str(shipped("firmware_ref") / "triax_imu_batch.c")),
-        IMU_IMAGE_FILE,
+        (*work.sources, str(shipped("firmware_ref") / "triax_imu_batch.c")),
+        names_of(build.accel).file(IMU_IMAGE_FILE),
         np.column_stack([temp, raw_accel, raw_gyro]).astype(np.int32).tobytes(),
         answers * 2,
     )
@@ -134,7 +144,7 @@ CHECKS: tuple[tuple[str, str, Callable[[Both], Outcome]], ...] = (
     (
         "gcc_analyzer",
         "gcc -fanalyzer",
-        lambda w: analyzers.analyse_with_gcc(w.folder, ROUTINES[0]),
+        lambda w: analyzers.analyse_with_gcc(w.folder, w.sources[0]),
     ),
     *(
         (sanitizer.key, sanitizer.title, lambda w, s=sanitizer: _sanitizer(w, s))

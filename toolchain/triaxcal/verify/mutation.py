@@ -1,6 +1,6 @@
 """Mutation testing: the shipped vector set has to find every small mistake in C and constants.
 
-Every mutant of triax_comp.c, of each integer in triax_calib.h and of each word of the image is
+Every mutant of triax_comp.c, of each integer in triax_calib.c and of each word of the image is
 compiled (or loaded) and run on the very vectors and images of the cross-check. One that no vector
 finds gets a second chance under sanitizers, as `triaxcal verify` runs them: reading out of bounds
 need not change a result. What still survives must be on file as equivalent, with a reason.
@@ -19,12 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.codegen.compiler import FLAGS as DELIVERY_FLAGS
-from triaxcal.codegen.templates import ACCEL_NAMES, Names, environment, names_of
+from triaxcal.codegen.names import Names, names_of
+from triaxcal.codegen.templates import environment
 from triaxcal.verify.analyzers import GCC, SANITIZERS
 from triaxcal.verify.c_mutants import Mutant, mutants_of
 from triaxcal.verify.mutation_inputs import write_images, write_vectors
 from triaxcal.verify.tools import BrokenToolError, run
-from triaxcal.verify.workspace import CONSTANTS, FORMS, IMAGE, ROUTINE, Workspace
+from triaxcal.verify.workspace import CONSTANTS, FORMS, HEADERS, IMAGE, ROUTINE, Workspace
 
 EQUIVALENTS = Path(__file__).with_name("equivalent_mutants.toml")
 KILLED = "killed by the vectors"
@@ -86,7 +87,7 @@ def _like(pattern: str, text: str) -> bool:
     return re.fullmatch(".*".join(map(re.escape, pattern.split("*~"))), text) is not None
 
 
-def read_equivalents(names: Names = ACCEL_NAMES) -> tuple[Equivalent, ...]:
+def read_equivalents(names: Names) -> tuple[Equivalent, ...]:
     """The equivalent mutants on file, with the names in the C of a triad."""
     text = environment().from_string(EQUIVALENTS.read_text()).render(names.context)
     return tuple(
@@ -135,7 +136,7 @@ class Bench:
         program = folder / "mutant"
         command = [
             GCC.find(), *flags, f"-I{folder}", "-o", str(program),
-            str(self.harness), str(folder / self.work.named(ROUTINE)),
+            str(self.harness), *(str(folder / self.work.named(f)) for f in (ROUTINE, CONSTANTS)),
         ]  # fmt: skip
         if run(command, folder).code:
             return None
@@ -173,7 +174,7 @@ def c_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
 
 
 def constants_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
-    """Each integer of triax_calib.h one up and one down."""
+    """Each integer of triax_calib.c one up and one down."""
     source = (bench.work.folder / bench.work.named(CONSTANTS)).read_text()
     mutants = []
     for match in _INTEGER.finditer(source):
@@ -208,7 +209,7 @@ def image_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
 
 def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdict]:
     """What becomes of mutants of one file, in their order."""
-    equivalents = read_equivalents(names_of(bench.work.plan.shape))
+    equivalents = read_equivalents(names_of(bench.work.plan))
 
     def judge(item: tuple[int, Mutant]) -> Verdict:
         number, mutant = item
@@ -241,7 +242,7 @@ def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
 
 def _fill(folder: Path, work: Workspace) -> None:
     folder.mkdir(exist_ok=True)
-    for name in map(work.named, (ROUTINE, CONSTANTS, "triax_comp.h")):
+    for name in map(work.named, (ROUTINE, CONSTANTS, *HEADERS)):
         (folder / name).write_bytes((work.folder / name).read_bytes())
 
 
@@ -249,7 +250,7 @@ Campaign = Callable[[Bench, int], list[Verdict]]
 
 CAMPAIGNS: Mapping[str, Campaign] = {
     "triax_comp.c": c_campaign,
-    "triax_calib.h": constants_campaign,
+    "triax_calib.c": constants_campaign,
     "triax_calib.bin": image_campaign,
 }
 """What is mutated, and how."""

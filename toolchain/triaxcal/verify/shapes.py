@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from triaxcal.codegen.names import names_of
 from triaxcal.codegen.outputs.image import IMAGE_FILE
-from triaxcal.codegen.templates import names_of
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS
@@ -72,5 +72,5 @@ def subject(name: str, units: Path) -> Subject:
     unit, change = ALL_SHAPES[name]
     case = made_case(units / unit, name, "", change, WITH_TERMS.get(name, NO_TERMS))
     files = {file: text.encode() for file, text in case.files.items()}
-    files[names_of(case.plan.shape).file(IMAGE_FILE)] = case.image
+    files[names_of(case.plan).file(IMAGE_FILE)] = case.image
     return Subject(name, case.plan, prove(case.plan), files)

@@ -7,15 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from triaxcal.codegen.templates import environment, names_of
+from triaxcal.codegen.names import names_of
+from triaxcal.codegen.shim import write_shim
+from triaxcal.codegen.templates import environment
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
 
 ROUTINE = "triax_comp.c"
-CONSTANTS = "triax_calib.h"
+CONSTANTS = "triax_calib.c"
+HEADERS = ("triax_comp.h", "triax_calib.h")
 IMAGE = "triax_calib.bin"
 PORTABLE: tuple[str, ...] = ()
 LIMBS: tuple[str, ...] = ("-DTRIAX_ARITHMETIC=1",)
+SHIM = "names"
+"""Folder of headers of the default names, where the unit has a prefix."""
 FORMS = {"portable": PORTABLE, "limbs": LIMBS}
 """Flags of the forms of the routine that a host can run; the assembly form needs its core."""
 
@@ -43,6 +48,7 @@ class Workspace:
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
             (folder / name).write_bytes(content)
+        write_shim(folder / SHIM, plan.prefix)
         return cls(folder, plan, bound)
 
     @property
@@ -52,12 +58,12 @@ class Workspace:
 
     def named(self, name: str) -> str:
         """Name of a file of the triad that is verified, from an accelerometer's."""
-        return names_of(self.plan.shape).file(name)
+        return names_of(self.plan).file(name)
 
     def render(self, name: str, template: str, context: dict[str, Any]) -> Path:
         """Write a template's text under `name` and return its path."""
         path = self.folder / name
         shape = self.plan.shape
-        known = {"shape": shape, **names_of(shape).context, **context}
+        known = {"shape": shape, **names_of(self.plan).context, **context}
         path.write_text(environment().get_template(template).render(known))
         return path

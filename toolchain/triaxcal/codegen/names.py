@@ -1,0 +1,84 @@
+"""The names in the C of a triad, and the shape that its link names carry."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+from triaxcal.codegen.image import header_words
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.unit.prefix import DEFAULT_PREFIX
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names in the C of a triad; status bits and TRIAX_ARITHMETIC are common to all.
+
+    Attributes
+    ----------
+    triad : str
+        What the names of functions, types and files begin with.
+    result : str
+        Name of what triax_apply gives.
+    shape : str
+        `shape_id` of the routine.
+    """
+
+    triad: str
+    result: str
+    shape: str
+
+    def file(self, name: str) -> str:
+        """Name of this triad's file, from the default: triax_comp.c, triax_gyro_comp.c."""
+        return self.triad + name.removeprefix(DEFAULT_PREFIX)
+
+    def default_file(self, name: str) -> str:
+        """The same without the prefix: a file of ours that calls this triad by default names."""
+        gyro = "_gyro" if self.result == "rate" else ""
+        return DEFAULT_PREFIX + gyro + name.removeprefix(DEFAULT_PREFIX)
+
+    @property
+    def linked(self) -> str:
+        """What the link names begin with. The shape stands early: C99 compares 31 characters."""
+        return f"{self.triad}_{self.shape}"
+
+    @property
+    def context(self) -> dict[str, str]:
+        """The names as the templates know them."""
+        prefix = self.triad.upper()
+        return {
+            "triad": self.triad,
+            "TRIAD": prefix,
+            "result": self.result,
+            "OUTPUT_Q": f"{prefix}_{self.result.upper()}_Q",
+            "linked": self.linked,
+            "shape_word": _word(self.shape),
+        }
+
+
+def shape_id(plan: Plan) -> str:
+    """Eight hex digits of the shape: equal exactly when the generated routine is equal."""
+    words = header_words(plan)
+    return f"{zlib.crc32(b''.join(w.to_bytes(4, 'little') for w in words)):08x}"
+
+
+def imu_context(accel: Plan, gyro: Plan) -> dict[str, str]:
+    """Names in the C of both triads together, beside the accelerometer's."""
+    ids = shape_id(accel), shape_id(gyro)
+    both = f"{zlib.crc32(''.join(ids).encode()):08x}"
+    return {
+        "gyro_shape_word": _word(ids[1]),
+        "imu_shape_word": _word(both),
+        "imu_linked": f"{accel.prefix}_imu_{both}",
+    }
+
+
+def _word(shape: str) -> str:
+    return f"0x{shape.upper()}u"
+
+
+def names_of(plan: Plan) -> Names:
+    """Names in the C of a plan."""
+    if plan.shape.gyro:
+        return Names(f"{plan.prefix}_gyro", "rate", shape_id(plan))
+    return Names(plan.prefix, "accel", shape_id(plan))

@@ -1,0 +1,13 @@
+"""What the names in the generated C begin with: [firmware] prefix, [device] prefix."""
+
+from triaxcal.base.kinds import Kind, pattern
+
+DEFAULT_PREFIX = "triax"
+
+PREFIX: Kind[str] = pattern(
+    r"(?!triax_|(?:str|mem|wcs|is|to)[a-z])(?!.*__)[a-z](?:[a-z0-9_]{0,18}[a-z0-9])?",
+    "1 to 20 small letters, digits and single underscores, a letter first, not beginning with "
+    "triax_ nor, as C reserves them, with str, mem, wcs, is or to and a letter",
+    '"left_accel"',
+)
+"""Names of the library that C99 7.26 reserves are refused: strength_apply would be one."""
