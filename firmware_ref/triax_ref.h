@@ -17,6 +17,7 @@
 #endif
 #define TRIAX_REF_MAX_ORDER 9
 #define TRIAX_REF_HEADER_WORDS 15
+#define TRIAX_REF_IDENTITY_SIZE 252u /* bytes behind the constants */
 
 /* The same bits as TRIAX_STATUS_*. */
 enum {

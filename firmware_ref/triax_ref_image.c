@@ -68,9 +68,25 @@ static int terms_are_legal(uint32_t magic, uint32_t version, int terms)
            within(terms / 256, 8, 30);
 }
 
-uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
+/* "TRID", version 1, the CRC of the constants again, 236 bytes of text and numbers, CRC of all. */
+static int identity_is_legal(const uint8_t *file, size_t constants, size_t size)
 {
-    reader_t reader = {image, size, 0};
+    reader_t crc_of_constants = {file, size, 0};
+    reader_t reader = {file, size, constants};
+    crc_of_constants.at = constants - 4;
+    if (next_word(&reader) != 0x44495254u || next_word(&reader) != 1u ||
+        next_word(&reader) != next_word(&crc_of_constants)) {
+        return 0;
+    }
+    reader.at = size - 4;
+    return next_word(&reader) == crc32(file, size - 4);
+}
+
+uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *file, size_t file_size)
+{
+    const uint8_t *const image = file;
+    reader_t reader = {file, file_size, 0};
+    size_t size = file_size;
     int s;
     int f;
     int k;
@@ -83,7 +99,12 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *image, size_t size)
     }
     magic = next_word(&reader);
     version = next_word(&reader);
-    if ((version != 1u && version != 2u) || next_word(&reader) != size) {
+    size = next_word(&reader);
+    if ((version != 1u && version != 2u) || size % 4 != 0 || size < 4 * (TRIAX_REF_HEADER_WORDS + 3) ||
+        (file_size != size && file_size != size + TRIAX_REF_IDENTITY_SIZE)) {
+        return TRIAX_REF_BAD_IMAGE;
+    }
+    if (file_size != size && !identity_is_legal(file, size, file_size)) {
         return TRIAX_REF_BAD_IMAGE;
     }
     ref->inverse_form = next_int(&reader);

@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from triaxcal import __version__
+from triaxcal.codegen.identity import IDENTITY_SIZE, Identity, identity_of
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.outputs.image import IMAGE_FILE
 from triaxcal.codegen.tryout import model_error_g
@@ -127,9 +129,26 @@ def test_c_and_image_hold_the_same_constants(
     text = files[unit]["triax_calib.c"].decode()
     body = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).split("calib_constants = ")[1]
     in_c = [int(n) for n in re.findall(r"-?\b\d+\b", body)]
-    image = files[unit][IMAGE_FILE]
+    image = files[unit][IMAGE_FILE][:-IDENTITY_SIZE]
     assert image == image_bytes(delivered[unit].plan)
     assert in_c == list(struct.unpack(f"<{len(image) // 4}i", image))[15:-1]
+
+
+@pytest.mark.parametrize("unit", ["AT-CHERNIAK", "AT-SIM"])
+def test_the_image_says_whose_it_is(
+    files: dict[str, dict[str, bytes]], delivered: dict[str, Delivery], unit: str
+) -> None:
+    made = delivered[unit]
+    sensor = made.unit.temperature_sensor
+    assert identity_of(files[unit][IMAGE_FILE]) == Identity(
+        serial=made.unit.serial,
+        date="" if made.unit.measured.date is None else str(made.unit.measured.date),
+        inputs_sha256=made.inputs_sha256,
+        generator=__version__,
+        axes="",
+        degc_per_code=sensor.degc_per_code,
+        degc_at_zero=sensor.degc_at_zero,
+    )
 
 
 @pytest.mark.parametrize("unit", ["AT-CHERNIAK", "AT-SIM"])

@@ -146,7 +146,7 @@ def test_the_sanitizers_are_awake(built: dict[str, Built], tmp_path: Path) -> No
     row = "        if (row_sum >= ROW_LIMIT) {\n            fits = 0u;"
     text = (b.folder / "triax_comp.c").read_text(encoding="utf-8")
     assert text.count(row) == 1
-    for file in b.folder.glob("triax_*.h"):
+    for file in b.folder.glob("triax_*.[ch]"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     (tmp_path / "triax_comp.c").write_text(text.replace(row, row.replace("0u", "1u")))
     program = compile_program(tmp_path, "awake", SANITIZERS)

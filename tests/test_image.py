@@ -5,6 +5,9 @@ from __future__ import annotations
 import ctypes
 import re
 import struct
+import subprocess
+from dataclasses import replace
+from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -15,10 +18,16 @@ from hypothesis import strategies as st
 import oracle
 from builds import Builds, Built
 from plans import COVERING, GOLDEN, INT32_MAX, INT32_MIN, disturbed, random_plan
+from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.constants import Provenance
+from triaxcal.codegen.identity import Identity, identity_of, with_identity
 from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.image_cases import image_cases
+from triaxcal.codegen.names import names_of
 from triaxcal.codegen.routines import Reference
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.unit.thermometer import TemperatureSensor
 
 NOTHING = np.zeros(0, np.int32), np.zeros((0, 3), np.int32)
 OK, BAD = 0, 16
@@ -315,9 +324,113 @@ def test_an_image_may_lie_at_any_address(built: dict[str, Built], offset: int) -
     image = routine.image
     storage = ctypes.create_string_buffer(bytes(offset) + image, len(image) + 8)
     calib = ctypes.create_string_buffer(4 * (2 + 3 + 12 * 3))
-    status = routine.generated.library.triax_calib_load(
+    status = getattr(routine.generated.library, f"{names_of(routine.plan).linked}_calib_load")(
         calib, ctypes.c_void_p(ctypes.addressof(storage) + offset), ctypes.c_size_t(len(image))
     )
     assert status == OK
     # The words of the structure, in the host's own order.
     assert list(struct.unpack(f"={len(calib) // 4}i", calib.raw)) == words_of(image)[15:-1]
+
+
+# ---- the identity behind the constants ----
+
+SENSOR = TemperatureSensor(0.0625, -3.5)
+HASH = "0123456789abcdef" * 4
+PROVENANCE = Provenance("SN-0042", HASH, (), "2026-03-30", "-ACC2, ACC1, ACC3")
+
+
+def identity_by_the_page(image: bytes) -> bytes:
+    """docs/explanation/fixed-point.md, the table of the identity, field by field."""
+    content = image + b"TRID" + (1).to_bytes(4, "little") + image[-4:]
+    content += b"SN-0042" + bytes(57) + b"2026-03-30" + bytes(2) + bytes.fromhex(HASH)
+    content += __version__.encode().ljust(16, b"\0") + b"-ACC2, ACC1, ACC3".ljust(96, b"\0")
+    return with_crc(content + struct.pack("<dd", 0.0625, -3.5))
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_identity_is_the_page(built: dict[str, Built], reference: Reference, name: str) -> None:
+    image = image_bytes(built[name].plan)
+    file = with_identity(image, SENSOR, PROVENANCE)
+    assert file == identity_by_the_page(image)
+    assert load(built[name], file) == OK
+    assert opens(reference, file)
+    assert identity_of(image) is None
+    assert identity_of(file) == Identity(
+        "SN-0042", "2026-03-30", HASH, __version__, "-ACC2, ACC1, ACC3", 0.0625, -3.5
+    )
+
+
+def test_an_identity_of_other_constants_is_refused(
+    built: dict[str, Built], reference: Reference
+) -> None:
+    """Its CRC alone would not tell: a CRC over a message and its own CRC is always the same."""
+    plan = built[SAMPLES[0]].plan
+    one, other = image_bytes(plan), image_bytes(replace(plan, temp_max_code=plan.temp_max_code - 1))
+    mixed = one + with_identity(other, SENSOR, PROVENANCE)[len(other) :]
+    assert crc32_by_the_bit(mixed[:-4]).to_bytes(4, "little") == mixed[-4:]
+    assert load(built[SAMPLES[0]], mixed) == BAD
+    assert not opens(reference, mixed)
+    with pytest.raises(RefusedError, match="of other constants"):
+        identity_of(mixed)
+
+
+def test_a_damaged_file_names_what_is_damaged() -> None:
+    image = image_bytes(GOLDEN["direct-checked"])
+    file = with_identity(image, SENSOR, PROVENANCE)
+    for at, text in ((40, "CRC of the constants"), (len(image) + 20, "CRC of the identity")):
+        damaged = file[:at] + bytes([file[at] ^ 8]) + file[at + 1 :]
+        with pytest.raises(RefusedError, match=text):
+            identity_of(damaged)
+    for cut in (b"", b"TRXC", file[:-1], file + b"0", bytes(400)):
+        with pytest.raises(RefusedError, match=f"{len(cut)} bytes"):
+            identity_of(cut)
+
+
+def test_a_long_list_of_axes_is_cut_at_a_character() -> None:
+    axes = "a" + "\N{GREEK SMALL LETTER ALPHA}" * 60
+    provenance = replace(PROVENANCE, axes=axes)
+    identity = identity_of(with_identity(image_bytes(GOLDEN["direct-checked"]), SENSOR, provenance))
+    assert identity is not None
+    assert identity.axes == axes[:48]
+
+
+KEEP = """
+#include <string.h>
+#include "triax_calib.h"
+/* 1: refused and as it was, by both functions alike; 2: accepted; 0: anything else. */
+int keeps(const uint8_t *image, size_t size)
+{
+    triax_calib_t calib;
+    triax_calib_t before;
+    uint32_t status;
+    memset(&calib, 0x55, sizeof calib);
+    before = calib;
+    status = triax_calib_load(&calib, image, size);
+    if (triax_calib_check(image, size) != status) {
+        return 0;
+    }
+    if (status == TRIAX_STATUS_OK) {
+        return 2;
+    }
+    return memcmp(&calib, &before, sizeof calib) == 0;
+}
+"""
+
+
+def test_a_refused_image_leaves_the_constants_as_they_were(
+    built: dict[str, Built], tmp_path: Path
+) -> None:
+    """Damaged, cut, of other constants, or with constants that could overflow."""
+    b = built["direct-cubic-24-bit"]
+    good = with_identity(image_bytes(b.plan), SENSOR, PROVENANCE)
+    source, library = tmp_path / "keep.c", tmp_path / "keep.so"
+    source.write_text(KEEP)
+    files = [source, *(b.folder / name for name in ("triax_comp.c", "triax_calib.c"))]
+    command = ["gcc", "-shared", "-fPIC", f"-I{b.folder}", "-o", str(library), *map(str, files)]
+    subprocess.run(command, check=True)
+    keeps = ctypes.CDLL(str(library)).keeps
+    assert keeps(good, ctypes.c_size_t(len(good))) == 2
+    refused = [case for case in image_cases(b.plan, image_bytes(b.plan)) if not case.accepted]
+    assert len(refused) > 500
+    for case in refused:
+        assert keeps(case.image, ctypes.c_size_t(len(case.image))) == 1, case.name

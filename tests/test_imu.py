@@ -15,8 +15,10 @@ from builds import PROVENANCE
 from plans import SENSOR
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.forces import forces_of
+from triaxcal.codegen.identity import IDENTITY_SIZE, identity_of
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.imu import ImuBuild, build_imu, rate_bound
+from triaxcal.codegen.render import render_routine
 from triaxcal.fixedpoint.gyro import TriadDescription, make_gyro_plan
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import make_plan
@@ -202,7 +204,12 @@ def test_the_gyros_files_have_names_of_their_own(built_imu: ImuBuild) -> None:
 def test_an_image_of_the_other_triad_is_refused(built_imu: ImuBuild) -> None:
     accel, gyro = image_bytes(built_imu.accel), image_bytes(built_imu.gyro)
     assert (accel[:4], gyro[:4]) == (b"TRXC", b"TRXG")
-    assert built_imu.files["triax_imu.bin"] == accel + gyro
+    file, size = built_imu.files["triax_imu.bin"], len(accel) + IDENTITY_SIZE
+    for half, constants in ((file[:size], accel), (file[size:], gyro)):
+        assert half.startswith(constants)
+        identity = identity_of(half)
+        assert identity is not None
+        assert identity.serial == PROVENANCE.serial
 
 
 def test_a_gyro_of_another_accelerometer_does_not_compile(
@@ -212,9 +219,10 @@ def test_a_gyro_of_another_accelerometer_does_not_compile(
 
     for name, content in built_imu.files.items():
         (tmp_path / name).write_bytes(content)
-    text = (tmp_path / "triax_comp.h").read_text()
-    (tmp_path / "triax_comp.h").write_text(text.replace("ACCEL_Q 24", "ACCEL_Q 23"))
+    shape = replace(built_imu.accel.shape, output_q=23)
+    other = render_routine(replace(built_imu.accel, shape=shape))
+    (tmp_path / "triax_comp.h").write_text(other["triax_comp.h"])
     command = ["gcc", "-std=c99", "-fsyntax-only", str(tmp_path / "triax_imu.c")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode != 0
-    assert "was generated for another accelerometer" in done.stderr
+    assert "have different shapes" in done.stderr

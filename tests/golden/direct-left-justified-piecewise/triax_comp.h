@@ -53,13 +53,24 @@ extern "C" {
 #define triax_set_temperature triax_c31ffe1c_set_temperature
 #define triax_apply triax_c31ffe1c_apply
 #define triax_calib_load triax_c31ffe1c_calib_load
+#define triax_calib_check triax_c31ffe1c_calib_check
 
 /* What this routine was generated for; an image of another shape is refused. */
 #define TRIAX_SEGMENTS 3
 #define TRIAX_ORDER 1
 #define TRIAX_RAW_MIN (-2147483647 - 1)
 #define TRIAX_RAW_MAX 2147483647
-#define TRIAX_IMAGE_SIZE 396u /* bytes of triax_calib.bin */
+#define TRIAX_IMAGE_SIZE 396u /* bytes of the constants in triax_calib.bin */
+#define TRIAX_FILE_SIZE 648u /* bytes of triax_calib.bin: constants, identity */
+
+/* Where the identity stands in it. Texts are UTF-8 with zeros behind them. */
+#define TRIAX_SERIAL_AT 408u /* 64 bytes: serial number */
+#define TRIAX_DATE_AT 472u /* 12 bytes: day of the measurements, or zeros where unit.toml does not state it */
+#define TRIAX_INPUTS_AT 484u /* 32 bytes: SHA-256 of the unit's files */
+#define TRIAX_GENERATOR_AT 516u /* 16 bytes: version of triaxcal */
+#define TRIAX_AXES_AT 532u /* 96 bytes: what raw x, y, z are; cut where it is longer */
+#define TRIAX_DEGC_PER_CODE_AT 628u /* 8 bytes: IEEE 754 double: degC of a temperature code */
+#define TRIAX_DEGC_AT_ZERO_AT 636u /* 8 bytes: IEEE 754 double: degC of the code 0 */
 
 /* One segment of the temperature range: x = (code - origin_code) * gain, Q31 in -1 to 1. */
 typedef struct {
@@ -103,11 +114,14 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3]);
 
 /*
- * Reads triax_calib.bin. Returns TRIAX_STATUS_OK, or _BAD_IMAGE when the image is damaged,
- * truncated, of another shape, or holds constants whose arithmetic could overflow; then *calib
- * must not be used.
+ * Reads triax_calib.bin, TRIAX_FILE_SIZE bytes, or its first TRIAX_IMAGE_SIZE, the constants
+ * alone. Returns TRIAX_STATUS_OK, or _BAD_IMAGE when they are damaged, truncated, of another shape,
+ * or hold constants whose arithmetic could overflow; then *calib is as it was.
  */
 uint32_t triax_calib_load(triax_calib_t *calib, const uint8_t *image, size_t size);
+
+/* What triax_calib_load would return; nothing is written. */
+uint32_t triax_calib_check(const uint8_t *image, size_t size);
 
 #ifdef __cplusplus
 }

@@ -336,13 +336,20 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
     return status;
 }
 
-/* First words of the image: magic, version, size, shape. */
+/* Words of the image: the header (magic, version, size, shape), two temperature codes, segments. */
 #define HEADER_WORDS 15u
+#define SEGMENTS_AT (HEADER_WORDS + 2u)
+#define SEGMENT_WORDS (3u + (12u * ((uint32_t)TRIAX_ORDER + 1u)))
 
 static uint32_t word_at(const uint8_t *image, size_t index)
 {
     const uint8_t *const p = &image[4u * index];
     return (uint32_t)p[0] | ((uint32_t)p[1] << 8) | ((uint32_t)p[2] << 16) | ((uint32_t)p[3] << 24);
+}
+
+static int32_t int_at(const uint8_t *image, size_t index)
+{
+    return s32(word_at(image, index));
 }
 
 /* CRC-32 of IEEE 802.3, reflected. */
@@ -407,25 +414,62 @@ static uint32_t segment_fits(const triax_segment_t *segment)
     return fits;
 }
 
-/* The plan's own range proof, repeated on whatever the image holds. */
-static uint32_t calib_fits(const triax_calib_t *calib)
+static void read_segment(triax_segment_t *segment, const uint8_t *image, uint32_t s)
 {
+    size_t at = SEGMENTS_AT + (s * SEGMENT_WORDS);
+    uint32_t i;
+    segment->first_code = int_at(image, at);
+    segment->origin_code = int_at(image, at + 1u);
+    segment->gain = int_at(image, at + 2u);
+    at += 3u;
+    for (i = 0u; i < 12u; i++) {
+        uint32_t k;
+        for (k = 0u; k <= (uint32_t)TRIAX_ORDER; k++) {
+            segment->coefficient[i][k] = int_at(image, at);
+            at++;
+        }
+    }
+}
+
+/* The plan's own range proof, repeated on whatever the image holds. */
+static uint32_t constants_fit(const uint8_t *image)
+{
+    const int32_t temp_min_code = int_at(image, HEADER_WORDS);
+    const int32_t temp_max_code = int_at(image, HEADER_WORDS + 1u);
     uint32_t fits = 1u;
     uint32_t s;
-    if (calib->segment[0].first_code != calib->temp_min_code) {
+    if (int_at(image, SEGMENTS_AT) != temp_min_code) {
         fits = 0u;
     }
     for (s = 0u; s < (uint32_t)TRIAX_SEGMENTS; s++) {
-        const triax_segment_t *const segment = &calib->segment[s];
-        int32_t last = calib->temp_max_code;
-        if ((x_fits(segment, segment->first_code, last) == 0u) || (segment_fits(segment) == 0u)) {
+        triax_segment_t segment;
+        int32_t last = temp_max_code;
+        read_segment(&segment, image, s);
+        if ((x_fits(&segment, segment.first_code, last) == 0u) || (segment_fits(&segment) == 0u)) {
             fits = 0u;
         }
     }
     return fits;
 }
 
-/* Whether size, header and CRC are right. */
+/* Whether the identity is undamaged and belongs to the constants before it: it repeats their CRC. */
+static uint32_t identity_fits(const uint8_t *image)
+{
+    const size_t at = TRIAX_IMAGE_SIZE / 4u;
+    const size_t end = (TRIAX_FILE_SIZE / 4u) - 1u;
+    uint32_t fits = 0u;
+    if ((word_at(image, at) == 0x44495254u) && (word_at(image, at + 1u) == 1u)) {
+        if (word_at(image, at + 2u) == word_at(image, at - 1u)) {
+            fits = 1u;
+        }
+    }
+    if (crc32(image, TRIAX_FILE_SIZE - 4u) != word_at(image, end)) {
+        fits = 0u;
+    }
+    return fits;
+}
+
+/* Whether size, header and CRC are right, and the identity where there is one. */
 static uint32_t image_fits(const uint8_t *image, size_t size)
 {
     static const uint32_t header[HEADER_WORDS] = {
@@ -447,7 +491,7 @@ static uint32_t image_fits(const uint8_t *image, size_t size)
     };
     uint32_t fits = 0u;
 
-    if (size == TRIAX_IMAGE_SIZE) {
+    if ((size == TRIAX_IMAGE_SIZE) || (size == TRIAX_FILE_SIZE)) {
         uint32_t i;
         fits = 1u;
         for (i = 0u; i < HEADER_WORDS; i++) {
@@ -458,43 +502,42 @@ static uint32_t image_fits(const uint8_t *image, size_t size)
         if (crc32(image, TRIAX_IMAGE_SIZE - 4u) != word_at(image, (TRIAX_IMAGE_SIZE / 4u) - 1u)) {
             fits = 0u;
         }
+        if ((size == TRIAX_FILE_SIZE) && (identity_fits(image) == 0u)) {
+            fits = 0u;
+        }
     }
     return fits;
 }
 
 static void read_calib(triax_calib_t *calib, const uint8_t *image)
 {
-    size_t at = HEADER_WORDS + 2u;
     uint32_t s;
 
-    calib->temp_min_code = s32(word_at(image, HEADER_WORDS));
-    calib->temp_max_code = s32(word_at(image, HEADER_WORDS + 1u));
+    calib->temp_min_code = int_at(image, HEADER_WORDS);
+    calib->temp_max_code = int_at(image, HEADER_WORDS + 1u);
     for (s = 0u; s < (uint32_t)TRIAX_SEGMENTS; s++) {
-        triax_segment_t *const segment = &calib->segment[s];
-        uint32_t i;
-        segment->first_code = s32(word_at(image, at));
-        segment->origin_code = s32(word_at(image, at + 1u));
-        segment->gain = s32(word_at(image, at + 2u));
-        at += 3u;
-        for (i = 0u; i < 12u; i++) {
-            uint32_t k;
-            for (k = 0u; k <= (uint32_t)TRIAX_ORDER; k++) {
-                segment->coefficient[i][k] = s32(word_at(image, at));
-                at++;
-            }
-        }
+        read_segment(&calib->segment[s], image, s);
     }
 }
 
-uint32_t triax_calib_load(triax_calib_t *calib, const uint8_t *image, size_t size)
+uint32_t triax_calib_check(const uint8_t *image, size_t size)
 {
     uint32_t status = TRIAX_STATUS_BAD_IMAGE;
 
     if (image_fits(image, size) != 0u) {
-        read_calib(calib, image);
-        if (calib_fits(calib) != 0u) {
+        if (constants_fit(image) != 0u) {
             status = TRIAX_STATUS_OK;
         }
+    }
+    return status;
+}
+
+uint32_t triax_calib_load(triax_calib_t *calib, const uint8_t *image, size_t size)
+{
+    const uint32_t status = triax_calib_check(image, size);
+
+    if (status == TRIAX_STATUS_OK) {
+        read_calib(calib, image);
     }
     return status;
 }

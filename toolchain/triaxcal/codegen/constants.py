@@ -31,11 +31,17 @@ class Provenance:
         Hash of the unit's files.
     summary : tuple of str
         Lines for readers: method, thermal model, range, limits.
+    date : str
+        Day of the measurements; "" where it is not stated.
+    axes : str
+        Columns of raw x, y, z with their signs; "" where the readings have none.
     """
 
     serial: str
     inputs_sha256: str
     summary: tuple[str, ...]
+    date: str = ""
+    axes: str = ""
 
 
 def render_constants(

@@ -17,6 +17,8 @@ from random import Random
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.constants import Provenance
+from triaxcal.codegen.identity import with_identity
 from triaxcal.codegen.image import QUADRATIC, RATE, SENSITIVITY, header_names, terms_word
 from triaxcal.codegen.image_layout import (
     GAIN,
@@ -33,6 +35,7 @@ from triaxcal.codegen.routines import Generated, Reference, difference
 from triaxcal.fixedpoint.integer_model import STATUS_BAD_IMAGE, STATUS_OK
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.methods.method import INVERSE
+from triaxcal.unit.thermometer import TemperatureSensor
 
 QUADRATIC_LIMIT, SENSITIVITY_LIMIT = 2**31 - 1, 2**29
 _TABLES = {0: (0, 0), QUADRATIC: (6, QUADRATIC_LIMIT), SENSITIVITY: (3, SENSITIVITY_LIMIT)}
@@ -95,6 +98,7 @@ def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
     )  # fmt: skip
     words = list(struct.unpack(f"<{len(image) // 4}i", image))[:-1]
     cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image, names)]
+    cases += _identities(image)
     changes = itertools.chain(
         _temperature_edges(layout, words), _coefficient_edges(layout, words),
         _row_edges(layout, words), _wild(layout, words), _inverse_edges(layout, plan),
@@ -130,6 +134,29 @@ def _damaged(image: bytes, names: Sequence[str]) -> Iterator[tuple[str, bytes]]:
     for at, name in enumerate(names):
         for bit in (1, INT32_MIN):
             yield f"{name}, CRC right", _sealed([*words[:at], words[at] ^ bit, *words[at + 1 :]])
+
+
+def _identities(image: bytes) -> Iterator[ImageCase]:
+    """Files with an identity behind the constants: good, damaged, and of other constants."""
+    sensor = TemperatureSensor(1.0 / 64.0, 0.0)
+    file = with_identity(
+        image, sensor, Provenance("CASE-1", "5A" * 32, (), "2026-03-30", "-Y, X, Z")
+    )
+    yield ImageCase("with identity", file, True)
+    for size in (len(image) + 4, len(file) - 4, len(file) - 1):
+        yield ImageCase(f"identity cut to {size} bytes", file[:size], False)
+    for more in (1, 4):
+        yield ImageCase(f"identity and {more} bytes", file + bytes(more), False)
+    for at in range(len(file)):
+        damaged = file[:at] + bytes([file[at] ^ 1 << at % 8]) + file[at + 1 :]
+        yield ImageCase(f"with identity, bit of byte {at}", damaged, False)
+    words = list(struct.unpack(f"<{len(file) // 4}i", file))[:-1]
+    start = len(image) // 4
+    for word, name in enumerate(("magic", "version", "CRC of the constants")):
+        for bit in (1, INT32_MIN):
+            at = start + word
+            changed = _sealed([*words[:at], words[at] ^ bit, *words[at + 1 :]])
+            yield ImageCase(f"{name} of the identity, CRC right", changed, False)
 
 
 def _temperature_edges(layout: Layout, words: list[int]) -> Iterator[Change]:

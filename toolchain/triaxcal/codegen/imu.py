@@ -12,6 +12,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.crosscheck import RANDOM_VECTORS, CrossCheck, cross_check, vector_sets
+from triaxcal.codegen.identity import IDENTITY_SIZE, with_identity
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images, image_cases
 from triaxcal.codegen.names import imu_context, names_of
@@ -99,7 +100,7 @@ def build_imu(
             _check(gyro, (GyroGenerated(library), GyroReference(reference)), random_vectors),
         )
         vectors = _check_both(
-            accel, gyro, GeneratedImu(library), image_bytes(accel) + image_bytes(gyro)
+            accel, gyro, GeneratedImu(library), files[names_of(accel).file(IMU_IMAGE_FILE)]
         )
     for what, bound, check in zip(("accelerometer", "gyro"), bounds, checks, strict=True):
         if check.largest_error_lsb > bound.lsb:
@@ -124,7 +125,10 @@ def render_imu(
     shapes = f"shapes {names.shape} and {names_of(gyro).shape}"
     texts |= dict(render(name, shapes, names, **context) for name in IMU_FILES)
     files = {name: text.encode() for name, text in texts.items()}
-    files[names.file(IMU_IMAGE_FILE)] = image_bytes(accel) + image_bytes(gyro)
+    files[names.file(IMU_IMAGE_FILE)] = b"".join(
+        with_identity(image_bytes(plan), triad.temperature_sensor, provenance)
+        for plan, triad in zip((accel, gyro), triads, strict=True)
+    )
     return files
 
 
@@ -154,7 +158,8 @@ def _check_both(accel: Plan, gyro: Plan, generated: GeneratedImu, image: bytes) 
     """Random samples of both triads, in range and any, against Python; and the joint image."""
     temp, raw_accel, raw_gyro = imu_vectors(accel, gyro)
     expected = imu_answers(accel, gyro, temp, raw_accel, raw_gyro)
-    for given in (None, image):
+    bare = image_bytes(accel) + image_bytes(gyro)
+    for given in (None, image, bare):
         loaded, found = generated.run(given, temp, raw_accel, raw_gyro)
         if loaded != STATUS_OK:
             raise RefusedError("triax_imu_calib_load", f"refused its own image: status {loaded}")
@@ -171,7 +176,7 @@ def _check_both(accel: Plan, gyro: Plan, generated: GeneratedImu, image: bytes) 
                 f"status {expected[2][i]}",
                 remedy="do not use this build, report it",
             )
-    accel_size = len(image_bytes(accel))
+    accel_size = len(image_bytes(accel)) + IDENTITY_SIZE
     damaged = {
         "cut": image[:-4], "too long": image + bytes(4), "accelerometer alone": image[:accel_size],
         "exchanged": image[accel_size:] + image[:accel_size], "accelerometer's last byte":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from triaxcal.codegen.forms import assembly, forms_using, limb_split
+from triaxcal.codegen.identity import FIELDS, IDENTITY_SIZE, MAGIC, VERSION
 from triaxcal.codegen.image import header_names, header_words, image_size
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.templates import macro_literal, render
@@ -58,6 +59,10 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "lsb_deg_per_h": f"{3600 / 2**shape.output_q:.4g}",
         "function_order": ", ".join(names[:4]) + ", ... " + names[11],
         "image_size": image_size(plan),
+        "identity_size": IDENTITY_SIZE,
+        "identity": FIELDS,
+        "identity_magic": MAGIC,
+        "identity_version": VERSION,
         "header": header_words(plan),
         "header_names": header_names(plan),
         "row_limit": shape.row_limit,

@@ -19,7 +19,7 @@ from triaxcal.codegen.tryout import model_error_g, run_on_dwells
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.delivery.judgement import verdict_on
 from triaxcal.delivery.verdict import Verdict
-from triaxcal.fitting.converter import input_words
+from triaxcal.fitting.converter import input_words, plain_name
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.acceptance import dwells_in_range
 from triaxcal.fixedpoint.arithmetic import INT32_MAX
@@ -159,7 +159,13 @@ def _files(firmware: Firmware) -> dict[str, bytes]:
         *_constants_at_t0(calibration),
         *_tested(firmware.verdict),
     )
-    provenance = Provenance(unit.serial, fitted.inputs_sha256, summary)
+    provenance = Provenance(
+        unit.serial,
+        fitted.inputs_sha256,
+        summary,
+        "" if unit.measured.date is None else unit.measured.date.isoformat(),
+        ", ".join(map(plain_name, calibration.inputs)),
+    )
     return output_files(Job(plan, unit.temperature_sensor, provenance))
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.shipped import shipped
+from triaxcal.codegen.identity import IDENTITY_SIZE
 from triaxcal.codegen.imu import IMU_FILES, IMU_IMAGE_FILE, ImuBuild, imu_answers, imu_vectors
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.shim import write_shim
@@ -68,7 +69,7 @@ def verify_imu(folder: Path, build: ImuBuild) -> dict[str, tuple[Outcome, ...]]:
         Outcomes of `ACCELEROMETER`, `GYRO` and `BOTH`.
     """
     image = build.files[names_of(build.accel).file(IMU_IMAGE_FILE)]
-    length = image_length(image)
+    length = image_length(image) + IDENTITY_SIZE
     accel = {**build.files, names_of(build.accel).file(IMAGE): image[:length]}
     gyro = {**build.files, names_of(build.gyro).file(IMAGE): image[length:]}
     return {

@@ -12,6 +12,7 @@ from triaxcal.codegen.shim import write_shim
 from triaxcal.codegen.templates import environment
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
+from triaxcal.verify.image_reader import image_length
 
 ROUTINE = "triax_comp.c"
 CONSTANTS = "triax_calib.c"
@@ -53,8 +54,9 @@ class Workspace:
 
     @property
     def image(self) -> bytes:
-        """The delivered image."""
-        return (self.folder / self.named(IMAGE)).read_bytes()
+        """The delivered constants, without the identity behind them."""
+        content = (self.folder / self.named(IMAGE)).read_bytes()
+        return content[: image_length(content)]
 
     def named(self, name: str) -> str:
         """Name of a file of the triad that is verified, from an accelerometer's."""
