@@ -112,7 +112,7 @@ def _ranges(build: ImuBuild) -> dict[str, object]:
 def _cppcheck(work: Both) -> Outcome:
     """triax_imu.c and its header; the findings in the files of the triads are theirs."""
     own = {names_of(work.build.accel).file(name) for name in IMU_FILES}
-    found = cppcheck.find_in(work.folder, work.sources)
+    found = cppcheck.find_in(work.folder, work.sources, [work.build.accel, work.build.gyro])
     return cppcheck.judge([finding for finding in found if finding.file in own])
 
 
