@@ -74,7 +74,11 @@ def run_on_host(case: Case, folder: Path, arithmetic: int = 0) -> str:
     source = folder / "case-0"
     target = FIRMWARE / "target"
     program = folder / "program"
-    files = [source / case.routine, FIRMWARE / "triax_ref.c", FIRMWARE / "triax_ref_image.c"]
+    files = [
+        *(source / name for name in case.sources),
+        FIRMWARE / "triax_ref.c",
+        FIRMWARE / "triax_ref_image.c",
+    ]
     command = ["gcc", "-std=c99", "-O1", "-DTARGET_HOSTED", f"-DTRIAX_ARITHMETIC={arithmetic}"]
     command += [f"-I{d}" for d in (source, FIRMWARE, target)]
     command += map(str, [*files, target / "test_main.c", target / "target_io.c"])

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import pytest
 
+from triaxcal.codegen.names import Names
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
 from triaxcal.verify import eva
 from triaxcal.verify.mutation import read_equivalents
@@ -75,7 +76,7 @@ def test_a_planted_mistake_gives_an_alarm(
 
 IDIOMS = [
     (entry.function, entry.before, after)
-    for entry in read_equivalents()
+    for entry in read_equivalents(Names("triax", "accel", "01234567"))
     if "Eva gives an alarm" in entry.reason and entry.function != "asr64"
     for after in entry.after
 ]

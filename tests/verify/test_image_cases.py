@@ -21,7 +21,7 @@ WRONG = [
     ("inverse", "(divisor < INT64_C(1073741825))", "(divisor < INT64_C(1073741824))"),
     ("saturating", "(bound / 2) + 1", "(bound / 2)"),
     ("saturating", "segment->gain > 0", "segment->gain >= 0"),
-    ("direct-two-segments", "first_code != calib->temp_min", "first_code < calib->temp_min"),
+    ("direct-two-segments", "SEGMENTS_AT) != temp_min", "SEGMENTS_AT) < temp_min"),
     ("direct-two-segments", "last = next - 1;", "last = next;"),
 ]
 
@@ -80,7 +80,7 @@ def test_a_wrong_loader_is_found(plant: Planter, shape: str, old: str, new: str)
 def test_a_loader_that_ignores_the_size_is_found(plant: Planter, tmp_path: Path) -> None:
     del tmp_path
     work = plant(
-        "saturating", ("if (size == TRIAX_IMAGE_SIZE) {", "if (size >= TRIAX_IMAGE_SIZE) {")
+        "saturating", ("if ((size == TRIAX_IMAGE_SIZE) ||", "if ((size >= TRIAX_IMAGE_SIZE) ||")
     )
     with pytest.raises(RefusedError, match="too long"):
         check_images(work.plan, image_cases(work.plan, work.image), *loaded(work))

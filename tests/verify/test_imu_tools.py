@@ -128,12 +128,12 @@ def broken(build: ImuBuild, folder: Path, old: str, new: str) -> imu.Both:
 @pytest.mark.parametrize(
     ("key", "change", "says"),
     [
-        ("eva_image", ("&image[TRIAX_IMAGE_SIZE]", "&image[TRIAX_IMAGE_SIZE + 5u]"), "mem_access"),
+        ("eva_image", ("&image[accel_size]", "&image[accel_size + 5u]"), "mem_access"),
         ("eva_codes", ("raw_gyro, accel, rate", "raw_gyro, &accel[1], rate"), "mem_access"),
         ("gcc_sanitizers", ("raw_gyro, accel, rate", "raw_gyro, raw_accel, rate"),
          "answers differ"),
         ("clang_sanitizers", ("accel_status | (", "gyro_status | ("), "answers differ"),
-        ("cppcheck", ("status |= triax_gyro_calib_load", "triax_gyro_calib_load"), "MISRA 17.7"),
+        ("cppcheck", ("status |= triax_gyro_calib_check", "triax_gyro_calib_check"), "MISRA 17.7"),
     ],
 )  # fmt: skip
 def test_a_planted_mistake_in_what_joins_the_triads_is_found(
