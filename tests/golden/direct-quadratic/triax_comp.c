@@ -380,7 +380,7 @@ static uint32_t terms_fit(const uint8_t *image)
     return fits;
 }
 
-static void read_segment(triax_segment_t *segment, const uint8_t *image, uint32_t s)
+static void read_segment(triax_segment_t *segment, const uint8_t *image, size_t s)
 {
     size_t at = SEGMENTS_AT + (s * SEGMENT_WORDS);
     uint32_t i;

@@ -414,7 +414,7 @@ static uint32_t segment_fits(const triax_segment_t *segment)
     return fits;
 }
 
-static void read_segment(triax_segment_t *segment, const uint8_t *image, uint32_t s)
+static void read_segment(triax_segment_t *segment, const uint8_t *image, size_t s)
 {
     size_t at = SEGMENTS_AT + (s * SEGMENT_WORDS);
     uint32_t i;
