@@ -13,6 +13,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS, find_compiler
 from triaxcal.codegen.crosscheck import python_routine
+from triaxcal.codegen.shim import write_shim
 from triaxcal.delivery.unit import deliver
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import CODE_BITS, NODE_SOURCES, Agreement, exchange, packing_source, vectors
@@ -64,7 +65,8 @@ def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
         folder / "tilter.c",
         *(folder / name for name in files if name.endswith(".c")),
     ]
-    command = [find_compiler(), *FLAGS, f"-I{folder}", f"-I{ours}", "-o", str(program)]
+    include = [folder, *write_shim(folder / "names", setup.unit.prefix), ours]
+    command = [find_compiler(), *FLAGS, *(f"-I{path}" for path in include), "-o", str(program)]
     done = subprocess.run(
         [*command, *map(str, sources)], capture_output=True, text=True, check=False
     )
