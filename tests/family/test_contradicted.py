@@ -79,11 +79,11 @@ def test_a_zero_far_from_the_prior_is_named(tmp_path: Path) -> None:
 def test_a_refusal_for_the_residuals_names_it(tmp_path: Path) -> None:
     """The prior makes residuals of 20 mg: no pose is to blame."""
     values = readings(np.eye(3) + CROSS, np.zeros(3))
-    text = f"{ROWS}\n[priors]\ncross_term_rad = 0.001"
+    text = f"{ROWS}\n[priors]\ncross_term_rad = 1e-5"
     folder = write_unit(tmp_path / "U", values, text, header="a,b,c")
     result = CliRunner().invoke(main, ["calib", str(folder), "--build", str(tmp_path / "B")])
     assert result.exit_code == 1
-    assert "[priors] cross_term_rad = 0.001 is contradicted by the poses" in str(result.exception)
+    assert "[priors] cross_term_rad = 1e-05 is contradicted by the poses" in str(result.exception)
 
 
 def test_it_stands_in_terminal_and_files(tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def test_a_hand_turned_log_gives_the_truth_in_the_sensors_frame(tmp_path: Path) 
     assert sd[:9].max() < 8e-3
     assert sd[9:].max() < 3e-2
     assert recording.rms_g < 0.3e-3
-    assert calibration.selection_reason.startswith("linear, with priors: held-out error")
+    assert calibration.selection_reason.startswith("linear, with priors scaled by the poses: held")
     assert calibration.terms.quadratic_per_g is None
 
 
@@ -211,7 +211,7 @@ def test_six_faces_twice_are_judged_by_single_poses(tmp_path: Path) -> None:
     """No orientation of six can be held out; each face was taken twice."""
     faces = directions(6)
     calibration = calibrated(write_unit(tmp_path / "U", log(np.concatenate([faces, faces]))))
-    assert calibration.selection_reason.startswith("linear, with priors: held-out error")
+    assert calibration.selection_reason.startswith("linear, with priors scaled by the poses: held")
     assert (
         "12 single poses, those of equal orientation kept, held out in turn"
         in calibration.selection_reason
@@ -372,7 +372,7 @@ def test_quadratic_terms_that_cannot_be_scored_do_not_end_in_a_fault(tmp_path: P
     poses = random / np.linalg.norm(random, axis=1, keepdims=True)
     folder = write_unit(tmp_path / "U", log(poses), more='[fit]\nterms = "quadratic"\n')
     told = calibrated(folder).selection_reason
-    assert told.startswith("all terms, with priors: held-out error")
+    assert told.startswith("all terms, with priors scaled by the poses: held")
     assert '[firmware] or [fit] terms = "quadratic"' in told
 
 

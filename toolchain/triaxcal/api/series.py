@@ -119,7 +119,7 @@ def learn_priors(
     RefusedError
         When fewer than two units can be used.
     """
-    from triaxcal.fitting.recorded.learned import UnitPoses, learn  # noqa: PLC0415
+    from triaxcal.fitting.recorded.learned import learn, unit_poses  # noqa: PLC0415
 
     found = []
     for path in sorted(dict.fromkeys(map(Path, units))):
@@ -129,7 +129,7 @@ def learn_priors(
             if layout is None or layout.faces or layout.angles is not None:
                 skipped(str(path), "no recording of poses of which only |a| = g is known")
                 continue
-            found.append(UnitPoses.of(unit, layout, path))
+            found.append(unit_poses(unit, layout, path))
         except RefusedError as refusal:
             skipped(str(path), str(refusal))
     if len(found) < 2:

@@ -38,9 +38,9 @@ _ORIGINS = {
     ),
     LEFT_OUT_PART: (
         "left_out_terms",
-        "terms that the firmware leaves out",
-        "difference of the constants in the C from those of the fit with all terms",
-        'state [firmware] terms = "quadratic"',
+        "shift from the fit with all terms",
+        "difference of the constants in the C from those with all terms and the priors as stated",
+        "learn [priors] of this type of sensor (batch --learn-priors)",
     ),
 }
 """Key, name, origin and advice of each part."""

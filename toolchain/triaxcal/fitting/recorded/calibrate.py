@@ -19,16 +19,13 @@ from triaxcal.fitting.recorded.magnitude import fit_with_prior
 from triaxcal.fitting.recorded.prepared import Prepared, prepare
 from triaxcal.fitting.recorded.prior import FULL, LINEAR, Known
 from triaxcal.fitting.recorded.rate import half_cycle_turns, pose_rates
-from triaxcal.fitting.recorded.scalar import (
-    MODELS,
-    ScalarModel,
-)
+from triaxcal.fitting.recorded.scalar import MODELS, ScalarModel
 from triaxcal.fitting.recorded.solution import ScalarFit
 from triaxcal.fitting.recorded.temperatures import (
     gain_functions,
     thermal_shapes,
 )
-from triaxcal.fitting.recorded.terms import choose_terms, models_of
+from triaxcal.fitting.recorded.terms import choose_terms, models_of, scaled_by_poses
 from triaxcal.fitting.recorded.trials import (
     TURNS_MAX,
     Judged,
@@ -100,11 +97,12 @@ def calibrate_poses(
     poses = find_poses(samples, layout)
     found, climate, turns, thermal, best = _linear(unit, layout, samples, poses, quadratic)
     base = thermal[0].trial
-    rows = [best] + [
-        judge(replace(best.trial, model=_with(quadratic, model)), found.data, climate, turns.all)
-        for model in models_of(unit)[1:]
-    ]
-    delivered = choose_terms(unit, rows)
+    models = [_with(quadratic, model) for model in models_of(unit)]
+    trials = [replace(best.trial, model=model) for model in models]
+    scaled = [scaled_by_poses(trial, found.data, climate, turns.all) for trial in trials]
+    full = judge(trials[-1], found.data, climate, turns.all)
+    delivered = choose_terms(unit, full, scaled)
+    rows = [*(s.row for s in scaled), best] + [full] * (len(models) > 1)
     plain = _plain_rows(unit, found, climate, replace(base, known=None), turns)
     why = _reason(thermal, delivered.own, turns, delivered.reason)
     outlier = _outlier(best, poses, unit.loss)

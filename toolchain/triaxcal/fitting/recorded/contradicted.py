@@ -15,10 +15,10 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from triaxcal.fitting.core.noise import Linearised, noise_of
 from triaxcal.fitting.core.outliers import CHANCE
 from triaxcal.fitting.recorded.magnitude import fit_with_prior
 from triaxcal.fitting.recorded.prior import Known
+from triaxcal.fitting.recorded.scales import ScaleEvidence
 from triaxcal.fitting.recorded.solution import ScalarFit
 from triaxcal.fitting.recorded.trials import Judged
 from triaxcal.model.positions import AXES
@@ -30,22 +30,6 @@ _GROUPS = tuple(field.name for field in fields(Priors))
 _STEP = math.sqrt(2.0)
 """Of the scales that are tried: nearer to each other than three constants show a scale."""
 _WIDEST = 1e6
-
-
-def log_evidence(fit: ScalarFit, known: Known, priors: Priors) -> float:
-    """Ln of the probability of the poses under other priors, but for a constant.
-
-    By Laplace's approximation about a fit with priors.
-    """
-    posterior = fit.posterior
-    assert posterior is not None
-    prior = replace(known, priors=priors).of(fit.model, fit.data, fit.gain_functions)
-    slopes = fit.jacobian * (posterior.weight / fit.data.weight)[:, None]
-    at_mean = posterior.weight * fit.residual_g + slopes @ (prior.mean - fit.theta)
-    values = fit.data.values
-    count = float((posterior.weight**2).sum()) if values is None else values
-    at = Linearised.about(slopes @ prior.factor, at_mean, count)
-    return noise_of(at, known.noise).log_evidence
 
 
 @dataclass(frozen=True)
@@ -77,9 +61,10 @@ def contradicted(row: Judged, t0_degc: float) -> list[str]:
     known = row.trial.known
     assert known is not None
     stated = wide = known.priors
+    evidence = ScaleEvidence(known, row.fit)
     keys: list[str] = []
     while len(keys) < len(_GROUPS):
-        tried = [(*_wider(row.fit, known, wide, key), key) for key in _GROUPS if key not in keys]
+        tried = [(*_wider(evidence, wide, key), key) for key in _GROUPS if key not in keys]
         gain, scale, key = max(tried)
         # chi-square with one degree of freedom, by the normal distribution; one of several groups.
         if 0.5 * math.erfc(math.sqrt(max(gain, 0.0))) * len(_GROUPS) > CHANCE:
@@ -115,13 +100,13 @@ def _whose(key: str, value: float) -> str:
     return " (the default)" if value == getattr(Priors(), key) else ""
 
 
-def _wider(fit: ScalarFit, known: Known, priors: Priors, key: str) -> tuple[float, float]:
+def _wider(evidence: ScaleEvidence, priors: Priors, key: str) -> tuple[float, float]:
     """Largest gain of ln evidence by a wider scale of one group, and that scale."""
     own = float(getattr(priors, key))
-    base = log_evidence(fit, known, priors)
+    base = evidence.log_evidence(priors)
     best, factor = (0.0, own), _STEP
     while factor < _WIDEST:
-        gain = log_evidence(fit, known, replace(priors, **{key: own * factor})) - base
+        gain = evidence.log_evidence(replace(priors, **{key: own * factor})) - base
         if gain <= best[0]:
             break
         best, factor = (gain, own * factor), factor * _STEP

@@ -25,7 +25,6 @@ from triaxcal.fitting.recorded.scalar import (
     ScalarModel,
     constant_part,
 )
-from triaxcal.model.terms import PRODUCT_AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.priors import Priors
 
@@ -33,13 +32,10 @@ _SCALE_UNKNOWN = 0.5
 """Of the mean scale factor where no nominal one is known, against that of the poses."""
 _FAR_SDS = 5.0
 """Poses all round that show biases as large: the reading of 0 g is not 0, as of unsigned codes."""
-WIDER = 4.0
-"""Factor of the products' prior in the candidate for sensors with larger ones."""
 
 LINEAR = replace(NINE, label="linear, with priors")
 OWN_SQUARES = replace(NINE, label="own-axis squares, with priors", quadratic=SQUARES)
 FULL = replace(NINE, label="all terms, with priors", quadratic=np.eye(18).reshape(18, 3, 6))
-WIDE = replace(FULL, label=f"all terms, with priors, products {WIDER:g} times")
 
 
 @dataclass(frozen=True)
@@ -80,9 +76,8 @@ class Known:
         zero_sd = p.bias_g * gain
         bias = zero_sd**2 * np.eye(3)
         biases = _over_temperature(bias, bias, data.basis, ones)
-        Q = np.array(
-            [_product_sd(pattern, p, wide=model.label == WIDE.label) for pattern in model.quadratic]
-        )
+        own_square = np.einsum("qij,ij->q", model.quadratic, SQUARES.sum(axis=0)) > 0.0
+        Q = np.where(own_square, p.own_square_g_per_g2, p.product_g_per_g2)
         covariance = np.zeros((m * g + 3 * P + len(Q),) * 2)
         covariance[: m * g, : m * g] = gains
         covariance[m * g : m * g + 3 * P, m * g : m * g + 3 * P] = biases
@@ -117,10 +112,3 @@ def _over_temperature(
     # Of functions that are orthonormal over the poses, all but the constant 1.
     spread = (np.linalg.pinv(basis.T @ basis / len(basis)) - level) / (basis.shape[1] - 1)
     return np.asarray(of_constant + np.kron(varying, spread), dtype=np.float64)
-
-
-def _product_sd(pattern: FloatArray, priors: Priors, *, wide: bool) -> float:
-    row, column = (int(k) for k in np.argwhere(pattern)[0])
-    if PRODUCT_AXES[column] == (row, row):
-        return priors.own_square_g_per_g2
-    return priors.product_g_per_g2 * (WIDER if wide else 1.0)

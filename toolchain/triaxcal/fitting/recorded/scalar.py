@@ -142,6 +142,11 @@ class ScalarData:
         """How many values there are, where `count` says it."""
         return float(self.count.sum()) if len(self.count) else None
 
+    @property
+    def quality(self) -> FloatArray:
+        """Square roots of the weights by the poses' own scatter alone, (n,)."""
+        return self.weight / np.sqrt(self.count) if len(self.count) else self.weight
+
     def with_basis(self, basis: FloatArray) -> ScalarData:
         """The same poses with other functions of temperature."""
         return replace(self, basis=basis)

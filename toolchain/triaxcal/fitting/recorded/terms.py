@@ -1,31 +1,34 @@
-"""Which terms beyond the linear constants go into the C: those that unseen poses ask for.
+"""Which terms beyond the linear constants go into the C: those that the poses ask for.
 
-The fit with priors knows all terms; the firmware need not compute them. Terms are put into the C
-where both are true:
+The fit with priors knows all terms; the firmware need not compute them. What is delivered is
+fitted with the scales of the priors that the poses of this unit show (`recorded.scales`). Terms are
+put into the C where both are true:
 
-1. their largest effect on a component at 1 g, after the linear constants have been fitted anew
-   without them, is above the standard uncertainty of that component;
-2. without them the held-out error is larger by more than two of its standard errors: an rms of n
-   values is known to 1 / sqrt(2 n) of itself.
+1. the poses are `ODDS` times as probable with them as without them, with the constants, their
+   scales and the noise integrated out. That probability is the product of those of each pose
+   predicted from the poses before it: terms that only follow the noise lower it;
+2. their largest effect on a component at 1 g, after the linear constants have been fitted anew
+   without them, is above the standard uncertainty of that component.
 
 `[firmware] terms` decides instead where it is stated. What is left out stays in the uncertainty:
-the covariance about the delivered constants is that of the full fit, and the square of the shift
-from its solution.
+the covariance about the delivered constants is that of the fit with all terms and the stated
+priors, and the shift from its solution is a source of its own.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fitting.recorded.prior import FULL, LINEAR, OWN_SQUARES, WIDE
-from triaxcal.fitting.recorded.scalar import ScalarModel
+from triaxcal.fitting.recorded.prior import FULL, LINEAR, OWN_SQUARES
+from triaxcal.fitting.recorded.scalar import ScalarData, ScalarModel
+from triaxcal.fitting.recorded.scales import ScaleEvidence, scales_of
 from triaxcal.fitting.recorded.solution import ScalarFit
-from triaxcal.fitting.recorded.trials import Judged
+from triaxcal.fitting.recorded.trials import Judged, PoseClimate, Trial, Turn, judge
 from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import UnitDescription
@@ -34,7 +37,25 @@ from triaxcal.unit.priors import LINEAR as LINEAR_C
 from triaxcal.unit.priors import OWN_SQUARES as OWN_SQUARES_C
 from triaxcal.unit.priors import QUADRATIC_TERMS as QUADRATIC_C
 
+ODDS = 10.0
+"""What terms in the C need; the usual word for such odds is strong."""
 _DIRECTIONS = 200
+_SCALED = " scaled by the poses"
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """A model with the scales of its priors that the poses show.
+
+    Attributes
+    ----------
+    row : Judged
+    log_evidence : float
+        Ln of the probability of the poses, with the scales integrated out.
+    """
+
+    row: Judged
+    log_evidence: float
 
 
 @dataclass(frozen=True)
@@ -45,7 +66,7 @@ class Delivered:
     ----------
     own : Judged
     full : Judged
-        The same row where nothing is left out.
+        Of all terms that are fitted, with the priors as stated.
     reason : str
         The rule and its numbers.
     """
@@ -64,7 +85,7 @@ def models_of(unit: UnitDescription) -> tuple[ScalarModel, ...]:
         When [firmware] asks for terms that [fit] rules out.
     """
     if unit.terms != "linear":
-        return LINEAR, OWN_SQUARES, FULL, WIDE
+        return LINEAR, OWN_SQUARES, FULL
     if unit.firmware_terms in {OWN_SQUARES_C, QUADRATIC_C}:
         raise RefusedError(
             f"{unit.source}, [firmware] terms",
@@ -75,55 +96,57 @@ def models_of(unit: UnitDescription) -> tuple[ScalarModel, ...]:
     return (LINEAR,)
 
 
-def choose_terms(unit: UnitDescription, rows: Sequence[Judged]) -> Delivered:
-    """What goes into the C, of rows of `models_of` with one thermal function."""
-    by_model = {row.trial.model.label: row for row in rows}
-    linear = by_model[LINEAR.label]
-    if len(rows) == 1:
-        return Delivered(linear, linear, "no terms are fitted: [fit] terms")
-    full, wide = by_model[FULL.label], by_model[WIDE.label]
-    best = min((full, wide), key=_score)
-    if _better(wide, full):
-        full = best = wide
+def scaled_by_poses(
+    trial: Trial, data: ScalarData, poses: PoseClimate, left_out: Sequence[Turn]
+) -> Scaled:
+    """A trial with the scales of its priors that the poses show, those held out among them."""
+    known = trial.known
+    assert known is not None
+    fit = judge(trial, data, poses, []).fit
+    scales = scales_of([ScaleEvidence(known, fit)], known.priors)
+    model = replace(trial.model, label=f"{trial.model.label}{_SCALED}")
+    own = replace(trial, model=model, known=replace(known, priors=scales.priors))
+    return Scaled(judge(own, data, poses, left_out), scales.log_evidence)
+
+
+def choose_terms(unit: UnitDescription, full: Judged, scaled: Sequence[Scaled]) -> Delivered:
+    """What goes into the C, of the models of `models_of` with one thermal function.
+
+    `full` is the last of them with the priors as stated.
+    """
+    linear = scaled[0]
+    if len(scaled) == 1:
+        return Delivered(linear.row, full, "no terms are fitted: [fit] terms")
     stated = unit.firmware_terms
     if stated == AUTO and unit.terms == "quadratic":
         stated = QUADRATIC_C
     if stated != AUTO:
-        return _stated(stated, by_model, linear, full)
-    own = min((by_model[OWN_SQUARES.label], best), key=_score)
-    effect, u = largest_effect(unit, linear, own)
-    words = f"largest effect {_mg(effect)} at 1 g, where the standard uncertainty is {_mg(u)}"
-    if own.held_out_g is None or linear.held_out_g is None:
-        return Delivered(linear, full, f"left out of the C: {words}; nothing is held out")
-    count = 0 if own.errors_g is None else own.errors_g.size
-    scores = (
-        f"held-out error {_mg(own.held_out_g)} with them, {_mg(linear.held_out_g)} without "
-        f"(two standard errors: {2.0 / math.sqrt(2.0 * count):.0%})"
+        own = scaled[(LINEAR_C, OWN_SQUARES_C, QUADRATIC_C).index(stated)]
+        key = "[firmware] terms" if stated != QUADRATIC_C else "[firmware] or [fit] terms"
+        return Delivered(own.row, full, f'{key} = "{stated}"')
+    best = max(scaled[1:], key=lambda s: s.log_evidence)
+    effect, u = largest_effect(unit, linear.row, best.row)
+    log_odds = best.log_evidence - linear.log_evidence
+    words = (
+        f"the poses are {_odds(log_odds)} (needed: {ODDS:g} times as probable with them); largest "
+        f"effect {_mg(effect)} at 1 g, where the standard uncertainty is {_mg(u)}"
     )
-    larger = own.held_out_g * (1.0 + 2.0 / math.sqrt(2.0 * count)) < linear.held_out_g
-    if effect > u and larger:
-        name = "own squares" if own is by_model[OWN_SQUARES.label] else "quadratic terms"
-        kept = own if own is by_model[OWN_SQUARES.label] else best
-        at = full if kept is not wide else wide
-        return Delivered(kept, at, f"{name} are in the C: {words}; {scores}")
-    return Delivered(linear, full, f"left out of the C: {words}; {scores}")
+    if best.row.held_out_g is not None and linear.row.held_out_g is not None:
+        words += (
+            f"; held-out error {_mg(best.row.held_out_g)} with them, "
+            f"{_mg(linear.row.held_out_g)} without"
+        )
+    if log_odds > math.log(ODDS) and effect > u:
+        name = "own squares" if best is scaled[1] else "quadratic terms"
+        return Delivered(best.row, full, f"{name} are in the C: {words}")
+    return Delivered(linear.row, full, f"left out of the C: {words}")
 
 
-def _stated(stated: str, by_model: Mapping[str, Judged], linear: Judged, full: Judged) -> Delivered:
-    own = {LINEAR_C: linear, OWN_SQUARES_C: by_model[OWN_SQUARES.label], QUADRATIC_C: full}[stated]
-    key = "[firmware] terms" if stated != QUADRATIC_C else "[firmware] or [fit] terms"
-    return Delivered(own, full, f'{key} = "{stated}"')
-
-
-def _score(row: Judged) -> float:
-    return math.inf if row.held_out_g is None else row.held_out_g
-
-
-def _better(row: Judged, rival: Judged) -> bool:
-    """Whether held-out errors are smaller by a standard error."""
-    if row.held_out_g is None or rival.held_out_g is None or row.errors_g is None:
-        return False
-    return row.held_out_g * (1.0 + 1.0 / math.sqrt(2.0 * row.errors_g.size)) < rival.held_out_g
+def _odds(log_odds: float) -> str:
+    """How much more probable the poses are, in words."""
+    odds = math.exp(min(abs(log_odds), math.log(1e6)))
+    than = "more than " * (odds > 999999.0)
+    return f"{than}{odds:.3g} times as probable {'with' if log_odds > 0.0 else 'without'} them"
 
 
 def largest_effect(unit: UnitDescription, linear: Judged, other: Judged) -> tuple[float, float]:

@@ -107,7 +107,7 @@ class Judged:
     errors_g : array or None
         |a| - g of everything held out, in the order of the turns.
     expected_g : float or None
-        Rms of them that the fits with priors expect, with their noise.
+        Rms of them that the fits with priors expect, with the noise of each pose.
     """
 
     trial: Trial
@@ -176,16 +176,16 @@ def judge(trial: Trial, data: ScalarData, poses: PoseClimate, left_out: Sequence
             part.condition > CONDITION_MAX or (~mask).sum() < trial.parameters
         ):
             return Judged(trial, fit, None, able=True)
-        errors.append(part.errors_g(own.select(judged)))
+        out = own.select(judged)
+        errors.append(part.errors_g(out))
         if fit.posterior is not None:
-            expected.append(part.expected_g(own.select(judged)))
+            expected.append(part.expected_g(out) ** 2 + (fit.posterior.scale / out.quality) ** 2)
     if not errors:
         return Judged(trial, fit, None, able=True)
     every = np.concatenate(errors)
     rms, among = float(np.sqrt(np.mean(every**2))), None
     if fit.posterior is not None:
-        variance = np.mean(np.concatenate(expected) ** 2) + fit.posterior.scale**2
-        among = float(np.sqrt(variance))
+        among = float(np.sqrt(np.mean(np.concatenate(expected))))
     return Judged(trial, fit, rms, able=True, errors_g=every, expected_g=among)
 
 
