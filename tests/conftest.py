@@ -56,6 +56,7 @@ LONG = {
     "test_batch.py",
     "test_design.py",
     "test_diagnosis.py",
+    "test_diagnosis_blocks.py",
     "test_diagnosis_faults.py",
     "test_dynamic_calibrate.py",
     "test_dynamic_equations.py",

@@ -324,6 +324,18 @@ def fault_other_squares(bench: Bench, size: float) -> None:
         row["extra"] = row["extra"] + k * row["force"][[1, 2, 0]] ** 2
 
 
+def fault_gain_step(bench: Bench, size: float) -> None:
+    axis = bench.rng.integers(3)
+    for row in bench.rows:
+        if len(bench.temps) - 2 <= row["block"] < len(bench.temps):
+            row["extra"] = row["extra"] + np.eye(3)[axis] * size * row["force"][axis]
+
+
+def fault_one_gain(bench: Bench, size: float) -> None:
+    for row in bench.of_block(bench.rng.integers(len(bench.temps))):
+        row["extra"] = row["extra"] + size * row["force"]
+
+
 FAULTS: dict[str, Fault] = {
     name.removeprefix("fault_"): value
     for name, value in list(globals().items())
@@ -336,6 +348,8 @@ CAUSE_OF = {
     "unsigned": "block_temperature",
     "unit": "block_temperature",
     "blocks": "exchanged_blocks",
+    "gain_step": "block_gain",
+    "one_gain": "block_gain",
     "settling": "drift",
 }
 WITHOUT_SIZE = {
@@ -350,18 +364,6 @@ NEEDS_CHECKS = {
 
 
 # ---- what no cause of the list is
-
-
-def unlisted_gain_step(bench: Bench, size: float) -> None:
-    axis = bench.rng.integers(3)
-    for row in bench.rows:
-        if len(bench.temps) - 2 <= row["block"] < len(bench.temps):
-            row["extra"] = row["extra"] + np.eye(3)[axis] * size * row["force"][axis]
-
-
-def unlisted_one_gain(bench: Bench, size: float) -> None:
-    for row in bench.of_block(bench.rng.integers(len(bench.temps))):
-        row["extra"] = row["extra"] + size * row["force"]
 
 
 def unlisted_two(bench: Bench, size: float) -> None:

@@ -108,22 +108,27 @@ def test_a_cause_of_ones_own_competes() -> None:
 
     def undo(readings, amplitudes):
         own = (readings.block == 2)[:, None]
-        return readings.but(outputs=readings.outputs - own * readings.force * amplitudes[0])
+        mixed = readings.force[:, [1, 2, 0]] * amplitudes[0]
+        return readings.but(outputs=readings.outputs - own * mixed)
 
     def places(_known):
-        yield Hypothesis("third block", undo, (Parameter("gain", "%", 100.0),), change="its gain")
+        yield Hypothesis(
+            "third block", undo, (Parameter("mixed", "%", 100.0),), change="its crosstalk"
+        )
 
-    entry = Cause("block_gain", "gain of one block", "One block's gain.", places, "the block again")
+    entry = Cause(
+        "block_mixed", "one block mixed", "One block's crosstalk.", places, "the block again"
+    )
     unit, measurements, _ = simulated("none", 0.0, spoiled)
     third = sorted(measurements.dwells, key=lambda d: d.row)[12:18]
     rows = {d.row for d in third}
     dwells = tuple(
-        replace(d, voltage_v=d.voltage_v * 1.004) if d.row in rows else d
+        replace(d, voltage_v=d.voltage_v + 0.004 * d.voltage_v[[1, 2, 0]]) if d.row in rows else d
         for d in measurements.dwells
     )
     with CAUSES.added(entry):
         found = diagnose(unit, MeasurementSet("m.csv", dwells))
-    assert found.answer[0].cause == "block_gain"
+    assert found.answer[0].cause == "block_mixed"
     assert found.answer[0].amplitudes[0].value == pytest.approx(0.4, abs=0.05)
 
 

@@ -119,7 +119,10 @@ def test_a_unit_turned_over_throughout_is_seen_by_its_signs():
     turned = MeasurementSet(data.source, dwells)
     assert calibrate(unit(), turned).serial == "T-1"
     message = refusal(described("nominal_v_per_g = -0.55"), turned)
-    assert "polarity = [1, 1, 1] under [sensor]" in message
+    assert message.startswith("measurements.csv: Kxx and Kyy and Kzz have the wrong sign")
+    assert "expected those of [sensor] nominal_v_per_g = -0.55" in message
+    assert "set nominal_v_per_g = 0.55 under [sensor]" in message
+    assert "polarity =" not in message
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,8 @@ from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.adc import Adc
 
 TWELVE = Adc(12, 2.5, -(2**11), 2**11 - 1)
-CODE_MG = 1e3 * TWELVE.volts_per_code / 0.5485
+CODE_MG = 1e3 * TWELVE.volts_per_code / np.hypot(0.5485, 0.0147)
+"""K_zz and K_zx of the tables: the output's sensitivity along its own axis, however turned."""
 
 TOML = """format = 1
 serial = "COARSE"

@@ -42,10 +42,14 @@ def causes_of(
     """
     # Only readings that are refused or doubtful wait for it.
     from triaxcal.diagnosis import diagnose  # noqa: PLC0415
+    from triaxcal.diagnosis.ranking import TOGETHER  # noqa: PLC0415
 
-    if calibration is not None:
-        measurements = without_quadratic(measurements, calibration)
-    return diagnose(unit, measurements)
+    if calibration is None or calibration.terms.quadratic_per_g is None:
+        return diagnose(unit, measurements)
+    found = diagnose(unit, measurements)
+    # Squares that were fitted can be what a fault looks like: a converter at its end.
+    fault = bool(found.answer) and found.answer[0].spoils and found.answer[0].cause != TOGETHER
+    return found if fault else diagnose(unit, without_quadratic(measurements, calibration))
 
 
 def without_quadratic(measurements: MeasurementSet, calibration: Calibration) -> MeasurementSet:
@@ -69,8 +73,9 @@ def refuse_certain_fault(
 
     Curves through all temperatures follow a fault as well, and the outer temperatures are never
     held out. So the causes are ranked where readings are doubtful: an error, or the whole of a
-    held-out one, beyond half the limit, dwells that contradict others, or curves of as many
-    parameters as few sound sensors need.
+    held-out one, beyond half the limit, dwells that contradict others, curves of as many parameters
+    as few sound sensors need, or own-axis squares beyond the limit. Curves through all
+    temperatures, which nothing held out has tested, are doubted for wrong labels only.
 
     Raises
     ------
@@ -78,7 +83,9 @@ def refuse_certain_fault(
         When the odds of a fault that spoils constants are beyond `_CERTAIN`, and it is larger than
         the limit.
     """
-    if not _doubtful(unit, measurements, calibration):
+    doubtful = _doubtful(unit, measurements, calibration)
+    untested = 1 < len(calibration.points) <= calibration.shape.parameters
+    if not (doubtful or untested):
         return
     try:
         found = causes_of(unit, measurements, calibration)
@@ -87,10 +94,11 @@ def refuse_certain_fault(
     if not found.answer or found.answer[0].log_evidence < _CERTAIN:
         return
     best, limit = found.answer[0], unit.limits.over_range_g
-    # Amplitudes are in mg, or in mrad of a tilt, which moves a level output as many mg.
-    largest = max((abs(a.value) * 1e-3 for a in best.amplitudes), default=np.inf)
+    largest = max((a.moves_g for a in best.amplitudes), default=np.inf)
     if not best.spoils or largest <= limit:
         return
+    if best.amplitudes and not doubtful:
+        return  # an amount is what strongly bent curves look like as well
     refusal = RefusedError(
         measurements.source,
         "residuals and held-out errors are within the limits nevertheless",
@@ -112,11 +120,13 @@ def _doubtful(
     test = calibration.held_out
     held_out = 0.0 if test is None or test.worst is None else abs(test.worst.error_g)
     groups = group_dwells(measurements, unit.t0_degc)
+    Q = calibration.terms.quadratic_per_g
     return bool(
         (errors > DOUBT * limits).any()
         or held_out > DOUBT * unit.limits.over_range_g
         or contradiction(unit, straight(groups, calibration.terms, unit.gravity_g))
         or calibration.shape.parameters > _USUAL_PARAMETERS
+        or (Q is not None and np.abs(Q).max() > unit.limits.over_range_g)
     )
 
 

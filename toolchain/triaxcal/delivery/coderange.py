@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.model.metrological import sensitivities
 from triaxcal.unit.description import UnitDescription
 
 _HALVINGS = 6
@@ -48,7 +47,7 @@ def settled_codes(
             continue
         if not halvings:
             return unit, calibration
-        scale = float(np.abs(calibration.thermal.constants_at(unit.t0_degc)[[0, 4, 8]]).max())
+        scale = float(sensitivities(calibration.thermal.constants_at(unit.t0_degc)).max())
         note = (
             f"the C flags raw codes beyond +-{largest} ({own.adc.largest_v / scale:.3g} g): with "
             f"own-axis squares of {squares.effect_g * 1e3:.3g} mg/g^2 its integers reach no "

@@ -45,12 +45,15 @@ class Amplitude:
     name, unit : str
     value, sd : float
         In `unit`.
+    moves_g : float
+        How far it moves outputs, g.
     """
 
     name: str
     unit: str
     value: float
     sd: float
+    moves_g: float
 
     def __str__(self) -> str:
         return f"{self.name} {self.value:+.3g} +- {self.sd:.2g} {self.unit}"
@@ -249,7 +252,7 @@ def _shown(suspects: list[Suspect]) -> tuple[Suspect, ...]:
 def _suspect(ranked: Ranked, judged: Judged, readings: Readings, base: float) -> Suspect:
     hypothesis = judged.hypothesis
     amplitudes = tuple(
-        Amplitude(p.name, p.unit, float(v) * p.per_unit, float(sd) * p.per_unit)
+        Amplitude(p.name, p.unit, float(v) * p.per_unit, float(sd) * p.per_unit, abs(v) * p.moves_g)
         for p, v, sd in zip(hypothesis.parameters, judged.amplitudes, judged.sd, strict=True)
     )
     # Constants of the unit without the mistake say best what it shows in a check position.

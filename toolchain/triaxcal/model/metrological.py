@@ -31,6 +31,16 @@ def unpack_constants(constants: FloatArray) -> tuple[FloatArray, FloatArray]:
     return K, constants[..., 9:]
 
 
+def sensitivities(constants: FloatArray) -> FloatArray:
+    """Lengths of the rows of K, shape (..., 3): of each output along its own axis, however turned.
+
+    Parameters
+    ----------
+    constants : array, shape (..., 12)
+    """
+    return np.asarray(np.linalg.norm(unpack_constants(constants)[0], axis=-1))
+
+
 def voltage_from_force(constants: FloatArray, force_g: FloatArray) -> FloatArray:
     """U = K a + U0 in V, P1 (9); constants (..., 12), force (..., 3) in g."""
     K, U0 = unpack_constants(constants)

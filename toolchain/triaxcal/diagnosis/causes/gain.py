@@ -10,7 +10,7 @@ from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, unchanged
 from triaxcal.model.positions import AXES
 
 _FACTORS = (0.25, 0.5, 2.0, 4.0, 1e-3, 1e3)
-_LARGEST = 13.0
+_LARGEST = 20.0
 """Log odds that one output's sensitivity can give: a data sheet may be of another type."""
 
 
@@ -18,9 +18,10 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     nominal = known.sensitivity_v_per_g
     if nominal is None:
         return
-    off = np.log(np.abs(known.readings.volts_per_g / nominal)) / known.tolerance
+    sd = known.tolerance / 2.0  # the tolerance is a bound
+    off = np.log(np.abs(known.readings.volts_per_g / nominal)) / sd
     for factor in _FACTORS:
-        shifted = off - np.log(factor) / known.tolerance
+        shifted = off - np.log(factor) / sd
         for outputs in ((0, 1, 2), (0,), (1,), (2,)):
             some = list(outputs)
             each = 0.5 * (off[some] ** 2 - shifted[some] ** 2)

@@ -1,4 +1,4 @@
-"""The unit sat half a turn round, at one temperature or at all."""
+"""The unit sat half a turn round, at some temperatures or at all."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from triaxcal.diagnosis.core.blocks import apart, at_temperatures, in_blocks, sets_of, unlike
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo, falling
 from triaxcal.diagnosis.core.readings import FORCES, POSITIONS, Readings
 from triaxcal.model.positions import AXES
-from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.model.types import FloatArray
 
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     readings = known.readings
-    blocks = [b for b in readings.blocks if readings.test[readings.of_block(b)].any()]
+    count = len({int(b) for b in readings.block[readings.test]})
     for axis in range(3):
         pairs = _exchanged(axis)
-        if len(blocks) > 1:
+        if count > 1:
             yield Hypothesis(
                 f"about {AXES[axis]}",
                 _turned(axis, None),
@@ -32,15 +33,18 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
                 places=6.0,
                 log_prior=-2.0,
             )
-        for block in blocks:
-            degc = readings.block_degc(block)
-            yield Hypothesis(
-                f"about {AXES[axis]} at {degc:.4g} degC",
-                _turned(axis, block),
-                rows=readings.rows[readings.of_block(block)],
-                change=f"it exchanges {pairs} there",
-                places=6.0 * len(blocks),
-            )
+    for axis, blocks in unlike(readings, range(3), lambda u: u[_ORDERS]):
+        if 1 < count == len(blocks):
+            continue
+        where = at_temperatures(readings, blocks)
+        yield Hypothesis(
+            f"about {AXES[axis]} {where}",
+            _turned(axis, blocks),
+            rows=readings.rows[in_blocks(readings, blocks)],
+            change=f"it exchanges {_exchanged(axis)} there",
+            places=6.0 * sets_of(count),
+            log_prior=apart(readings, blocks),
+        )
 
 
 def _signs(axis: int) -> FloatArray:
@@ -57,13 +61,17 @@ def _exchanged(axis: int) -> str:
     return " and ".join(sorted(names))
 
 
-def _turned(axis: int, block: int | None) -> Undo:
+_ORDERS = np.array(
+    [[int((FORCES @ f).argmax()) for f in FORCES * _signs(axis)] for axis in range(3)]
+)
+"""Of each half turn and position, the position as which the unit was seated."""
+
+
+def _turned(axis: int, blocks: tuple[int, ...] | None) -> Undo:
     signs = _signs(axis)
 
     def undo(readings: Readings, _amplitudes: FloatArray) -> Readings:
-        own: BoolArray = np.ones(len(readings), dtype=np.bool_)
-        if block is not None:
-            own = readings.of_block(block)
+        own = readings.test if blocks is None else in_blocks(readings, blocks)
         force = np.where((own & readings.test)[:, None], readings.force * signs, readings.force)
         return readings.but(force=force)
 

@@ -7,29 +7,33 @@ from collections.abc import Iterator
 import numpy as np
 
 from triaxcal.diagnosis.causes.mounting import LOG_VOLUME, turned
-from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known
+from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, falling
 from triaxcal.diagnosis.core.turns import nearest_rotation, sensitivity
 from triaxcal.model.positions import AXES
 
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
-    turn = nearest_rotation(sensitivity(known.readings))
-    if turn is None or np.linalg.det(turn) > 0.0:
-        return
-    largest = np.abs(turn).argmax(axis=1)
-    if (largest == np.arange(3)).all():
-        return  # an inverted output: polarity
-    names = ", ".join(
-        f"{AXES[i]} answers to {'-' if turn[i, largest[i]] < 0 else ''}{AXES[largest[i]]}"
-        for i in range(3)
-        if largest[i] != i
-    )
-    yield Hypothesis(
-        f"output {names}",
-        turned(turn),
-        change="with these columns exchanged",
-        log_prior=LOG_VOLUME / 2.0,
-    )
+    K = sensitivity(known.readings)
+    # Without a stated polarity two exchanged columns of a falling sensor look like half a turn.
+    for sign in (1.0,) if known.readings.polarity else (1.0, -1.0):
+        turn = nearest_rotation(sign * K)
+        if turn is None or np.linalg.det(turn) > 0.0:
+            continue
+        largest = np.abs(turn).argmax(axis=1)
+        if (largest == np.arange(3)).all():
+            continue  # an inverted output: polarity
+        names = ", ".join(
+            f"{AXES[i]} answers to {'-' if turn[i, largest[i]] < 0 else ''}{AXES[largest[i]]}"
+            for i in range(3)
+            if largest[i] != i
+        )
+        undo = turned(turn)
+        yield Hypothesis(
+            f"output {names}" + ", all sensitivities being negative" * (sign < 0.0),
+            undo if sign > 0.0 else falling(undo),
+            change="with these columns exchanged",
+            log_prior=LOG_VOLUME / 2.0,
+        )
 
 
 ENTRY = Cause(

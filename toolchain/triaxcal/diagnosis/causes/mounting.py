@@ -20,16 +20,22 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     turn = nearest_rotation(sensitivity(known.readings))
     if turn is None or np.linalg.det(turn) < 0.0:
         return
-    degrees, axis = angle_and_axis(turn)
+    degrees, _ = angle_and_axis(turn)
     if degrees < LEAST_DEG or np.abs(np.diag(turn)).min() > np.cos(np.radians(LEAST_DEG)):
         return  # nearly none, or half a turn about an axis
-    words = ", ".join(f"{v:+.2f}" for v in axis)
     yield Hypothesis(
-        f"{degrees:.3g} deg about ({words})",
+        turned_by(turn),
         turned(turn),
         change="with the axes turned",
         log_prior=LOG_VOLUME,
     )
+
+
+def turned_by(turn: FloatArray) -> str:
+    """Angle and axis of a rotation in words."""
+    degrees, axis = angle_and_axis(turn)
+    words = ", ".join(f"{v:+.2f}" for v in axis)
+    return f"{degrees:.3g} deg about ({words})"
 
 
 def turned(turn: FloatArray) -> Undo:

@@ -21,6 +21,9 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
         plural = "s" if len(outputs) > 1 else ""
         signs = np.sign(known.readings.volts_per_g) * _signs(outputs)
         key = f"polarity = [{', '.join(f'{s:.0f}' for s in signs)}]"
+        if known.sensitivity_v_per_g is not None:
+            nominal = np.abs(known.sensitivity_v_per_g) * signs
+            key = f"nominal_v_per_g = [{', '.join(f'{v:g}' for v in nominal)}]"
         yield Hypothesis(
             f"output{plural} {names} ({key} under [sensor])",
             _inverted(outputs),

@@ -30,11 +30,14 @@ class Parameter:
     name, unit : str
     per_unit : float
         `unit` per g or rad of the amplitude.
+    moves_g : float
+        How far outputs are moved by an amplitude of 1, g.
     """
 
     name: str
     unit: str = "mg"
     per_unit: float = 1e3
+    moves_g: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,8 @@ class Hypothesis:
         Outputs that the cause itself explains, with `log_density` (ln g^-1).
     spoils : bool
         As that of `Cause`, of this place of it.
+    without_checks : bool
+        Whether the check dwells say nothing, because a sensitivity is unknown.
     """
 
     place: str
@@ -80,13 +85,13 @@ class Hypothesis:
     unused: BoolArray | None = None
     log_density: float = 0.0
     spoils: bool = False
+    without_checks: bool = False
 
     @property
     def blind(self) -> bool:
-        """Whether an output is lost, so that |a| in check positions is unknown."""
-        return self.unused is not None and bool(
-            (self.unused.sum(axis=0) > len(self.unused) / 3).any()
-        )
+        """Whether an output or its sensitivity is lost: |a| in check positions is unknown then."""
+        lost = self.unused is not None and (self.unused.sum(axis=0) > len(self.unused) / 3).any()
+        return self.without_checks or bool(lost)
 
     def columns(self, readings: Readings, theta: FloatArray, about: FloatArray) -> FloatArray:
         """Effect of each amplitude on the rows, about some amplitudes, shape (n, k)."""

@@ -72,6 +72,7 @@ class Pair:
             unused=either(first.unused, second.unused),
             log_density=first.log_density + second.log_density,
             spoils=any(c.spoils for c in self.causes),
+            without_checks=first.without_checks or second.without_checks,
         )
 
     def _undo(self, readings: Readings, amplitudes: FloatArray) -> Readings:

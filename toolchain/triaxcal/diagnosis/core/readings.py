@@ -92,11 +92,14 @@ class Readings:
     def rising(self) -> FloatArray:
         """+1 for dwells of a block reached by heating, -1 by cooling, shape (n,).
 
-        The first block has the direction in which the second one follows.
+        The first block has the direction in which the second one follows, and so has a block that
+        is measured at the temperature of the one before.
         """
         means = np.array([self.block_degc(b) for b in self.blocks])
-        steps = np.sign(np.diff(means))
-        signs = np.concatenate([steps[:1], steps]) if len(means) > 1 else np.ones(1)
+        steps = np.diff(means)
+        signs = np.concatenate([[0.0], np.where(np.abs(steps) > GROUP_GAP_DEGC, np.sign(steps), 0)])
+        for k in reversed(range(len(signs) - 1)):
+            signs[k] = signs[k] or signs[k + 1]
         signs[signs == 0] = 1.0
         return np.asarray(signs[np.searchsorted(self.blocks, self.block)])
 
@@ -145,15 +148,16 @@ def _direction(dwell: Dwell) -> FloatArray:
 def _volts_per_g(unit: UnitDescription, volts: FloatArray, force: FloatArray) -> FloatArray:
     """Sensitivity of each output along its own axis, shape (3,); of the strongest if it is dead.
 
-    The signs are those of the description; without one +, or - where all three outputs show it.
+    The signs are those of the description; without one +, or - where all that answer show it.
     """
     each = np.array([[_half_span(volts[:, i], force[:, j]) for j in range(3)] for i in range(3)])
     own, size = np.diag(each), np.linalg.norm(each, axis=1)
     strongest = max(float(size.max()), float(np.abs(volts).max()) / 10.0, 1e-12)
-    size = np.where(size > 0.2 * strongest, size, strongest)
+    alive = size > 0.2 * strongest
+    size = np.where(alive, size, strongest)
     if unit.polarity is not None:
         return np.asarray(size * np.array(unit.polarity), dtype=np.float64)
-    return np.asarray(-size if (own < 0).all() else size)
+    return np.asarray(-size if (own[alive] < 0).all() else size)
 
 
 def _half_span(volts: FloatArray, force: FloatArray) -> float:

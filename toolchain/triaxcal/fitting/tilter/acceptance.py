@@ -29,6 +29,7 @@ from triaxcal.fitting.tilter.runs import contradictory_runs
 from triaxcal.fitting.tilter.squares import straight
 from triaxcal.model.metrological import (
     force_from_voltage,
+    sensitivities,
     unpack_constants,
     voltage_from_force,
 )
@@ -211,7 +212,7 @@ def _largest_disagreement(
 def _residual_g(dwell: Dwell, constants: FloatArray, gravity_g: float) -> FloatArray:
     """Output less the model at one temperature, by the output's own scale factor, (3,), g."""
     model = voltage_from_force(constants, specific_force_g(dwell.position, gravity_g))
-    return (dwell.voltage_v - model) / np.abs(constants[[0, 4, 8]])
+    return (dwell.voltage_v - model) / sensitivities(constants)
 
 
 def _contradiction(

@@ -84,7 +84,7 @@ def calibrate(
     groups = group_dwells(measurements, unit.t0_degc)
     refuse_silent_outputs(measurements)
     refuse_mistaken_units(measurements)
-    refuse_exchanged_positions(measurements.source, groups, unit.polarity)
+    refuse_exchanged_positions(measurements.source, groups, unit.polarity, unit.nominal_v_per_g)
     _refuse_singular(measurements.source, groups, unit.gravity_g)
     refuse_other_sensitivity(unit, measurements.source, groups)
     squares = own_squares(unit, groups)

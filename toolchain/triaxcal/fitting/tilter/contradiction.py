@@ -27,7 +27,7 @@ def contradiction(unit: UnitDescription, groups: tuple[TemperatureGroup, ...]) -
     for group in groups:
         voltage = np.array([d.voltage_v for d in group.dwells])
         solution = np.linalg.lstsq(design, voltage, rcond=None)[0]
-        residual.append((voltage - design @ solution) / np.abs(np.diag(solution[:3])))
+        residual.append((voltage - design @ solution) / np.linalg.norm(solution[:3], axis=0))
     own = np.concatenate(residual)
     found = worst_outlier(own, _LEFT_OUT * own, 12 * len(groups))
     if found is None:

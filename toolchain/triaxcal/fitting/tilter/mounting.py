@@ -17,13 +17,20 @@ from triaxcal.model.types import FloatArray
 
 _WORTH_SAYING_DEG = 5.0
 """Sensors on a board are within one or two degrees of it."""
+_ANSWERS = 0.1
 _ALONG = math.cos(math.radians(5.0))
 
 
 def turned_notes(constants: FloatArray) -> tuple[str, ...]:
     """The angle of a turned sensor, for constants (12,) at T0; nothing for a straight one."""
     K, _ = unpack_constants(constants)
-    rows = K / (np.linalg.norm(K, axis=1) * np.where(np.diag(K) < 0.0, -1.0, 1.0))[:, None]
+    length = np.linalg.norm(K, axis=1)
+    own = np.diag(K) / length
+    # The sign of an output that does not answer along its own axis is unknown; it is then that of
+    # the others, or +.
+    sign = -1.0 if own.sum() < -_ANSWERS else 1.0
+    signs = np.where(np.abs(own) > _ANSWERS, np.sign(own), sign)
+    rows = K / (length * signs)[:, None]
     left, _, right = np.linalg.svd(rows)
     mounting = left @ right
     cosine = (float(np.trace(mounting)) - 1.0) / 2.0

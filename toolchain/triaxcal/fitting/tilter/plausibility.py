@@ -46,6 +46,7 @@ def refuse_exchanged_positions(
     source: str,
     groups: tuple[TemperatureGroup, ...],
     polarity: tuple[int, int, int] | None,
+    nominal_v_per_g: tuple[float, float, float] | None = None,
 ) -> None:
     """Refuse groups in which two positions look exchanged, and name the two.
 
@@ -53,6 +54,8 @@ def refuse_exchanged_positions(
     ----------
     polarity : tuple of three signs, or None
         Signs of Kxx, Kyy, Kzz; None means that all three are alike.
+    nominal_v_per_g : tuple of three floats, or None
+        Where the signs come from it, it is the key that is named.
 
     Raises
     ------
@@ -68,7 +71,7 @@ def refuse_exchanged_positions(
     first = next(pairs for pairs in found if pairs)
     spoiled = [g for g, pairs in zip(groups, found, strict=True) if pairs == first]
     if all(pairs == first for pairs in found) and all(p in _AXIS_PAIRS for p in first):
-        _refuse_signs(source, groups, polarity)
+        _refuse_signs(source, groups, polarity, nominal_v_per_g)
     row_of = [(spoiled[0].dwells[a].row, spoiled[0].dwells[b].row) for a, b in first]
     rows = "; ".join(f"rows {min(r)} and {max(r)}" for r in row_of)
     remedy = f"exchange {'the positions of these rows' if len(first) == 1 else 'them back'}"
@@ -88,6 +91,7 @@ def _refuse_signs(
     source: str,
     groups: tuple[TemperatureGroup, ...],
     polarity: tuple[int, int, int] | None,
+    nominal_v_per_g: tuple[float, float, float] | None,
 ) -> None:
     """Signs that differ at every temperature: positions, a turn of the unit, or its polarity.
 
@@ -105,27 +109,42 @@ def _refuse_signs(
     expected, exchanged = "signs of Kxx, Kyy, Kzz all alike", [pair]
     ways = f"{swap} or {turn}"
     if polarity is not None:
-        expected = f"those of [sensor] polarity = {list(polarity)}"
+        expected = f"those of [sensor] {_key(polarity, nominal_v_per_g)}"
         exchanged = [p for p, axis in _AXIS_PAIRS.items() if axis in wrong]
         ways = {1: swap, 2: turn, 3: "all positions turned over"}[len(wrong)]
     names = " and ".join(f"K{AXES[i]}{AXES[i]}" for i in wrong)
+    place = source if len(wrong) == 3 else f"{source}, {_rows(groups, exchanged)}"
+    signs = shown[0], shown[1], shown[2]
+    raise ContradictionError(
+        place,
+        f"{names} {'has' if len(wrong) == 1 else 'have'} the wrong sign at every temperature: "
+        f"Kxx, Kyy, Kzz are {_diagonal(groups[0], ())} V/g; the readings cannot tell {ways} from "
+        "polarity",
+        expected=expected,
+        remedy="see how the unit was seated and correct the positions; only if it has this "
+        f"polarity, set {_key(signs, nominal_v_per_g)} under [sensor] in unit.toml",
+    )
+
+
+def _key(
+    signs: tuple[float, float, float], nominal_v_per_g: tuple[float, float, float] | None
+) -> str:
+    """The key that states signs, as it is to be written."""
+    if nominal_v_per_g is None:
+        return f"polarity = {[int(s) for s in signs]}"
+    nominal = [f"{s * abs(v):g}" for s, v in zip(signs, nominal_v_per_g, strict=True)]
+    alike = len(set(nominal)) == 1
+    return f"nominal_v_per_g = {nominal[0] if alike else '[' + ', '.join(nominal) + ']'}"
+
+
+def _rows(groups: tuple[TemperatureGroup, ...], exchanged: list[Exchange]) -> str:
     first = groups[0]
     rows = "; ".join(
         f"rows {min(r)} and {max(r)}"
         for r in [(first.dwells[a].row, first.dwells[b].row) for a, b in exchanged]
     )
     rows += f" ({first.temp_degc:.6g} degC)"
-    if len(groups) > 1:
-        rows += ", and those of the other temperatures"
-    raise ContradictionError(
-        f"{source}, {rows}",
-        f"{names} {'has' if len(wrong) == 1 else 'have'} the wrong sign at every temperature: "
-        f"Kxx, Kyy, Kzz are {_diagonal(groups[0], ())} V/g; the readings cannot tell {ways} from "
-        "polarity",
-        expected=expected,
-        remedy="see how the unit was seated and correct the positions; only if it has this "
-        f"polarity, set polarity = {[int(s) for s in shown]} under [sensor] in unit.toml",
-    )
+    return f"{rows}, and those of the other temperatures" if len(groups) > 1 else rows
 
 
 def _follow(group: TemperatureGroup) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.model.metrological import sensitivities
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.description import UnitDescription
 
@@ -41,7 +42,8 @@ class Coarse:
 
 def coarse(unit: UnitDescription, calibration: Calibration) -> Coarse | None:
     """The smaller limit, where it is below half a code of the least sensitive output."""
-    scale = np.abs(calibration.thermal.constants_at(calibration.thermal.t0_degc)[[0, 4, 8]]).min()
+    at_t0 = calibration.thermal.constants_at(calibration.thermal.t0_degc)
+    scale = sensitivities(at_t0).min()
     code_g = unit.adc.volts_per_code / float(scale)
     limits = unit.limits
     limit_g, key = min(

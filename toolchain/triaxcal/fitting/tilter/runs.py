@@ -18,7 +18,7 @@ from triaxcal.fitting.core.grouping import TemperatureGroup
 from triaxcal.fitting.core.judged import RunRepeatability
 from triaxcal.fitting.tilter.estimators import constants_of, estimator_operators
 from triaxcal.model.curves import ThermalModel
-from triaxcal.model.metrological import unpack_constants, voltage_from_force
+from triaxcal.model.metrological import sensitivities, unpack_constants, voltage_from_force
 from triaxcal.model.positions import AXES, specific_force_g
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell
@@ -111,7 +111,7 @@ def _limit(unit: UnitDescription, group: TemperatureGroup) -> tuple[float, str]:
 
 
 def _farthest(unit: UnitDescription, thermal: ThermalModel, group: TemperatureGroup) -> _Apart:
-    scale = np.abs(thermal.constants_at(group.temp_degc)[[0, 4, 8]])
+    scale = sensitivities(thermal.constants_at(group.temp_degc))
     readings = _brought(unit, thermal, group) / scale
     low, high = readings.argmin(axis=0), readings.argmax(axis=0)
     spread = readings.max(axis=0) - readings.min(axis=0)
