@@ -107,6 +107,7 @@ def row(fault: str, units: list[dict[str, Any]]) -> str:
     n = len(units)
     others = ", ".join(f"{k} {v}" for k, v in firsts.most_common() if k not in true)
     if fault == "none":
+        wrong = alarms
         right, named, others = n - alarms, n - alarms, f"{alarms} with odds above 20; {others}"
     share = [f"{100 * value / n:.0f} %" for value in (right, named, wrong)]
     return f"| `{fault}` | {n} | {' | '.join(share)} | {others} |"

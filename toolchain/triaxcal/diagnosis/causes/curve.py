@@ -10,6 +10,8 @@ from triaxcal.diagnosis.core.readings import Readings
 from triaxcal.model.types import FloatArray
 
 _LENGTHS_DEGC = 8.0, 16.0
+_SYMPTOM = -4.0
+"""Log probability against a cause that says why: a sound sensor may bend, too."""
 
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
@@ -24,6 +26,7 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
             tuple(Parameter("bend") for _ in range(3 * features.count)),
             change="with a curve through every temperature",
             places=float(len(_LENGTHS_DEGC)),
+            log_prior=_SYMPTOM,
             sizes=(0.6e-3, 2e-3, 6e-3, 20e-3),
         )
 
