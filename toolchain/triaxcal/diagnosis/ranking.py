@@ -45,6 +45,8 @@ TOGETHER = "together"
 """The cause that stands for two at once."""
 Nominal = tuple[FloatArray | None, float]
 """Nominal sensitivities in V/g, shape (3,), and their relative tolerance."""
+_FEW_PLACES = 3
+"""Places that are all judged: of large mistakes the quick evidence may take the wrong one."""
 _BEHIND = 10.0
 """Log evidence by which a second place may be behind the first, to be judged with care."""
 
@@ -109,6 +111,7 @@ def _together(found: list[Ranked], sound: Sound, nominal: Nominal) -> list[Ranke
     if best.best.log_evidence < sound.fit.log_evidence or _explains_everything(best.best):
         return []
     pairs: dict[str, Judged] = {}
+    alone: list[Ranked] = []
     for ranked in found[:_FIRSTS]:
         if ranked.cause.name in _LOOSE:
             continue
@@ -120,13 +123,17 @@ def _together(found: list[Ranked], sound: Sound, nominal: Nominal) -> list[Ranke
         seen = readings.but(force=np.where(readings.test[:, None], readings.force, force))
         for pair in _pairs(ranked, seen, nominal):
             judged = judge(pair.hypothesis(), seen, first.scales, first.fit.theta)
+            if pair.superfluous(judged):
+                # The second explains alone what the first, at another place, was taken for.
+                second = judge(pair.second, readings, judged.scales, judged.fit.theta)
+                alone.append(Ranked(pair.causes[1], (second,)))
             before = pairs.setdefault(pair.key, judged)
             if judged.log_evidence > before.log_evidence:
                 pairs[pair.key] = judged
         if all(j.log_evidence < best.best.log_evidence for j in pairs.values()):
             return []
     places = sorted(pairs.values(), key=lambda j: -j.log_evidence)
-    return [Ranked(CAUSES[TOGETHER], tuple(places))]
+    return [*alone, Ranked(CAUSES[TOGETHER], tuple(places))] if places else alone
 
 
 def _explains_everything(judged: Judged) -> bool:
@@ -193,5 +200,6 @@ def _careful(
     distinct = {s.hypothesis.place: s for s in reversed(screened)}
     places = [s for s in screened if distinct[s.hypothesis.place] is s]
     near = [s for s in places[:2] if s.log_evidence > best - _BEHIND]
+    near = places if len(places) <= _FEW_PLACES else near
     judged = [judge(s.hypothesis, readings, s.scales, theta) for s in near]
     return Ranked(cause, tuple(sorted(judged, key=lambda j: -j.log_evidence)))

@@ -11,6 +11,9 @@ from triaxcal.diagnosis.core.evidence import FAULT_LOG_ODDS, Judged
 from triaxcal.diagnosis.core.readings import Readings
 from triaxcal.model.types import FloatArray
 
+_SIGNIFICANT = 3.0
+"""Standard deviations from which an amplitude is one."""
+
 
 @dataclass(frozen=True)
 class Pair:
@@ -45,6 +48,12 @@ class Pair:
         one, other = self._names
         lost = self.first.hypothesis.unused, self.second.unused
         return one != other and any(unused is None for unused in lost)
+
+    def superfluous(self, judged: Judged) -> bool:
+        """Whether the first has no effect beside the second, `judged` being both."""
+        count = len(self.first.hypothesis.parameters)
+        own = np.abs(judged.amplitudes[:count]) < _SIGNIFICANT * judged.sd[:count]
+        return count > 0 and bool(own.all())
 
     @property
     def key(self) -> str:
