@@ -194,14 +194,18 @@ def test_three_temperatures_with_a_lost_sign_are_refused(tmp_path: Path) -> None
         refuse_beyond_limits(done)
 
 
-def test_a_sensor_turned_by_90_deg_is_said_and_not_taken_for_a_coarse_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("degrees", [45, 90])
+@pytest.mark.parametrize("temps", [TEMPS, (-40.0, 20.0, 65.0)])
+def test_a_turned_sensor_is_said_and_not_taken_for_a_coarse_one(
+    tmp_path: Path, degrees: int, temps: tuple[float, ...]
+) -> None:
     def turned(bench: Bench) -> None:
         for row in bench.rows:
-            row["force"] = rotation(np.array([np.pi / 2, 0.0, 0.0])) @ row["force"]
+            row["force"] = rotation(np.array([np.radians(degrees), 0.0, 0.0])) @ row["force"]
 
-    description, measurements = made(11, turned, checks=False)
+    description, measurements = made(11, turned, checks=False, temps=temps)
     folder = described(tmp_path, description, measurements)
     done = fit_folder(read_unit(folder), folder)
     refuse_beyond_limits(done)
     (note,) = done.calibration.notes
-    assert "turned by 90" in note
+    assert f"turned by {degrees}" in note or f"turned by {degrees - 1}" in note

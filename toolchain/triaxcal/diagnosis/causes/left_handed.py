@@ -11,6 +11,9 @@ from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, falling
 from triaxcal.diagnosis.core.turns import nearest_rotation, sensitivity
 from triaxcal.model.positions import AXES
 
+_PLAIN = 0.95
+"""Least direction cosine of outputs that are exchanged and not turned."""
+
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     K = sensitivity(known.readings)
@@ -22,6 +25,8 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
         largest = np.abs(turn).argmax(axis=1)
         if (largest == np.arange(3)).all():
             continue  # an inverted output: polarity
+        if sign < 0.0 and turn[np.arange(3), largest].min() < _PLAIN:
+            continue  # a turned sensor
         names = ", ".join(
             f"{AXES[i]} answers to {'-' if turn[i, largest[i]] < 0 else ''}{AXES[largest[i]]}"
             for i in range(3)
