@@ -36,6 +36,7 @@ LONG = {
     "family/test_over_temperature.py",
     "family/test_pair_in_a_unit.py",
     "family/test_pair_on_a_tilter.py",
+    "family/test_pose_causes.py",
     "family/test_poses.py",
     "family/test_priors_measured.py",
     "family/test_rate_term.py",

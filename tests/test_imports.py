@@ -18,7 +18,7 @@ MAY_IMPORT = {
     "readings": {"base", "model", "unit"},
     "poses": {"base", "model", "unit", "readings"},
     "fitting": {"base", "model", "unit", "readings", "poses"},
-    "diagnosis": {"base", "model", "unit", "readings", "fitting"},
+    "diagnosis": {"base", "model", "unit", "readings", "poses", "fitting"},
     "dynamic": {"base", "model", "unit", "readings", "poses"},
     "fixedpoint": {"base", "model", "unit"},
     "codegen": {"base", "model", "unit", "readings", "fixedpoint"},

@@ -16,6 +16,8 @@ import click
 
 from triaxcal.cli.main import SECTIONS, main
 from triaxcal.diagnosis.causes.registry import CAUSES
+from triaxcal.diagnosis.core.cause import Cause
+from triaxcal.diagnosis.poses.causes.registry import POSE_CAUSES
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.reference import reference_markdown
@@ -92,8 +94,8 @@ def _named(entries: Iterable[object]) -> str:
     return _table(("name", "in reports", "what it is"), rows)
 
 
-def _causes() -> str:
-    rows = ((e.label, e.doc, e.apart) for e in CAUSES)
+def _causes(registry: Iterable[Cause]) -> str:
+    rows = ((e.label, e.doc, e.apart) for e in registry)
     return _table(("cause", "what it is", "what would tell it from what looks the same"), rows)
 
 
@@ -105,7 +107,8 @@ TABLES: dict[str, Callable[..., str]] = {
     "functions": lambda: _named(THERMAL_FUNCTIONS),
     "sources": _sources,
     "commands": _commands,
-    "causes": _causes,
+    "causes": lambda: _causes(CAUSES),
+    "pose-causes": lambda: _causes(POSE_CAUSES),
 }
 
 

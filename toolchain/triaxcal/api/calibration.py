@@ -18,6 +18,7 @@ from triaxcal.base.publish import renew
 from triaxcal.delivery.causes import causes_of
 from triaxcal.delivery.fitted import Fitted, fit_columns, fit_folder
 from triaxcal.delivery.judgement import judge
+from triaxcal.delivery.posecauses import causes_of_poses
 from triaxcal.delivery.saved import Saved, calibration_json, read_saved
 from triaxcal.delivery.verdict import Verdict
 from triaxcal.fitting.core.calibration import Candidate
@@ -56,11 +57,11 @@ class Diagnosis:
     def causes(self) -> Causes | None:
         """Physical causes that could explain the readings, ranked as `diagnose` does.
 
-        Quadratic terms of the calibration are no fault. None for a recording.
+        Quadratic terms of the calibration are no fault. None where the angles of poses are known.
         """
         done = self._fitted
-        if done.unit.recording is not None:
-            return None
+        if done.calibration.recording is not None:
+            return causes_of_poses(done.unit, done.calibration)
         return causes_of(done.unit, done.measurements, done.calibration)
 
     def __str__(self) -> str:

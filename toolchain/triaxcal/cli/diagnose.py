@@ -14,9 +14,9 @@ from triaxcal.cli.options import UnitFolder, command, example, say
 def diagnose(unit: Path) -> None:
     """Rank the causes that could explain a unit's readings.
 
-    UNIT is a unit on a tilter. Wrong dwells, misplaced or exchanged positions, hysteresis, mistaken
-    temperatures and others compete; `ln odds` is the logarithm of the odds of each against a sound
-    unit.
+    UNIT is a unit on a tilter, or one with a recording of poses. Wrong dwells or poses, misplaced
+    or exchanged positions, hysteresis, drift, mistaken temperatures, a dead output and others
+    compete; `ln odds` is the logarithm of the odds of each against a sound unit.
     """
     import triaxcal  # noqa: PLC0415
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 DOUBT = 0.5
 """Of a limit: beyond it readings that pass are doubtful, and their causes are ranked."""
-_CERTAIN = 20.0
+CERTAIN = 20.0
 """Ln of the odds of a fault against a sound unit; those of sound units are below 0 in 99 of 100."""
 _USUAL_PARAMETERS = 4
 """Of a curve: a cubic follows the sensors that are known."""
@@ -80,7 +80,7 @@ def refuse_certain_fault(
     Raises
     ------
     RefusedError
-        When the odds of a fault that spoils constants are beyond `_CERTAIN`, and it is larger than
+        When the odds of a fault that spoils constants are beyond `CERTAIN`, and it is larger than
         the limit.
     """
     doubtful = _doubtful(unit, measurements, calibration)
@@ -91,7 +91,7 @@ def refuse_certain_fault(
         found = causes_of(unit, measurements, calibration)
     except (RefusedError, np.linalg.LinAlgError):
         return
-    if not found.answer or found.answer[0].log_evidence < _CERTAIN:
+    if not found.answer or found.answer[0].log_evidence < CERTAIN:
         return
     best, limit = found.answer[0], unit.limits.over_range_g
     largest = max((a.moves_g for a in best.amplitudes), default=np.inf)

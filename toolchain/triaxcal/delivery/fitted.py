@@ -17,6 +17,7 @@ from triaxcal.base.tomltable import content_of, text_of
 from triaxcal.delivery.causes import refuse_certain_fault, with_cause
 from triaxcal.delivery.coderange import settled_codes
 from triaxcal.delivery.inputs import inputs_sha256
+from triaxcal.delivery.posecauses import refuse_certain_fault_of_poses, with_pose_cause
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import PairTerms
 from triaxcal.fitting.recorded.acceptance import refuse_poses_beyond_limits
@@ -164,4 +165,9 @@ def refuse_beyond_limits(fitted: Fitted) -> None:
         if fitted.unit.recording is None:  # faces that a hand has set are judged by their limits
             refuse_certain_fault(*parts)
         return
-    refuse_poses_beyond_limits(fitted.unit, fitted.calibration)
+    unit, calibration = fitted.unit, fitted.calibration
+    try:
+        refuse_poses_beyond_limits(unit, calibration)
+    except RefusedError as refusal:
+        raise with_pose_cause(refusal, unit, calibration) from None
+    refuse_certain_fault_of_poses(unit, calibration)

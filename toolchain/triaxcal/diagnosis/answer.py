@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from triaxcal.diagnosis.core.evidence import Judged
 from triaxcal.diagnosis.core.readings import Readings, readings_of
 from triaxcal.diagnosis.nextdwell import Request, next_dwell
 from triaxcal.diagnosis.ranking import TOGETHER, Ranked, rank
-from triaxcal.diagnosis.remaining import Remaining, remaining
+from triaxcal.diagnosis.remaining import remaining
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.description import UnitDescription
@@ -34,6 +36,30 @@ UNKNOWN = "unknown"
 _FEW = 3
 _SHOWN = 6
 """Amplitudes that are shown of a cause; more are those of a curve."""
+
+
+class Left(Protocol):
+    """What is left of a contradiction when a mistake is undone; `str` is a sentence."""
+
+    @property
+    def held_out(self) -> str:
+        """For a table; "-" where nothing is."""
+
+    @property
+    def checks(self) -> str:
+        """The same in check positions."""
+
+
+class Explained(Protocol):
+    """How well a cause explains the readings, with and without its prior odds."""
+
+    @property
+    def log_evidence(self) -> float:
+        """With prior odds."""
+
+    @property
+    def log_likelihood(self) -> float:
+        """Without."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +102,7 @@ class Suspect:
     change : str
         What undoing it changes.
     amplitudes : tuple of Amplitude
-    remaining : Remaining
+    remaining : Remaining, or `poses.answer.HeldOut`
         Held-out errors with the mistake undone.
     apart : str
         The datum that would tell it from causes that look the same.
@@ -95,13 +121,13 @@ class Suspect:
     log_evidence: float
     change: str
     amplitudes: tuple[Amplitude, ...]
-    remaining: Remaining
+    remaining: Left
     apart: str
     name: str
     spoils: bool
     symptom: bool
     alike: tuple[str, ...]
-    judged: Judged = field(repr=False, compare=False)
+    judged: Explained = field(repr=False, compare=False)
 
     @property
     def size(self) -> str:
@@ -123,7 +149,7 @@ class Diagnosis:
         Those that the readings do not tell from the best; empty where a sound unit is more probable
         than any cause.
         A sound unit is a part of it where the best is within `MARGIN` of it.
-    sound : Remaining
+    sound : Remaining, or `poses.answer.HeldOut`
         Held-out errors of the readings as they are.
     request : Request or None
         The further dwell that would separate the two best.
@@ -131,7 +157,7 @@ class Diagnosis:
 
     suspects: tuple[Suspect, ...]
     answer: tuple[Suspect, ...]
-    sound: Remaining
+    sound: Left
     request: Request | None
 
     @property
@@ -163,7 +189,8 @@ class Diagnosis:
             where = f", {best.place}" if best.place else ""
             return f"something that is not in the list of causes{where}"
         text = f"{best.name}{best.size}: {best.change}"
-        return text if str(best.remaining) == str(self.sound) else f"{text}, {best.remaining}"
+        left = str(best.remaining)
+        return text if left in {"", str(self.sound)} else f"{text}, {left}"
 
     def __str__(self) -> str:
         rows = [(s.log_evidence, s.remaining, s.name) for s in self.suspects]
@@ -171,18 +198,25 @@ class Diagnosis:
             rows = [row for row in rows if row[0] > -MARGIN]
         rows.append((0.0, self.sound, "none: a sound unit"))
         rows.sort(key=lambda r: -r[0])
-        head = ("ln odds", "held out", "in checks", "cause, undone for the errors held out")
+        head: tuple[str, ...] = (
+            "ln odds",
+            "held out",
+            "in checks",
+            "cause, undone for the errors held out",
+        )
         # Columns as wide as their heads, which are not broken then.
-        cells = [
+        cells: list[tuple[str, ...]] = [
             (f"{odds:.1f}", f"{left.held_out:>8}", f"{left.checks:>9}", name)
             for odds, left, name in rows
         ]
+        if all(left.checks == "-" for _, left, _ in rows):
+            head, cells = _without_checks(head), [_without_checks(row) for row in cells]
         lines = [self.sentence]
         if self.answer and not self.answer[0].size:
             lines += [f"  {a}" for a in self.answer[0].amplitudes[:_SHOWN]]
         if self.request is not None:
             lines.append(self.request.between(self.suspects[0].name, self.suspects[1].name))
-        return "\n".join([*lines, "", *table(head, cells, left=(3,))])
+        return "\n".join([*lines, "", *table(head, cells, left=(len(head) - 1,))])
 
     __repr__ = __str__
 
@@ -211,31 +245,42 @@ def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
     sound, ranked = rank(readings, (nominal, unit.nominal_tolerance))
     readings = sound.readings
     base = sound.fit.log_evidence
-    suspects = [_suspect(r, j, readings, base) for r in ranked for j in r.places]
+    judged = {_suspect(r, j, readings, base): j for r in ranked for j in r.places}
+    found = answered(judged, remaining(readings), checks=not readings.test.all())
+    shown = found.suspects
+    near = len(shown) > 1 and shown[1].log_evidence > shown[0].log_evidence - _FAR_BEHIND
+    if not (found.answer and near):
+        return found
+    return replace(found, request=next_dwell(readings, judged[shown[0]], judged[shown[1]]))
+
+
+def answered(suspects: Iterable[Suspect], sound: Left, *, checks: bool = True) -> Diagnosis:
+    """What is said of causes at their places, in any order; without `checks` some look alike."""
     # Two causes go first only where they are clearly more probable than one.
-    suspects.sort(key=lambda s: (MARGIN if s.cause == TOGETHER else 0.0) - s.log_evidence)
-    best = suspects[0]
-    checks = not readings.test.all()
+    ranked = sorted(
+        suspects, key=lambda s: (MARGIN if s.cause == TOGETHER else 0.0) - s.log_evidence
+    )
+    best = ranked[0]
     answer = [
         s
-        for s in suspects
+        for s in ranked
         if s.log_evidence > best.log_evidence - MARGIN
         or _equivalent(s.judged, best.judged)
         or (not checks and s.cause in best.alike and s.log_evidence > best.log_evidence - _ALIKE)
     ]
     if best.log_evidence <= 0.0:
         answer = []
-    shown = _shown(suspects)
-    request = None
-    if answer and len(shown) > 1 and shown[1].log_evidence > best.log_evidence - _FAR_BEHIND:
-        request = next_dwell(readings, best.judged, shown[1].judged)
-    return Diagnosis(shown, tuple(answer), remaining(readings), request)
+    return Diagnosis(_shown(ranked), tuple(answer), sound, None)
 
 
-def _equivalent(one: Judged, other: Judged) -> bool:
+def _equivalent(one: Explained, other: Explained) -> bool:
     """Whether only the number of places and the like differ between two."""
     near = abs(one.log_evidence - other.log_evidence) < _PLACES
     return near and abs(one.log_likelihood - other.log_likelihood) < _EQUIVALENT
+
+
+def _without_checks(cells: tuple[str, ...]) -> tuple[str, ...]:
+    return (*cells[:2], *cells[3:])
 
 
 def _shown(suspects: list[Suspect]) -> tuple[Suspect, ...]:

@@ -26,7 +26,7 @@ def summary(made: Passport, files: Iterable[str], where: str) -> str:
     """Text of the summary; `files` lie in the folder `where`."""
     delivery = made.delivery
     blocks = [
-        _head(delivery),
+        _head(made),
         _constants(delivery.calibration),
         *_shares(delivery.calibration),
         _candidates(delivery.calibration),
@@ -43,7 +43,8 @@ def _entry(label: str, *lines: str) -> str:
     return f"{label:<{_LABEL}}" + indent.join(lines)
 
 
-def _head(delivery: Delivery) -> str:
+def _head(made: Passport) -> str:
+    delivery = made.delivery
     calibration, plan = delivery.calibration, delivery.plan
     low, high = calibration.range_degc
     measured = measured_words(delivery).removesuffix("; no check dwells")
@@ -57,6 +58,7 @@ def _head(delivery: Delivery) -> str:
             _entry("unit", f"{delivery.unit.name}  (serial {delivery.unit.serial})"),
             _entry("measured", measured),
             *_findings(calibration),
+            *([_entry("found", made.cause)] if made.cause else []),
             _entry("thermal model", calibration.selection_reason),
             _entry("method", method),
             _entry(

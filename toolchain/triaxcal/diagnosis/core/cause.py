@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -176,7 +177,8 @@ class Cause:
     name, label, doc : str
         For files, for people, for the documentation.
     hypotheses : Callable
-        Known -> the places where it can have struck.
+        Known -> the places where it can have struck; of a recording KnownPoses -> PoseHypothesis
+        (`diagnosis.poses.core.cause`).
     apart : str
         The datum that would tell it from what looks the same.
     discrete : bool
@@ -195,7 +197,7 @@ class Cause:
     name: str
     label: str
     doc: str
-    hypotheses: Callable[[Known], Iterable[Hypothesis]]
+    hypotheses: Callable[[Any], Iterable[Any]]
     apart: str
     discrete: bool = False
     spoils: bool = False

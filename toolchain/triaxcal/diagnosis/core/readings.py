@@ -17,6 +17,8 @@ POSITIONS = tuple(TEST_POSITIONS)
 FORCES = np.array(list(TEST_POSITIONS.values()), dtype=np.float64)
 _UNSTATED_SD_G = 30e-6
 """Standard deviation of a mean that the file does not state; its factor is then free."""
+_BY_HAND_SD_G = 5e-3
+"""The same of labelled faces of a recording: a hand places them within some mrad."""
 _LEAST_SD_G = 2e-6
 
 
@@ -115,7 +117,8 @@ def readings_of(unit: UnitDescription, measurements: MeasurementSet) -> Readings
     block, order = _blocks(dwells)
     variances = [d.variance_of_mean_v2 for d in dwells]
     stated = all(v is not None for v in variances)
-    sd = np.full(volts.shape, _UNSTATED_SD_G)
+    unstated = _UNSTATED_SD_G if unit.recording is None else _BY_HAND_SD_G
+    sd = np.full(volts.shape, unstated)
     if stated:
         code = unit.adc.volts_per_code / np.sqrt(12.0)
         rounded = [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,7 +10,6 @@ import numpy as np
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.cubes import cube_findings
 from triaxcal.fitting.core.judged import ORIENTATION, TEMPERATURE, held_out_poses
-from triaxcal.fitting.core.outliers import left_out_residuals, worst_outlier
 from triaxcal.fitting.recorded.contradicted import contradicted
 from triaxcal.fitting.recorded.cubes import scalar_cubes
 from triaxcal.fitting.recorded.made import Made
@@ -40,6 +38,7 @@ from triaxcal.fitting.recorded.trials import (
     without_idle_rates,
     worth_judging,
 )
+from triaxcal.fitting.recorded.wrong import wrong_poses
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.poses.poses import PoseSet, find_poses
@@ -105,7 +104,7 @@ def calibrate_poses(
     rows = [*(s.row for s in scaled), best] + [full] * (len(models) > 1)
     plain = _plain_rows(unit, found, climate, replace(base, known=None), turns)
     why = _reason(thermal, delivered.own, turns, delivered.reason)
-    outlier = _outlier(best, poses, unit.loss)
+    outlier = _outliers(unit, found, delivered.full, poses)
     findings = found.findings + outlier
     findings += [BEYOND_1_G] if len(delivered.own.fit.model.quadratic) else []
     findings += cube_findings([scalar_cubes(delivered.full.fit)])
@@ -254,35 +253,35 @@ def _reason(thermal: Sequence[Judged], best: Judged, turns: Turns, terms: str) -
     return f"{text}. Terms beyond the linear constants: {terms}"
 
 
-def _outlier(row: Judged, poses: PoseSet, loss: str) -> list[str]:
-    """Names a pose that the others contradict, by its leverage in the linear fit with priors."""
+def _outliers(unit: UnitDescription, found: Prepared, row: Judged, poses: PoseSet) -> list[str]:
+    """Names the poses that the others contradict in the fit with all terms."""
     fit = row.fit
-    if loss != "linear":  # leverage and F are those of least squares
-        trial = row.trial
-        assert trial.known is not None
-        fit = fit_with_prior(trial.model, fit.data, trial.gain_functions, trial.known)
-    posterior = fit.posterior
-    assert posterior is not None
-    weighted = fit.residual_g * fit.data.weight
-    # The prior as rows of their own: it holds the constants as poses would.
-    rows = np.concatenate(
-        [fit.jacobian @ posterior.prior.factor, posterior.scale * np.eye(len(fit.theta))]
-    )
-    padded = np.concatenate([weighted, np.zeros(len(fit.theta))])
-    left_out = left_out_residuals(padded, rows)[: len(weighted)]
-    found = worst_outlier(weighted[:, None], left_out[:, None], math.ceil(posterior.used))
-    if found is None:
+    if unit.loss != "linear":  # the odds are those of least squares
+        fit = fit_with_prior(fit.model, fit.data, fit.gain_functions, found.known)
+    wrong = wrong_poses(fit, found.known.noise)
+    if wrong is None or not wrong.told:
         return []
-    worst = found.indices[0]
-    numbers = " or ".join(f"pose {poses.poses[k].number}" for k in found.indices[:4])
-    error = left_out[worst] / fit.data.weight[worst] * 1e3
-    remedy = 'remove it, or set [fit] loss = "huber"' if loss == "linear" else "or remove it"
+    named = [poses.poses[k] for k in wrong.indices]
+    pronoun = "it" if len(named) == 1 else "them"
+    lines = _listed([f"pose {pose.number} (line {pose.line})" for pose in named])
+    verb = "is an outlier" if len(named) == 1 else "are outliers"
+    errors = _listed([f"{error * 1e3:+.3g}" for error in wrong.error_g])
+    rivals = ""
+    if wrong.rivals:
+        also = [str(poses.poses[k].number) for k in wrong.rivals]
+        rivals = f"; as probable: pose{'s' * (len(also) != 1)} {', '.join(also)}"
+    remedy = f"or remove {pronoun}"
+    if unit.loss == "linear":
+        remedy = f'remove {pronoun}, or set [fit] loss = "huber"'
     finding = (
-        f"{numbers} (line {poses.poses[worst].line}) is an outlier: |a| differs by {error:+.3g} mg "
-        f"from the fit of the other poses, whose residuals are {found.others * 1e3:.2g} mg rms; "
-        f"check it, {remedy}"
+        f"{lines} {verb}: |a| differs by {errors} mg from the fit of the other poses, whose noise "
+        f"is {wrong.others_g * 1e3:.2g} mg{rivals}; check {pronoun}, {remedy}"
     )
     return [finding]
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
 def pose_dwells(

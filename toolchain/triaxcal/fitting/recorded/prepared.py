@@ -53,6 +53,13 @@ def prepare(
     RefusedError
         For left-handed axes, and what is no number.
     """
+    found = weighed(unit, layout, poses)
+    axes = refuse_left_handed(samples, layout, found.data.centre)
+    return replace(found, findings=[*found.findings, axes])
+
+
+def weighed(unit: UnitDescription, layout: RecordingLayout, poses: PoseSet) -> Prepared:
+    """The same without what samples between the poses say of the axes."""
     findings = [*poses.findings]
     refuse_no_numbers(poses)
     recorded = poses.temps_degc
@@ -63,13 +70,11 @@ def prepare(
     if left_open:
         findings.append(left_open)
         rough = unscaled_data(poses.readings, ones[:, None], ones, unit.gravity_g)
-    axes = refuse_left_handed(samples, layout, rough.centre)
     orientations, temperatures = orientation_groups(_directions(rough)), temperature_groups(temps)
     crowd = crowd_finding(orientations, poses)
     if crowd:
         findings.append(crowd)
     findings += temperature_findings(unit, recorded)
-    findings.append(axes)
     count = ones.copy()
     for group in _cells(orientations, temps):
         count[group] = 1.0 / len(group)

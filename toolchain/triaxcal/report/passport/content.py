@@ -12,6 +12,7 @@ import numpy as np
 from triaxcal.codegen.tryout import Residual
 from triaxcal.delivery.causes import DOUBT, causes_of
 from triaxcal.delivery.judgement import limits_that_apply
+from triaxcal.delivery.posecauses import causes_of_poses, doubtful_poses
 from triaxcal.delivery.unit import Delivery
 from triaxcal.delivery.verdict import UNCERTAINTY, Verdict, worst
 from triaxcal.uncertainty.budget import Budget
@@ -136,11 +137,21 @@ class Passport:
     def cause(self) -> str:
         """What would explain the readings, where a dwell is beyond half of its limit; else ""."""
         done = self.delivery
+        if done.calibration.recording is not None:
+            return self._cause_of_poses
         errors = [t for t in self.verdict.tested if t.what != UNCERTAINTY]
-        if done.calibration.recording is not None or worst(errors) <= DOUBT:
+        if worst(errors) <= DOUBT:
             return ""
         found = causes_of(done.unit, done.measurements, done.calibration)
         return found.sentence if found.doubtful else ""
+
+    @property
+    def _cause_of_poses(self) -> str:
+        done = self.delivery
+        if not doubtful_poses(done.unit, done.calibration):
+            return ""
+        found = causes_of_poses(done.unit, done.calibration)
+        return found.sentence if found is not None and found.doubtful else ""
 
     @property
     def tested(self) -> bool:

@@ -1,0 +1,1 @@
+"""Which physical cause explains the poses of a recording best, of which only |a| = g is known."""

@@ -1,0 +1,1 @@
+"""Causes of what poses contradict: a file each."""

@@ -1,0 +1,50 @@
+"""One output is on another scale than the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from triaxcal.diagnosis.core.cause import Cause
+from triaxcal.diagnosis.poses.causes.scale import NEAR, POWERS
+from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis, PoseUndo
+from triaxcal.diagnosis.poses.core.readings import PoseReadings
+from triaxcal.model.positions import AXES
+from triaxcal.model.types import FloatArray
+
+
+def _divided(i: int, factor: float) -> PoseUndo:
+    def undo(readings: PoseReadings, _amplitudes: FloatArray) -> PoseReadings:
+        outputs = readings.outputs.copy()
+        outputs[:, i] /= factor
+        return readings.but(outputs=outputs)
+
+    return undo
+
+
+def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
+    span = np.ptp(known.readings.outputs, axis=0)
+    for i, axis in enumerate(AXES):
+        others = float(np.delete(span, i).max())
+        for factor in POWERS:
+            if not 1.0 / NEAR < span[i] / factor / others < NEAR:
+                continue
+            yield PoseHypothesis(
+                f"output {axis}, {factor:g} times the others",
+                _divided(i, factor),
+                lines=known.readings.lines,
+                change=f"with output {axis} divided by {factor:g}",
+                places=3.0 * len(POWERS),
+            )
+
+
+ENTRY = Cause(
+    name="output_scale",
+    label="gain or full scale of one output",
+    doc="The scale factor of one output is a power of two times that of the others.",
+    hypotheses=_hypotheses,
+    apart="the settings of the converter",
+    discrete=True,
+    rank=37,
+)

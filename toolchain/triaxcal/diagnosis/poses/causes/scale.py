@@ -1,0 +1,60 @@
+"""The readings are in another unit, or on another full scale, than stated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from triaxcal.diagnosis.core.cause import Cause
+from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis, PoseUndo
+from triaxcal.diagnosis.poses.core.readings import PoseReadings
+from triaxcal.model.types import FloatArray
+from triaxcal.unit.recording import ACCELERATION_UNITS
+
+POWERS = (2.0, 0.5, 4.0, 0.25)
+"""Of another full scale or gain."""
+NEAR = 1.6
+"""Factor within which biases and scale errors leave what a sound sensor reads."""
+
+
+def _divided(factor: float) -> PoseUndo:
+    def undo(readings: PoseReadings, _amplitudes: FloatArray) -> PoseReadings:
+        return readings.but(outputs=readings.outputs / factor)
+
+    return undo
+
+
+def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
+    readings = known.readings
+    if not readings.nominal:
+        return
+    changes = {
+        size / readings.one_g: f'with acceleration_unit = "{unit}"'
+        for unit, size in ACCELERATION_UNITS.items()
+        if size is not None and size != readings.one_g
+    }
+    for factor in POWERS:
+        changes[factor] = f"with a full scale {1 / factor:g} times the stated one"
+    length = float(np.median(np.linalg.norm(readings.outputs, axis=1))) / readings.gravity_g
+    for factor, change in changes.items():
+        if not 1.0 / NEAR < length / factor < NEAR:
+            continue
+        yield PoseHypothesis(
+            f"{factor:.6g} times what {known.unit} would be",
+            _divided(factor),
+            lines=readings.lines,
+            change=change,
+            places=float(len(changes)),
+        )
+
+
+ENTRY = Cause(
+    name="scale",
+    label="unit or scale of the readings",
+    doc="The readings are in another unit, codes of another full scale, or in counts.",
+    hypotheses=_hypotheses,
+    apart="the settings of the sensor and of the logger",
+    discrete=True,
+    rank=36,
+)

@@ -1,0 +1,1 @@
+"""Poses as arrays, what a cause did to them, and its evidence."""
