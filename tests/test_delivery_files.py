@@ -166,6 +166,8 @@ def test_stated_model_error_is_that_of_the_planned_functions(
     ).max()
     found = model_error_g(delivery.unit, delivery.calibration.thermal, delivery.plan)
     assert found == delivery.model_error_g
+    total = found + delivery.bound.lsb * 2.0**-delivery.plan.shape.output_q
+    assert delivery.firmware.error_g == total
     # The plan's functions are the same polynomials about another origin: 1e-15 of 2 g/V x 2.5 V.
     assert abs(found - expected) <= 1e-13
     assert found <= delivery.unit.model_error_max_micro_g * 1e-6

@@ -191,6 +191,12 @@ def test_what_is_written_and_said(ran: Ran) -> None:
     assert max(map(len, wrapped(summary, 80).splitlines())) <= 80
     stated = json.loads((ran.folder / "verification.json").read_text(encoding="utf-8"))
     assert stated["accelerometer"]["bound_lsb"] == accel
+    total = accel * 2.0**-24 + ran.c.accel_model_error_g
+    assert stated["accelerometer"]["error_g"] == pytest.approx(total)
+    assert f"of the fitted model: together {total * 1e6:.3g} micro-g" in ran.output
+    total = gyro * 2.0**-19 * 3600 + ran.c.gyro_model_error_deg_per_h
+    assert stated["gyro"]["error_deg_per_h"] == pytest.approx(total)
+    assert f"of the fitted model: together {total:.3g} deg/h" in ran.output
     fitted = json.loads((ran.folder / "calibration.json").read_text(encoding="utf-8"))
     files = ran.made.done.unit.path, ran.made.done.unit.recording
     digests = b"".join(hashlib.sha256(file.read_bytes()).digest() for file in files)

@@ -361,15 +361,16 @@ def test_the_device_is_in_the_acceleration_only(
     unit, measurements, calibration = at_sim
     result = uncertainty(unit, measurements, calibration, DEVICE)
     keys = {s.key: s for s in result.sources}
-    for key in ("raw_code", "temperature_code", "output_lsb", "arithmetic", "method"):
+    for key in ("raw_code", "temperature_code", "firmware"):
         assert keys[key].constants is None
         assert keys[key].force is not None
     assert keys["thermometer"].force is None
     b = result.force_budget(0, 0, np.array([1.0, 0.0, 0.0]))
     found = {line.source.key: line.contribution for line in b.lines}
-    assert found["output_lsb"] == pytest.approx(2.0**-24 / math.sqrt(12.0))
-    assert found["arithmetic"] == pytest.approx(0.25 * 2.0**-24 / math.sqrt(3.0))
-    assert found["method"] == pytest.approx(5e-7 / math.sqrt(3.0))
+    assert found["firmware"] == pytest.approx((0.75 * 2.0**-24 + 5e-7) / math.sqrt(3.0))
+    assert "model_error_max" in keys["firmware"].advice
+    coarse = uncertainty(unit, measurements, calibration, replace(DEVICE, output_q=10))
+    assert "output_q" in {s.key: s for s in coarse.sources}["firmware"].advice
 
 
 def test_a_rotation_moves_no_length_and_gravity_scales_it() -> None:

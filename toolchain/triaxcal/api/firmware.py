@@ -61,6 +61,11 @@ class Firmware:
     def __repr__(self) -> str:
         return f"<triaxcal.Firmware {self.calibration.serial}, {self._compensation.method}>"
 
+    @property
+    def error_g(self) -> float:
+        """Largest error against the fitted model: that of `bound` and `model_error_g` together."""
+        return self.bound.lsb * self.lsb_g + self.model_error_g
+
     @cached_property
     def bound(self) -> Bound:
         """Proven error of the arithmetic, in codes of the result, for every input in range."""

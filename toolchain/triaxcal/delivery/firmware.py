@@ -74,6 +74,11 @@ class Firmware:
         """Proven error of the arithmetic."""
         return prove(self.plan)
 
+    @property
+    def error_g(self) -> float:
+        """Largest error against K(T)^-1 (U - U0(T)): that of arithmetic and method."""
+        return self.bound.lsb * 2.0**-self.plan.shape.output_q + self.model_error_g
+
     @cached_property
     def uncertainty(self) -> Uncertainty:
         """Uncertainty of the unit, the device's own errors included."""

@@ -61,6 +61,22 @@ class ImuC:
     gyro_model_error_deg_per_h: float
     left_out: tuple[str, ...]
 
+    @property
+    def accel_error_g(self) -> float:
+        """Largest error against the fitted model: that of the arithmetic and of the functions."""
+        arithmetic = self.build.accel_bound.lsb * 2.0**-self.build.accel.shape.output_q
+        return arithmetic + self.accel_model_error_g
+
+    @property
+    def gyro_arithmetic_error_deg_per_h(self) -> float:
+        """Proven error of the arithmetic, with what the accelerometer carries over."""
+        return max(self.build.rate_bound_lsb) * 2.0**-self.build.gyro.shape.output_q * 3600
+
+    @property
+    def gyro_error_deg_per_h(self) -> float:
+        """The same of the gyro, the accelerometer's errors carried over."""
+        return self.gyro_arithmetic_error_deg_per_h + self.gyro_model_error_deg_per_h
+
 
 @dataclass(frozen=True)
 class ImuDelivery:

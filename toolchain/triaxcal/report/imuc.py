@@ -68,12 +68,14 @@ def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:
             **_triad(build.accel, build.accel_bound, build.accel_check),
             "bound_g": build.accel_bound.lsb * 2.0**-build.accel.shape.output_q,
             "model_error_g": c.accel_model_error_g,
+            "error_g": c.accel_error_g,
         },
         "gyro": {
             **_triad(build.gyro, build.gyro_bound, build.gyro_check),
             "with_accelerometer_lsb": list(build.rate_bound_lsb),
-            "with_accelerometer_deg_per_h": _deg_per_h(build.gyro, max(build.rate_bound_lsb)),
+            "with_accelerometer_deg_per_h": c.gyro_arithmetic_error_deg_per_h,
             "model_error_deg_per_h": c.gyro_model_error_deg_per_h,
+            "error_deg_per_h": c.gyro_error_deg_per_h,
         },
         "both_together_vectors": build.vectors,
         "mismatches": 0,
@@ -117,11 +119,15 @@ def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
             "Gyro: proven arithmetic error",
             proven_words(build.gyro_bound, build.gyro_check, f"{own} °/h")
             + f"; with the error carried over from the accelerometer ≤ {carried:.3f} LSB = "
-            f"{significant(_deg_per_h(build.gyro, carried), 3)} °/h",
+            f"{significant(c.gyro_arithmetic_error_deg_per_h, 3)} °/h",
         ),
         (
             "Method against the fitted model",
             f"≤ {model} at every temperature code and any raw code",
+        ),
+        (
+            "Arithmetic and method, the sum",
+            f"≤ {g_in_words(c.accel_error_g)} and {significant(c.gyro_error_deg_per_h)} °/h",
         ),
         ("Accelerometer: cross-check", checked_words(build.accel_check)),
         ("Gyro: cross-check", checked_words(build.gyro_check)),
@@ -137,6 +143,10 @@ def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
             ("Constant over temperature", f"{' and '.join(constant)}: no temperature block")
         )
     return rows
+
+
+def _with_functions(own: float, total: float) -> str:
+    return f"and {own:.2g} of the fitted model: together {total:.3g}"
 
 
 def constant_triads(made: ImuDelivery) -> list[str]:
@@ -157,15 +167,19 @@ def imu_c_lines(made: ImuDelivery) -> list[str]:
     codes = thousands(build.accel_bound.codes, " ")
     proven = (
         f"{accel:.3f} LSB, {accel * 2.0**-accel_q * 1e6:.3g} micro-g",
-        f"{gyro:.3f} LSB, {_deg_per_h(build.gyro, gyro):.3g} deg/h",
+        f"{gyro:.3f} LSB, {c.gyro_arithmetic_error_deg_per_h:.3g} deg/h",
+    )
+    together = (
+        _with_functions(c.accel_model_error_g * 1e6, c.accel_error_g * 1e6),
+        _with_functions(c.gyro_model_error_deg_per_h, c.gyro_error_deg_per_h),
     )
     agree = f"{thousands(checked, ' ')} vectors: Python, reference C and generated C agree"
     lines = [
         f"C               both triads, {low:g} to {high:g} degC, {codes} temperature codes",
         f"  accelerometer LSB 2^-{accel_q} g; proven within {proven[0]},",
-        f"                and {c.accel_model_error_g * 1e6:.2g} micro-g of the fitted model",
+        f"                {together[0]} micro-g",
         f"  gyro          LSB 2^-{gyro_q} deg/s; proven within {proven[1]},",
-        f"                and {c.gyro_model_error_deg_per_h:.2g} deg/h of the fitted model",
+        f"                {together[1]} deg/h",
         f"  checked       {agree}",
     ]
     lines += [f"  not corrected {title}" for title in c.left_out]

@@ -32,6 +32,7 @@ def verification_json(delivery: Delivery) -> bytes:
             "temp_codes_visited": bound.codes,
             "largest_seen_lsb": check.largest_error_lsb,
         },
+        "error_g": delivery.firmware.error_g,
         "cross_check": {
             "implementations": ["Python integer model", "reference C", "generated C"],
             "vectors": check.vectors,

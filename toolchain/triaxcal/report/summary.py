@@ -206,6 +206,11 @@ def _verdict(made: Passport) -> str:
             f"proven error <= {bound.lsb:.3f} LSB ({bound.lsb * 1e6 / 2**q:.3f} micro-g); "
             f"largest seen {check.largest_error_lsb:.3f}",
         ),
+        _entry(
+            "",
+            f"with the method's error <= {delivery.firmware.error_g * 2**q:.3f} LSB "
+            f"({delivery.firmware.error_g * 1e6:.3f} micro-g) of K(T)^-1 (U - U0(T))",
+        ),
         _entry("cross-check", f"{vectors} vectors bit for bit: Python = reference = generated C"),
         "",
         _entry("verdict", verdict.words),

@@ -1,4 +1,4 @@
-"""Sources in the device: rounding of its codes and of its result, and the proven bounds."""
+"""Sources in the device: rounding of its codes, and the largest error of its C."""
 
 from __future__ import annotations
 
@@ -59,40 +59,28 @@ def device_sources(p: Curves, device: Device | None) -> list[Source]:
             force=from_factor(p, p.slopes.reshape(-1, 12, 1) * code_degc)[1],
         ),
     ]
-    return sources if device is None else sources + _of_firmware(p, device)
+    return sources if device is None else [*sources, _of_firmware(p, device)]
 
 
-def _of_firmware(p: Curves, device: Device) -> list[Source]:
-    """Rounding of the result, the proven bound without it, the method's own distance."""
-    lsb_g = 2.0**-device.output_q
-    beyond = np.array([max(bound - 0.5, 0.0) for bound in device.bound_lsb])
-    found = (
-        (
-            "output_lsb",
-            "the rounding of the result",
-            "raise compensation.output_q",
-            f"LSB of 2^-{device.output_q} g, ± 1/2",
-            np.full(3, lsb_g / _ROOT_12),
+def _of_firmware(p: Curves, device: Device) -> Source:
+    """The proven bound of the arithmetic and the method's own distance, which add up."""
+    arithmetic_g = np.array(device.bound_lsb) * 2.0**-device.output_q
+    total_g = arithmetic_g + device.model_error_g
+    of_method = device.model_error_g > arithmetic_g.max()
+    return Source(
+        key="firmware",
+        name="the C against the fitted model",
+        unit="g",
+        advice=(
+            'lower compensation.model_error_max_micro_g, with method = "matrix"'
+            if of_method
+            else "raise compensation.output_q"
         ),
-        (
-            "arithmetic",
-            "the integer arithmetic",
-            "raise compensation.output_q",
-            "proven bound beyond the final rounding",
-            beyond * lsb_g / _ROOT_3,
-        ),
-        (
-            "method",
-            "the compensation method",
-            'lower compensation.model_error_max_micro_g, with method = "matrix"',
-            "largest distance from K(T)^-1 (U - U0(T)) for any raw code",
-            np.full(3, device.model_error_g / _ROOT_3),
-        ),
+        origin="proven arithmetic error and the method's distance from K(T)^-1 (U - U0(T)), added",
+        sd=float(total_g.max()) / _ROOT_3,
+        distribution=RECTANGULAR,
+        force=_axes(p, total_g / _ROOT_3),
     )
-    return [
-        Source(key, name, "g", advice, origin, float(sds.max()), RECTANGULAR, force=_axes(p, sds))
-        for key, name, advice, origin, sds in found
-    ]
 
 
 def _axes(p: Curves, sds_g: FloatArray) -> FloatArray:

@@ -266,5 +266,6 @@ def _verification(p: Passport) -> list[tuple[str, str]]:
             proven_words(d.bound, d.check, g_in_words(d.bound.lsb * lsb_g)),
         ),
         ("Method against the fitted model", method),
+        ("Both together", f"≤ {g_in_words(d.firmware.error_g)}, the sum"),
         ("Cross-check", checked_words(d.check)),
     ]
