@@ -54,6 +54,7 @@ ONLY_IN = {
     "cantools": {"rig"},
     "asammdf": {"rig", "readings"},
     "pyarrow": {"rig", "readings"},
+    "bincopy": {"codegen"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report", "api"},  # api: the type of `plot` alone

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from triaxcal.api.diagnosis import diagnose
     from triaxcal.api.files import key_schema, write_first_file
     from triaxcal.api.firmware import CompiledFirmware, Firmware, firmware
+    from triaxcal.api.image import CalibrationImage, read_image
     from triaxcal.api.imu import (
         Imu,
         ImuCalibration,
@@ -58,14 +59,15 @@ if TYPE_CHECKING:
 __version__ = "0.2.0.dev0"
 
 __all__ = [
-    "Budget", "Calibration", "CompiledFirmware", "Delivered", "Diagnosis", "FieldCheck",
-    "FieldUpdate", "Firmware", "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState",
-    "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "SeriesResult", "Study",
-    "TableGrid", "Unit", "UsageError", "Verdict", "Verification", "__version__", "calibrate_series",
-    "compare_history", "cross_coupling", "deliver", "diagnose", "find_poses", "firmware",
-    "firmware_imu", "fit", "fit_imu", "key_schema", "learn_priors", "load", "load_imu",
-    "plan_measurements", "plan_motion", "read_imu", "read_unit", "simulate", "simulate_series",
-    "study_angle_errors", "study_drift", "update", "verify_unit", "write_first_file",
+    "Budget", "Calibration", "CalibrationImage", "CompiledFirmware", "Delivered", "Diagnosis",
+    "FieldCheck", "FieldUpdate", "Firmware", "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware",
+    "ImuState", "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "SeriesResult",
+    "Study", "TableGrid", "Unit", "UsageError", "Verdict", "Verification", "__version__",
+    "calibrate_series", "compare_history", "cross_coupling", "deliver", "diagnose", "find_poses",
+    "firmware", "firmware_imu", "fit", "fit_imu", "key_schema", "learn_priors", "load", "load_imu",
+    "plan_measurements", "plan_motion", "read_image", "read_imu", "read_unit", "simulate",
+    "simulate_series", "study_angle_errors", "study_drift", "update", "verify_unit",
+    "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
@@ -74,6 +76,7 @@ _MODULES = {
     "triaxcal.api.diagnosis": ("diagnose",),
     "triaxcal.api.files": ("key_schema", "write_first_file"),
     "triaxcal.api.firmware": ("CompiledFirmware", "Firmware", "firmware"),
+    "triaxcal.api.image": ("CalibrationImage", "read_image"),
     "triaxcal.api.imu": (
         "Imu", "ImuCalibration", "ImuConstants", "ImuState", "fit_imu", "load_imu", "read_imu",
     ),

@@ -54,6 +54,19 @@ class UnitFolder(click.ParamType[Path]):
         return names or [CompletionItem(incomplete, type="dir")]
 
 
+class HexNumber(click.ParamType[int]):
+    """A whole number, decimal or hexadecimal with 0x."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number."""
+        try:
+            return int(str(value), 0)
+        except ValueError:
+            self.fail(f"{value!r} is no whole number, as 4096 or 0x1000", param, ctx)
+
+
 _UNIT = click.argument("unit", type=UnitFolder())
 
 
