@@ -78,6 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _makers(units: Path, work: Path) -> dict[str, object]:
     makers = {f"load-{shape}": lambda shape=shape: _load(shape, units, work) for shape in SHAPES}
     makers["reference"] = lambda: _reference(units, work)
+    makers["xcp"] = lambda: _xcp(units, work)
     makers["unit.toml"] = lambda: _parser("unit.toml", units)
     makers["measurements.csv"] = lambda: _parser("measurements.csv", units)
     return makers
@@ -107,6 +108,30 @@ def _reference(units: Path, work: Path) -> Target:
     _compile(program, [HERE / "reference.c", *_reference_sources()], [], [])
     seeds = tuple(subject(shape, units).files[IMAGE] for shape in SHAPES)
     return Target("reference", (str(program),), seeds, 4096)
+
+
+def _xcp(units: Path, work: Path) -> Target:
+    """The XCP slave and its store, with the loader of the first shape."""
+    made = subject(next(iter(SHAPES)), units)
+    space = Workspace.create(work / "xcp", made.files, made.plan, made.bound)
+    folder = shipped("firmware_ref") / "xcp"
+    sources = [HERE / "xcp.c", *sorted(folder.glob("*.c")), space.folder / ROUTINE]
+    program = space.folder / "xcp"
+    image = made.files[IMAGE]
+    words = ",".join(str(byte) for byte in image)
+    _compile(program, sources, [space.folder, folder], [f"-DFUZZ_FILE={words}"])
+    return Target("xcp", (str(program),), _sessions(image), 4096)
+
+
+def _sessions(image: bytes) -> tuple[bytes, ...]:
+    """Packets, each after its size: a whole download that is stored, and one of every command."""
+    start = [b"\xff\0", b"\xeb\x02\0\x01", b"\xf6" + bytes(7)]
+    parts = [image[at : at + 6] for at in range(0, len(image), 6)]
+    down = [bytes([0xF0, len(part)]) + part for part in parts]
+    codes = (0xFD, 0xFC, 0xFA, 0xF5, 0xF4, 0xF3, 0xEA, 0xE4, 0xFE)
+    each = [bytes([code, 1, 0, 0, 1, 0, 0, 0]) for code in codes]
+    sessions = ([*start, *down, b"\xf9\x01", b"\xeb\x03\0\x01"], [b"\xff\0", *each])
+    return tuple(b"".join(bytes([len(p)]) + p for p in packets) for packets in sessions)
 
 
 def _parser(file: str, units: Path) -> Target:
