@@ -265,7 +265,7 @@ def test_each_characteristic_gives_the_planned_value(
     delivery = delivered[name]
     plan, sensor = delivery.plan, delivery.unit.temperature_sensor
     memory = struct_words(delivery)
-    words = calib_words(delivery)
+    words = calib_words(delivery.firmware)
     found = {w.name: w.method.slope * memory[w.offset // 4] + w.method.intercept for w in words}
     assert found["TRIAX_temp_min"] == sensor.degc(plan.temp_min_code)
     assert found["TRIAX_s0_origin"] == sensor.degc(plan.segments[0].origin_code)
@@ -285,7 +285,7 @@ A2L_TOKEN = re.compile(r'"[^"]*"|/\*.*?\*/|/begin|/end|[^\s"]+', re.DOTALL)
 
 def test_a2l_blocks_nest_and_refer_to_each_other(delivered: dict[str, Delivery]) -> None:
     delivery = delivered["AT-SIM"]
-    text = calib_a2l(delivery).decode()
+    text = calib_a2l(delivery.firmware).decode()
     assert text.isascii()
     tokens = [t for t in A2L_TOKEN.findall(text) if not t.startswith("/*")]
     stack, methods, used, symbols = [], set(), set(), []
@@ -306,7 +306,7 @@ def test_a2l_blocks_nest_and_refer_to_each_other(delivered: dict[str, Delivery])
     assert stack == []
     assert used == methods
     assert {name for name, _ in symbols} == {f'"{names_of(delivery.plan).linked}_calib_constants"'}
-    assert [offset for _, offset in symbols] == [w.offset for w in calib_words(delivery)]
+    assert [offset for _, offset in symbols] == [w.offset for w in calib_words(delivery.firmware)]
 
 
 def test_another_parser_reads_the_a2l(delivered: dict[str, Delivery], tmp_path: Path) -> None:
@@ -315,10 +315,10 @@ def test_another_parser_reads_the_a2l(delivered: dict[str, Delivery], tmp_path: 
 
     delivery = delivered["AT-SIM"]
     path = tmp_path / "triax_calib.a2l"
-    path.write_bytes(calib_a2l(delivery))
+    path.write_bytes(calib_a2l(delivery.firmware))
     session = pya2l.import_a2l(str(path), in_memory=True, loglevel="ERROR")
     found = {c.name: c for c in session.query(model.Characteristic).all()}
-    words = calib_words(delivery)
+    words = calib_words(delivery.firmware)
     assert set(found) == {w.name for w in words}
     for w in words:
         assert found[w.name].symbol_link.offset == w.offset

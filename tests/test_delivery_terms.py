@@ -64,7 +64,7 @@ def test_residuals_are_those_of_the_compensated_force(made: Delivery) -> None:
 
 
 def test_the_a2l_words_stand_where_the_compiler_puts_them(made: Delivery) -> None:
-    words = {w.name: w for w in calib_words(made)}
+    words = {w.name: w for w in calib_words(made.firmware)}
     order, segments = made.plan.shape.order, made.plan.shape.segments
 
     class Segment(ctypes.Structure):

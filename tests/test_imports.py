@@ -55,6 +55,7 @@ ONLY_IN = {
     "asammdf": {"rig", "readings"},
     "pyarrow": {"rig", "readings"},
     "bincopy": {"codegen"},
+    "elftools": {"codegen"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report", "api"},  # api: the type of `plot` alone

@@ -15,7 +15,8 @@ import numpy as np
 from triaxcal.api.calibration import Calibration
 from triaxcal.base.arrays import int32
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.publish import publish
+from triaxcal.base.publish import publish, renew
+from triaxcal.codegen.names import names_of
 from triaxcal.codegen.routines import Int32Array, UInt32Array, routines_of, start_generated
 from triaxcal.delivery.firmware import make_firmware
 from triaxcal.delivery.fitted import refuse_beyond_limits
@@ -51,15 +52,14 @@ class Firmware:
 
     def __init__(self, calibration: Calibration) -> None:
         self.calibration = calibration
-        made = make_firmware(calibration.fitted)
+        self._made = made = make_firmware(calibration.fitted)
         self.plan: Plan = made.plan
         self.files = made.files
         self.model_error_g = made.model_error_g
         self.lsb_g = 2.0**-made.plan.shape.output_q
-        self._compensation = made.compensation
 
     def __repr__(self) -> str:
-        return f"<triaxcal.Firmware {self.calibration.serial}, {self._compensation.method}>"
+        return f"<triaxcal.Firmware {self.calibration.serial}, {self._made.compensation.method}>"
 
     @property
     def error_g(self) -> float:
@@ -119,7 +119,7 @@ class Firmware:
         temp_degc = codes * sensor.degc_per_code + sensor.degc_at_zero
         voltage = raw.clip(plan.shape.raw_min, plan.shape.raw_max) * unit.adc.volts_per_code
         rate_k_per_s = rate.astype(np.float64) * (sensor.degc_per_code * 2.0**-RATE_Q)
-        return self._compensation.evaluate(voltage, temp_degc, rate_k_per_s)
+        return self._made.compensation.evaluate(voltage, temp_degc, rate_k_per_s)
 
     @contextmanager
     def compiled(self) -> Iterator[CompiledFirmware]:
@@ -147,6 +147,47 @@ class Firmware:
         target = Path(folder)
         publish(self.files, target)
         return tuple(target / name for name in self.files)
+
+    def write_a2l(
+        self,
+        elf: str | Path,
+        path: str | Path | None = None,
+        *,
+        can_ids: tuple[int, int] | None = None,
+        bitrate: int | None = None,
+    ) -> Path:
+        """Write the A2L of these constants with their addresses in a linked program.
+
+        Parameters
+        ----------
+        elf : path
+            The program as the linker wrote it, with its symbols.
+        path : path or None
+            File to write; None is triax_calib.a2l beside the program.
+        can_ids : tuple of two int, or None
+            CAN identifiers of the XCP commands and of the answers; above 0x7FF they are extended
+            ones. None leaves XCP on CAN to the tool.
+        bitrate : int or None
+            Of the bus, in bit/s.
+
+        Raises
+        ------
+        RefusedError
+            When the file is no linked program, its constants are not these, or an identifier is
+            none.
+        """
+        from triaxcal.codegen.elf import linked_constants  # noqa: PLC0415
+        from triaxcal.report.a2l import XcpOnCan, calib_a2l  # noqa: PLC0415
+
+        if can_ids is None and bitrate is not None:
+            raise RefusedError("bitrate", "stated", expected="CAN identifiers as well")
+        xcp = None if can_ids is None else XcpOnCan(*can_ids, bitrate)
+        program = Path(elf)
+        linked = linked_constants(program, self.plan, self._made.provenance.epk)
+        name = names_of(self.plan).file("triax_calib.a2l")
+        target = program.with_name(name) if path is None else Path(path)
+        renew({target.name: calib_a2l(self._made, linked, xcp)}, target.parent)
+        return target
 
     def codes(
         self, raw_codes: Any, temp_codes: Any, rate_codes: Any

@@ -43,6 +43,11 @@ class Provenance:
     date: str = ""
     axes: str = ""
 
+    @property
+    def epk(self) -> str:
+        """What tells these constants from all others to a calibration tool (ASAP2: EPK)."""
+        return f"{self.serial} {self.inputs_sha256[:16]}"
+
 
 def render_constants(
     plan: Plan, sensor: TemperatureSensor, provenance: Provenance
@@ -52,6 +57,7 @@ def render_constants(
     source = f"shape {names.shape}, inputs sha256 {provenance.inputs_sha256[:16]}"
     context = {
         "serial": provenance.serial,
+        "epk": provenance.epk,
         "summary": provenance.summary,
         "inputs_word": f"0x{provenance.inputs_sha256[:8].upper()}u",
         "temp_min": _code(plan.temp_min_code, sensor),

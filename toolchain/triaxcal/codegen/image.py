@@ -110,12 +110,17 @@ def _term_words(plan: Plan) -> list[int]:
     return words
 
 
-def image_bytes(plan: Plan) -> bytes:
-    """Render the image of a plan."""
-    words = [*header_words(plan), plan.temp_min_code, plan.temp_max_code]
+def constant_words(plan: Plan) -> list[int]:
+    """The constants, each an int32, in the order of the image and of the structure in the C."""
+    words = [plan.temp_min_code, plan.temp_max_code]
     for segment in plan.segments:
         words += [segment.first_code, segment.origin_code, segment.gain]
         words += segment.coefficients.ravel().tolist()
-    words += _term_words(plan)
+    return words + _term_words(plan)
+
+
+def image_bytes(plan: Plan) -> bytes:
+    """Render the image of a plan."""
+    words = [*header_words(plan), *constant_words(plan)]
     payload = struct.pack(f"<{len(words)}I", *(w % 2**32 for w in words))
     return payload + struct.pack("<I", zlib.crc32(payload))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -96,6 +96,19 @@ class Firmware:
         """Name and content."""
         return _files(self)
 
+    @property
+    def provenance(self) -> Provenance:
+        """Where the constants come from, without the summary of their header."""
+        unit = self.fitted.unit
+        date = unit.measured.date
+        return Provenance(
+            unit.serial,
+            self.fitted.inputs_sha256,
+            (),
+            "" if date is None else date.isoformat(),
+            ", ".join(map(plain_name, self.fitted.calibration.inputs)),
+        )
+
     def _errors_g(self) -> FloatArray:
         """| |a| - g | at the dwells in the range by the integers, in which the C equals, (n,)."""
         unit, calibration = self.fitted.unit, self.fitted.calibration
@@ -164,13 +177,7 @@ def _files(firmware: Firmware) -> dict[str, bytes]:
         *_constants_at_t0(calibration),
         *_tested(firmware.verdict),
     )
-    provenance = Provenance(
-        unit.serial,
-        fitted.inputs_sha256,
-        summary,
-        "" if unit.measured.date is None else unit.measured.date.isoformat(),
-        ", ".join(map(plain_name, calibration.inputs)),
-    )
+    provenance = replace(firmware.provenance, summary=summary)
     return output_files(Job(plan, unit.temperature_sensor, provenance))
 
 

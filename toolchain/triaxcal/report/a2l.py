@@ -2,20 +2,23 @@
 
 A CHARACTERISTIC for each word of `triax_calib_t`: the temperature range, where each segment starts
 and has its origin, and each coefficient. They stand at SYMBOL_LINK of the constants with their byte
-offset; the tool that includes the fragment fills in the address from the linked program's map. The
-COMPU_METHODs are linear and give the value that the coefficient of x^k stands for: 1/2 for the
-floor after it and the preloaded half LSB of the output are taken off (fixed-point.md).
+offset. In a delivery the addresses are 0, and the tool that includes the fragment fills them in;
+with the linked program (`codegen.elf`) they are final. The COMPU_METHODs are linear and give the
+value that the coefficient of x^k stands for: 1/2 for the floor after it and the preloaded half LSB
+of the output are taken off (fixed-point.md).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from triaxcal import __version__
+from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.constants import function_format
+from triaxcal.codegen.elf import Linked
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.templates import environment
-from triaxcal.delivery.unit import Delivery
+from triaxcal.delivery.firmware import Firmware
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
@@ -26,6 +29,10 @@ from triaxcal.unit.thermometer import TemperatureSensor
 
 _WORD = 4
 _HEAD_WORDS, _SEGMENT_HEAD_WORDS = 2, 3
+_LAST_STANDARD = 0x7FF
+"""Last CAN identifier of 11 bits."""
+_COMMANDS = {"GET_ID": 250, "SET_MTA": 246, "UPLOAD": 245, "SHORT_UPLOAD": 244, "DOWNLOAD": 240}
+"""Commands of XCP that reading and changing the constants takes, by their codes."""
 
 
 @dataclass(frozen=True)
@@ -55,35 +62,100 @@ class Word:
     method: Method
 
 
-def calib_a2l(delivery: Delivery) -> bytes:
-    """Text of the fragment: a project with one module."""
-    words = calib_words(delivery)
+@dataclass(frozen=True)
+class XcpOnCan:
+    """How a tool reaches the device.
+
+    Attributes
+    ----------
+    master, slave : int
+        CAN identifiers of commands and of answers; above 0x7FF they are extended ones.
+    bitrate : int or None
+        Of the bus, in bit/s; None is not stated.
+    """
+
+    master: int
+    slave: int
+    bitrate: int | None = None
+
+    @property
+    def context(self) -> dict[str, int | None]:
+        """The same as ASAP2 has it: bit 31 marks an extended identifier.
+
+        Raises
+        ------
+        RefusedError
+            For what is no identifier, the same one twice, or no bit rate.
+        """
+        ids = self.master, self.slave
+        for wrong in (i for i in ids if not 0 <= i < 2**29):
+            raise RefusedError("CAN identifier", f"found {wrong}", expected="0 to 0x1FFFFFFF")
+        if self.master == self.slave:
+            raise RefusedError(
+                "CAN identifiers", f"0x{self.master:X} twice", expected="two identifiers"
+            )
+        if self.bitrate is not None and not 1000 <= self.bitrate <= 1_000_000:
+            raise RefusedError(
+                "bitrate", f"found {self.bitrate} bit/s", expected="1000 to 1000000, as CAN has"
+            )
+        master, slave = (i if i <= _LAST_STANDARD else i | 2**31 for i in ids)
+        return {"master": master, "slave": slave, "bitrate": self.bitrate}
+
+
+def calib_a2l(
+    firmware: Firmware, linked: Linked | None = None, xcp: XcpOnCan | None = None
+) -> bytes:
+    """Text of the fragment: a project with one module.
+
+    `linked` are the constants in a program; without it the addresses are 0.
+    """
+    words, names = calib_words(firmware), names_of(firmware.plan)
+    provenance = firmware.provenance
+    little = linked is None or linked.little_endian
     context = {
         "version": __version__,
-        "inputs": delivery.inputs_sha256[:16],
-        "serial": delivery.unit.serial,
-        "symbol": f"{names_of(delivery.plan).linked}_calib_constants",
+        "inputs": provenance.inputs_sha256[:16],
+        "serial": provenance.serial,
+        "epk": provenance.epk,
+        "TRIAD": names.triad.upper(),
+        "symbol": f"{names.linked}_calib_constants",
         "words": words,
         "methods": list({w.method.name: w.method for w in words}.values()),
+        "linked": linked,
+        "byte_order": "MSB_LAST" if little else "MSB_FIRST",
+        "xcp": xcp.context if xcp else None,
+        "commands": _COMMANDS,
     }
     return environment().get_template("a2l/triax_calib.a2l.j2").render(context).encode()
 
 
-def calib_words(delivery: Delivery) -> list[Word]:
+def calib_words(firmware: Firmware) -> list[Word]:
     """Every adjustable word of the constants; the gains of x, which fix formats, are none."""
-    plan, sensor = delivery.plan, delivery.unit.temperature_sensor
+    prefix = names_of(firmware.plan).triad.upper()
+    return [
+        replace(
+            word,
+            name=f"{prefix}_{word.name}",
+            method=replace(word.method, name=f"{prefix}_{word.method.name}"),
+        )
+        for word in _words(firmware.plan, firmware.fitted.unit.temperature_sensor)
+    ]
+
+
+def _words(plan: Plan, sensor: TemperatureSensor) -> list[Word]:
+    """The same, without the prefix of the names."""
     temperature = Method(
-        "TRIAX_TEMPERATURE", "temperature code", "degC", sensor.degc_per_code, sensor.degc_at_zero
+        "TEMPERATURE", "temperature code", "degC", sensor.degc_per_code, sensor.degc_at_zero
     )
     words = [
-        Word("TRIAX_temp_min", "lowest temperature of the range", 0, temperature),
-        Word("TRIAX_temp_max", "highest temperature of the range", _WORD, temperature),
+        Word("temp_min", "lowest temperature of the range", 0, temperature),
+        Word("temp_max", "highest temperature of the range", _WORD, temperature),
     ]
     order = plan.shape.order
     size = _SEGMENT_HEAD_WORDS + 12 * (order + 1)
     for s in range(len(plan.segments)):
         base = _HEAD_WORDS + s * size
-        first, origin = f"TRIAX_s{s}_first", f"TRIAX_s{s}_origin"
+        first, origin = f"s{s}_first", f"s{s}_origin"
         words.append(Word(first, f"first temperature of segment {s}", base * _WORD, temperature))
         words.append(
             Word(origin, f"temperature of segment {s} where x = 0", (base + 1) * _WORD, temperature)
@@ -99,25 +171,23 @@ def _terms(plan: Plan, sensor: TemperatureSensor, offset: int) -> list[Word]:
     words = []
     if plan.quadratic is not None:
         log2 = quadratic_log2(plan.shape.output_q, plan.shape.output_shift - 32)
-        method = Method("TRIAX_QUADRATIC", "quadratic term", "g/g^2", 2.0**-log2, 0.0)
+        method = Method("QUADRATIC", "quadratic term", "g/g^2", 2.0**-log2, 0.0)
         for name in QUADRATIC_NAMES:
-            words.append(Word(f"TRIAX_{name}", f"{name}, quadratic term", offset, method))
+            words.append(Word(f"{name}", f"{name}, quadratic term", offset, method))
             offset += _WORD
     if plan.rate is not None:
         step = sensor.degc_per_code * 2.0**-RATE_Q
         fraction = plan.shape.output_q + plan.shape.output_shift - 32
         lsb = plan.rate.gain / step * 2.0 ** -(fraction + 32)
-        of_range = Method("TRIAX_RATE_RANGE", "rate of temperature", "K/s", step, 0.0)
-        of_offset = Method("TRIAX_RATE_OFFSET", "offset for dT/dt", "g/(K/s)", lsb, 0.0)
+        of_range = Method("RATE_RANGE", "rate of temperature", "K/s", step, 0.0)
+        of_offset = Method("RATE_OFFSET", "offset for dT/dt", "g/(K/s)", lsb, 0.0)
         words += [
-            Word("TRIAX_rate_min", "lowest rate of the range", offset, of_range),
-            Word("TRIAX_rate_max", "highest rate of the range", offset + _WORD, of_range),
+            Word("rate_min", "lowest rate of the range", offset, of_range),
+            Word("rate_max", "highest rate of the range", offset + _WORD, of_range),
         ]
         # The gain, which fixes a format, stands between.
         words += [
-            Word(
-                f"TRIAX_r{axis}", f"offset of {axis} for dT/dt", offset + (3 + i) * _WORD, of_offset
-            )
+            Word(f"r{axis}", f"offset of {axis} for dT/dt", offset + (3 + i) * _WORD, of_offset)
             for i, axis in enumerate(AXES)
         ]
     return words
@@ -126,7 +196,7 @@ def _terms(plan: Plan, sensor: TemperatureSensor, offset: int) -> list[Word]:
 def _coefficient(plan: Plan, segment: int, function: int, power: int, offset: int) -> Word:
     name = FUNCTION_NAMES[plan.shape.form][function]
     return Word(
-        f"TRIAX_s{segment}_{name}_{power}",
+        f"s{segment}_{name}_{power}",
         f"{name}, coefficient of x^{power} in segment {segment}",
         offset,
         _method(plan, function, power),
@@ -142,4 +212,4 @@ def _method(plan: Plan, function: int, power: int) -> Method:
         centre += plan.shape.rounding_in_offset
     kind = "OFFSET" if is_offset else "GAIN"
     text = f"coefficient of x^{power}"
-    return Method(f"TRIAX_{kind}_{power}", text, unit, slope, -centre * slope)
+    return Method(f"{kind}_{power}", text, unit, slope, -centre * slope)

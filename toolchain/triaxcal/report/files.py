@@ -41,6 +41,6 @@ def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, byt
         "verification.json": verification_json(delivery),
         "residuals.svg": residuals_svg(delivery),
         **passport_files(unit_passport),
-        names_of(delivery.plan).file("triax_calib.a2l"): calib_a2l(delivery),
+        names_of(delivery.plan).file("triax_calib.a2l"): calib_a2l(delivery.firmware),
         **certificate,
     }

@@ -1,0 +1,56 @@
+"""`triaxcal a2l`: the constants in a linked program, for calibration tools."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from triaxcal.cli.options import DELIVERED, HexNumber, UnitFolder, command, example, say
+
+
+@command(
+    epilog=example(
+        "triaxcal a2l AT-SIM --elf firmware.elf",
+        "triaxcal a2l AT-SIM --elf firmware.elf --can-ids 0x555 0x666",
+    )
+)
+@click.argument("unit", type=UnitFolder(files=True))
+@DELIVERED
+@click.option(
+    "--elf",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="The program as the linker wrote it, with its symbols.",
+)
+@click.option(
+    "--to",
+    type=click.Path(path_type=Path),
+    help="Write this file; default: triax_calib.a2l beside the program.",
+)
+@click.option(
+    "--can-ids",
+    type=(HexNumber(), HexNumber()),
+    metavar="COMMANDS ANSWERS",
+    help="CAN identifiers of the XCP commands and of the answers.",
+)
+@click.option("--bitrate", type=int, help="Bit rate of the bus, bit/s.")
+def a2l(
+    unit: Path,
+    build: Path,
+    *,
+    elf: Path,
+    to: Path | None,
+    can_ids: tuple[int, int] | None,
+    bitrate: int | None,
+) -> None:
+    """Write the A2L of constants that are linked into a program.
+
+    UNIT is a unit, whose calibration is in build/UNIT, or a delivered folder. The constants in the
+    program must be those of the unit. Addresses and byte order are those of the program.
+    """
+    import triaxcal  # noqa: PLC0415
+    from triaxcal.api.delivery import delivered_file  # noqa: PLC0415
+
+    made = triaxcal.firmware(triaxcal.load(delivered_file(unit, build)))
+    say(f"{made.write_a2l(elf, to, can_ids=can_ids, bitrate=bitrate)} written")

@@ -1,0 +1,182 @@
+"""The constants of a unit in the linked program of a user: their address, and their values."""
+
+from __future__ import annotations
+
+import io
+import re
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from triaxcal.base.errors import RefusedError, refused_by_system
+from triaxcal.base.extras import install_command
+from triaxcal.codegen.image import constant_words
+from triaxcal.codegen.names import names_of
+from triaxcal.fixedpoint.plan import Plan
+
+if TYPE_CHECKING:
+    from elftools.elf.elffile import ELFFile
+
+_CONSTANTS = re.compile(r"(\w+)_([0-9a-f]{8})_calib_constants")
+_LINKED = "ET_EXEC", "ET_DYN"
+_WRITABLE, _LOADED = 1, 2
+"""SHF_WRITE and SHF_ALLOC."""
+
+
+@dataclass(frozen=True)
+class Linked:
+    """Constants in a linked program.
+
+    Attributes
+    ----------
+    address, size : int
+        Of the constants.
+    little_endian : bool
+        Byte order of the core.
+    writable : bool
+        True where they stand in memory that the program may write.
+    epk_address : int or None
+        Where the text of TRIAX_CALIB_EPK stands, if the program has it.
+    """
+
+    address: int
+    size: int
+    little_endian: bool
+    writable: bool
+    epk_address: int | None
+
+
+def linked_constants(path: Path, plan: Plan, epk: str) -> Linked:
+    """Find the constants of a plan in an ELF file, and compare them with the plan's integers.
+
+    Raises
+    ------
+    RefusedError
+        When the file is no linked ELF program, has no symbols, has not these constants, or
+        pyelftools is missing.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise refused_by_system(path, "read", error, expected="a linked program") from error
+    try:
+        from elftools.elf.elffile import ELFFile  # noqa: PLC0415  optional
+    except ImportError:
+        raise RefusedError(
+            str(path),
+            "missing package: pyelftools",
+            remedy="install it: " + install_command("production"),
+        ) from None
+    if not content.startswith(b"\x7fELF"):
+        raise RefusedError(
+            str(path),
+            f"begins with {content[:4].hex(' ') or 'nothing'}",
+            expected="an ELF file, as the linker writes it (.elf, .axf, .out)",
+            remedy="not the HEX or the bin that is made of it",
+        )
+    try:
+        return _found(str(path), ELFFile(io.BytesIO(content)), plan, epk)
+    except RefusedError:
+        raise
+    except Exception as error:  # a damaged file makes pyelftools raise errors of many kinds
+        raise RefusedError(
+            str(path),
+            f"damaged, or no whole ELF file: {type(error).__name__} {error}",
+            expected="the file as the linker wrote it",
+        ) from error
+
+
+def _found(place: str, elf: ELFFile, plan: Plan, epk: str) -> Linked:
+    if elf["e_type"] not in _LINKED:
+        raise RefusedError(
+            place,
+            f"not linked ({elf['e_type']}): its addresses are not final",
+            expected="the program as the linker wrote it",
+        )
+    symbol = _symbol(place, elf, plan)
+    section = elf.get_section(symbol["st_shndx"])
+    words = constant_words(plan)
+    at, size = symbol["st_value"] - section["sh_addr"], 4 * len(words)
+    _compare(place, section.data()[at : at + size], words, elf.little_endian)
+    if symbol["st_value"] + size > 2**32:
+        raise RefusedError(
+            place,
+            f"the constants stand at 0x{symbol['st_value']:X}",
+            expected="an address within 32 bits, as ASAP2 has them",
+        )
+    writable = bool(section["sh_flags"] & _WRITABLE)
+    return Linked(symbol["st_value"], size, elf.little_endian, writable, _text_address(elf, epk))
+
+
+def _symbol(place: str, elf: ELFFile, plan: Plan) -> Any:
+    """The symbol of the constants; refused with what there is instead."""
+    symbols = list(_symbols(elf))
+    if not symbols:
+        raise RefusedError(
+            place,
+            "no symbols: the file is stripped",
+            expected="the program as the linker wrote it",
+            remedy="strip a copy, and give the file before",
+        )
+    names = names_of(plan)
+    wanted = f"{names.linked}_calib_constants"
+    defined = {s.name: s for s in symbols if isinstance(s["st_shndx"], int)}
+    if wanted in defined:
+        return defined[wanted]
+    matches = [m for m in map(_CONSTANTS.fullmatch, defined) if m]
+    shapes = sorted({m[2] for m in matches if m[1] == names.triad})
+    if shapes:
+        raise RefusedError(
+            place,
+            f"the constants {names.triad} have the shape {' and '.join(shapes)}",
+            expected=f"the shape {names.shape}",
+            remedy="link the C of this delivery, or name the unit that the program was linked for",
+        )
+    others = sorted(m[0] for m in matches)
+    raise RefusedError(
+        place,
+        f"no symbol {wanted}" + (f", but {', '.join(others)}" if others else ""),
+        expected="a program that uses the constants of this unit",
+        remedy="another prefix is another unit.toml"
+        if others
+        else f"compile {names.file('triax_calib.c')}, and use {names.triad.upper()}_CALIB: "
+        "the linker drops what nobody uses",
+    )
+
+
+def _symbols(elf: ELFFile) -> Iterator[Any]:
+    from elftools.elf.sections import SymbolTableSection  # noqa: PLC0415  optional
+
+    for section in elf.iter_sections():
+        if isinstance(section, SymbolTableSection):
+            yield from section.iter_symbols()
+
+
+def _compare(place: str, content: bytes, words: list[int], little_endian: bool) -> None:
+    """Refuse constants that are not these words."""
+    order = "<" if little_endian else ">"
+    count = len(content) // 4
+    found = struct.unpack(f"{order}{count}i", content[: 4 * count])
+    wrong = [k for k, word in enumerate(words) if k >= count or found[k] != word]
+    if wrong:
+        first = wrong[0]
+        there = found[first] if first < count else "nothing"
+        raise RefusedError(
+            place,
+            f"{len(wrong)} of {len(words)} constants are not those of the unit, the first at byte "
+            f"{4 * first} ({there})",
+            expected=f"{words[first]} there",
+            remedy="link the C of this delivery, or name the unit that the program was linked for",
+        )
+
+
+def _text_address(elf: ELFFile, text: str) -> int | None:
+    """Address of a text in what is loaded."""
+    for section in elf.iter_sections():
+        if section["sh_type"] == "SHT_PROGBITS" and section["sh_flags"] & _LOADED:
+            at = section.data().find(text.encode())
+            if at >= 0:
+                return int(section["sh_addr"]) + at
+    return None
