@@ -8,6 +8,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from hypothesis import settings
 
 from builds import UNITS, Builds
 from plans import COVERING, GOLDEN, random_plan
@@ -15,6 +16,10 @@ from recordings import ABSENT, FOLDER
 from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.routines import Reference
 from triaxcal.delivery.unit import Delivery, deliver
+
+# A deadline would fail tests on a machine that does other work.
+settings.register_profile("any-machine", deadline=None)
+settings.load_profile("any-machine")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

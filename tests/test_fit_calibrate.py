@@ -106,7 +106,7 @@ def test_the_result_is_frozen():
 # Invariances.
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32 - 1))
 def test_the_order_of_rows_does_not_matter(seed):
     data = readings(cubic_truth(), SEVEN, sd_v=1e-6, count=20, spread_degc=0.05, seed=seed % 97)
@@ -124,7 +124,7 @@ def test_the_order_of_rows_does_not_matter(seed):
     )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(-12, 8), st.integers(0, 1000))
 def test_scaling_the_readings_scales_the_constants(power, seed):
     """By a power of two every operation rounds alike: equal to the bit."""

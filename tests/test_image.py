@@ -269,7 +269,7 @@ def test_segments_out_of_order_are_refused(built: dict[str, Built]) -> None:
         assert load(built[name], image_of(words)) == status, (second, third)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     name=st.sampled_from([*COVERING]),
     seed=st.integers(0, 2**32),
@@ -284,7 +284,7 @@ def test_the_loader_keeps_step_r_exactly(
     assert load(built[name], image_bytes(plan)) == (OK if oracle.keeps_step_r(plan) else BAD)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(name=st.sampled_from([*COVERING]), seed=st.integers(0, 2**32), count=st.integers(1, 40))
 def test_any_words_with_a_right_crc_are_refused_or_harmless(
     built: dict[str, Built], name: str, seed: int, count: int

@@ -94,14 +94,14 @@ def compare(plan: Plan, reference: Reference, seed: int, count: int = 10) -> int
     return len(good)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(plan=plans("direct"), seed=st.integers(0, 2**32))
 def test_direct_form_is_the_page(reference: Reference, plan: Plan, seed: int) -> None:
     check_ranges(plan)
     assert compare(plan, reference, seed) > 0
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(plan=plans("inverse"), seed=st.integers(0, 2**32))
 def test_inverse_form_is_the_page(reference: Reference, plan: Plan, seed: int) -> None:
     compare(plan, reference, seed)

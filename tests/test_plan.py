@@ -76,7 +76,7 @@ def adcs(draw: st.DrawFn) -> tuple[int, tuple[int, int]]:
     return bits, (min(low, high), max(low, high))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(adc=adcs())
 def test_raw_shift_is_the_largest_that_fits(adc: tuple[int, tuple[int, int]]) -> None:
     bits, codes = adc
@@ -93,7 +93,7 @@ def test_raw_shift_is_the_largest_that_fits(adc: tuple[int, tuple[int, int]]) ->
 # ---- temperature codes and segments ----
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     low=st.floats(-40.0, 60.0),
     width=st.floats(0.1, 10.0),
@@ -262,7 +262,7 @@ def test_spare_bits_are_as_many_as_fit(method: str, full_scale_v: float, output_
     assert plan.shape.saturates == (spare <= 0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     full_scale_v=st.floats(0.5, 50.0),
     output_q=st.integers(8, 26),

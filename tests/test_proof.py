@@ -120,7 +120,7 @@ def test_no_sample_exceeds_the_bound(name: str) -> None:
     assert compared > 1000
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     name=st.sampled_from([n for n, s in COVERING.items() if s.form == DIRECT]),
     seed=st.integers(0, 2**32),
@@ -281,7 +281,7 @@ def interval(plan: Plan, s: int, f: int) -> list[tuple[int, int]]:
     return reached
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     name=st.sampled_from([*COVERING]),
     seed=st.integers(0, 2**32),

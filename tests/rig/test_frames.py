@@ -59,7 +59,7 @@ def test_columns_pack_as_cantools(name):
 
 
 @given(st.data())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_signal_decodes_as_cantools(data):
     length = data.draw(st.integers(1, 48))
     start = data.draw(st.integers(0, 63))

@@ -56,14 +56,14 @@ def folder() -> object:
         yield unit
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(content=damaged("unit.toml") | st.binary(max_size=300))
 def test_unit_toml(folder: Path, content: bytes) -> None:
     (folder / "unit.toml").write_bytes(content)
     refused_or_read(lambda: read_unit(folder))
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(content=damaged("measurements.csv") | st.binary(max_size=300))
 def test_measurements_csv(folder: Path, content: bytes) -> None:
     unit = read_unit(UNITS / "AT-SIM")
