@@ -230,6 +230,7 @@ def test_a_file_of_version_0_1_0_has_its_constants() -> None:
         ("{", "not JSON"),
         ("[]", "format: missing; expected 1"),
         ('{"format": 2}', "format: found 2; expected 1"),
+        ('{"format": 1, "kind": "dynamic"}', "kind: the calibration of a whole IMU; expected that"),
         ('{"format": 1, "unit": "U"}', "damaged, or no calibration.json: KeyError 'thermal_model'"),
     ],
 )

@@ -220,6 +220,7 @@ def test_a_file_says_whose_it_is(name: str, padding: int, tmp_path: Path) -> Non
         if part.identity is not None:
             assert part.identity.serial == "SN-0042"
     assert sum(part.size for part in found.parts) == len(content)
+    assert found.summary.count("serial number") == (not name.endswith("0.1.0"))
     assert (f"and {padding} of erased flash" in found.summary) == bool(padding)
 
 
@@ -234,9 +235,9 @@ def test_the_command_shows_and_writes(tmp_path: Path) -> None:
         f"  inputs sha256   {'0123456789abcdef' * 4}\n"
         f"  generator       triaxcal {triaxcal.__version__}\n"
         "  axes            -ACC2, ACC1, ACC3\n"
+        "  temperature     0.0625 degC per code, -3.5 degC at code 0\n"
         f"  constants       accelerometer, shape {shape_id(PLAN)}, "
         f"{len(image_bytes(PLAN))} bytes from byte 0\n"
-        "  temperature     0.0625 degC per code, -3.5 degC at code 0\n"
         "  range           -323.5 to 556.5 degC, codes -5120 to 8960\n"
     )
     target = tmp_path / "x.uf2"

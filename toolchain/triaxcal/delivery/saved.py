@@ -213,6 +213,13 @@ def read_saved(path: Path) -> Saved:
             remedy="give a calibration.json of a tilter's or a recording's calibration; another "
             "format needs a triaxcal that knows it",
         )
+    if document.get("kind") == "dynamic":
+        raise RefusedError(
+            f"{path}, kind",
+            "the calibration of a whole IMU",
+            expected="that of an accelerometer from a tilter or a recording",
+            remedy="of an IMU, Python reads it with triaxcal.load_imu",
+        )
     try:
         return _saved(str(path), document)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
