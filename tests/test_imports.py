@@ -26,6 +26,7 @@ MAY_IMPORT = {
     "simulation": {"base", "model", "unit", "readings", "dynamic"},
     "design": {"base", "model", "unit", "dynamic", "simulation"},
     "rig": {"base", "model", "unit", "readings", "simulation"},
+    "device": {"base", "codegen"},
     "keytable": {"base", "unit", "dynamic", "simulation", "design", "rig"},
     "delivery": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
@@ -50,7 +51,9 @@ MAY_IMPORT["api"] = set(MAY_IMPORT)
 
 ONLY_IN = {
     "scipy": {"fitting", "dynamic", "readings"},  # readings: MAT-files
-    "can": {"rig"},
+    "can": {"rig", "device"},
+    "pyxcp": {"device"},
+    "construct": {"device"},  # what pyxcp's answers are parsed with
     "cantools": {"rig"},
     "asammdf": {"rig", "readings"},
     "pyarrow": {"rig", "readings"},

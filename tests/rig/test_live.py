@@ -23,11 +23,12 @@ from test_cli_rig import bench_copy, triaxcal
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.rig import rig
-from triaxcal.rig.canbus import BusSource, messages_of, open_bus
+from triaxcal.rig.canbus import BusSource, messages_of
 from triaxcal.rig.candump import parse
 from triaxcal.rig.check import findings
 from triaxcal.rig.frames import empty
 from triaxcal.rig.journal import read_journal
+from triaxcal.rig.openbus import open_bus
 from triaxcal.rig.recording import JOURNAL_FILE, Recording
 from triaxcal.rig.runner import live
 from triaxcal.rig.samples import SampleDecoder

@@ -16,7 +16,7 @@ from triaxcal.cli.options import HELP, UnitFolder, WithKinds, example, unit_and_
 
 SECTIONS = {
     "Calibrate": ("calib", "dynamic", "batch"),
-    "In the field": ("check", "update"),
+    "In the field": ("check", "update", "device"),
     "Look at readings and results": ("diagnose", "poses", "drift", "crosscoupling", "history"),
     "Into production": ("image", "a2l"),
     "Check the generated C": ("verify", "target"),

@@ -197,7 +197,7 @@ def simulate(setup: Setup, bus: BusChoice, seconds: float | None, hold: int) -> 
     It turns through the plan's positions.
     """
     from triaxcal.cli.rig_live import simulate_on  # noqa: PLC0415
-    from triaxcal.rig.canbus import open_bus  # noqa: PLC0415
+    from triaxcal.rig.openbus import open_bus  # noqa: PLC0415
 
     name = bus.name if ":" in bus.name else f"socketcan:{bus.name}"
     sender = open_bus(name, setup.plan.layout == "fd")

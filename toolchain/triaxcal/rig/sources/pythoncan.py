@@ -6,7 +6,8 @@ from triaxcal.rig.source import Source, SourceKind, Wanted
 
 
 def _open(wanted: Wanted) -> Source:
-    from triaxcal.rig.canbus import BusSource, open_bus  # noqa: PLC0415
+    from triaxcal.rig.canbus import BusSource  # noqa: PLC0415
+    from triaxcal.rig.openbus import open_bus  # noqa: PLC0415
 
     return BusSource(open_bus(wanted.bus, wanted.fd), wanted.bus)
 

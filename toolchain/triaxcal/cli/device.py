@@ -1,0 +1,212 @@
+"""`triaxcal device`: the calibration in the unit at the other end of a CAN cable."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+from collections.abc import Callable, Iterator
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from triaxcal.base.errors import RefusedError, refused_by_system
+from triaxcal.base.extras import install_command
+from triaxcal.cli.options import HELP, HexNumber, UnitFolder, example, say
+
+if TYPE_CHECKING:
+    from triaxcal.device.link import Link
+    from triaxcal.device.unit import Node
+
+_NEEDED = ("can", "pyxcp")
+Opener = Callable[[], "contextlib.AbstractContextManager[Link]"]
+
+
+@click.group(
+    context_settings=HELP,
+    epilog=example("triaxcal device identify --bus can0", "triaxcal device flash --help"),
+)
+def device() -> None:
+    """Identify, read, flash and verify a unit over XCP on CAN.
+
+    The unit runs the XCP slave of firmware_ref/xcp.
+    """
+
+
+def _node_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options that say which node; `command` gets `opener`, which connects to it."""
+
+    @wraps(command)
+    def with_opener(bus: str, request_id: int, response_id: int, **others: Any) -> None:
+        command(opener=lambda: _connected(bus, request_id, response_id), **others)
+
+    options = (
+        click.option(
+            "--bus", required=True, help="A CAN device, or interface:channel of python-can."
+        ),
+        click.option(
+            "--request-id", type=HexNumber(), default="0x650", show_default=True,
+            help="CAN id of what the node takes; bit 31 for 29-bit ids.",
+        ),
+        click.option(
+            "--response-id", type=HexNumber(), default="0x651", show_default=True,
+            help="CAN id of what it sends.",
+        ),
+    )  # fmt: skip
+    optioned = with_opener
+    for option in reversed(options):
+        optioned = option(optioned)
+    return optioned
+
+
+@contextlib.contextmanager
+def _connected(bus: str, request_id: int, response_id: int) -> Iterator[Link]:
+    missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise RefusedError(
+            "triaxcal device",
+            "missing packages: " + ", ".join(missing),
+            remedy="install them: " + install_command("device"),
+        )
+    from triaxcal.device.link import Link  # noqa: PLC0415
+    from triaxcal.rig.openbus import open_bus  # noqa: PLC0415
+
+    opened = open_bus(bus if ":" in bus else f"socketcan:{bus}", fd=False)
+    with contextlib.closing(Link(opened, bus, request_id, response_id)) as link:
+        yield link
+
+
+@device.command(epilog=example("triaxcal device identify --bus can0"))
+@_node_options
+def identify(opener: Opener) -> None:
+    """Show who a node is, and whose calibration it has in flash."""
+    from triaxcal.device.unit import identify as ask  # noqa: PLC0415
+
+    with opener() as link:
+        say(_about(link.name, ask(link)))
+
+
+def _about(name: str, node: Node) -> str:
+    from triaxcal.report.image import image_text  # noqa: PLC0415
+
+    info = node.info
+    rows = [
+        ("hardware", node.hardware or "no serial number of its own"),
+        ("firmware", node.firmware or "no version"),
+        ("takes", f"shape {info.shape:08x}, {info.file_size} bytes"),
+        ("uses", "the calibration in RAM" if info.page_used else "the calibration in flash"),
+    ]
+    if node.part is None:
+        rows[-1] = ("flash", "no calibration: uses that in its program")
+    lines = [name, *(f"  {key:<15} {value}" for key, value in rows)]
+    if node.part is None:
+        return "\n".join(lines)
+    where = f"slot {info.slot}, store {info.sequence}"
+    return "\n".join([*lines, image_text(f"flash, {where}", node.content, (node.part,))])
+
+
+@device.command(epilog=example("triaxcal device read found.bin --bus can0"))
+@click.argument("file", type=click.Path(path_type=Path))
+@_node_options
+def read(opener: Opener, file: Path) -> None:
+    """Read the calibration in a node's flash into FILE.
+
+    `triaxcal image FILE` shows it, and writes it in other formats.
+    """
+    from triaxcal.base.publish import renew  # noqa: PLC0415
+    from triaxcal.device.unit import identify as ask  # noqa: PLC0415
+
+    with opener() as link:
+        node = ask(link)
+        name = link.name
+    if node.part is None:
+        raise RefusedError(name, "no calibration in flash", remedy="nothing was written")
+    renew({file.name: node.content}, file.parent)
+    say(f"{file} written: {node.serial}, {len(node.content)} bytes, every CRC is correct")
+
+
+@device.command(
+    epilog=example(
+        "triaxcal device flash build/AT-7/triax_calib.bin --bus can0",
+        "triaxcal device flash build/AT-7/triax_calib.bin --bus can0 --power-cycle",
+    )
+)
+@click.argument("file", type=click.Path(path_type=Path))
+@_node_options
+@click.option("--power-cycle", is_flag=True, help="Ask for one, and read the calibration again.")
+@click.option(
+    "--replaces", default="", metavar="SERIAL", help="The node's serial number until now."
+)
+def flash(opener: Opener, file: Path, power_cycle: bool, replaces: str) -> None:
+    """Store a calibration in a node's flash.
+
+    FILE is a triax_calib.bin. It is read back and compared. If anything fails, the calibration in
+    use before is still in use.
+    """
+    from triaxcal.device.unit import flash as store  # noqa: PLC0415
+
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise refused_by_system(file, "read", error) from error
+    with opener() as link:
+        asked = _ask_for_power_cycle if power_cycle else None
+        info = store(link, content, str(file), replaces, asked)
+        name = link.name
+    again = ", after the power cycle too" if power_cycle else ""
+    say(f"{name}: {file} is in use from slot {info.slot}, read back and equal{again}")
+
+
+def _ask_for_power_cycle() -> None:
+    click.prompt(
+        "Switch the unit off and on, then press Enter",
+        default="",
+        show_default=False,
+        prompt_suffix="",
+    )
+
+
+@device.command(
+    epilog=example(
+        "triaxcal device verify AT-7 --bus can0",
+        "triaxcal device verify AT-7 --bus can0 --samples 1000",
+    )
+)
+@click.argument("unit", type=UnitFolder())
+@_node_options
+@click.option("--samples", type=click.IntRange(min=2), default=100, show_default=True)
+def verify(opener: Opener, unit: Path, samples: int) -> None:
+    """Compare a node's samples with the integer model.
+
+    Result and status of each must be equal bit for bit. The node must have this UNIT's
+    calibration in use.
+    """
+    from triaxcal.codegen.crosscheck import python_routine  # noqa: PLC0415
+    from triaxcal.delivery.unit import deliver  # noqa: PLC0415
+    from triaxcal.device.compare import compare, take_samples  # noqa: PLC0415
+    from triaxcal.device.unit import require_in_use  # noqa: PLC0415
+
+    delivery = deliver(unit)
+    plan = delivery.plan
+    if plan.rate is not None:
+        raise RefusedError(str(unit), "a term in dT/dt", expected="none: not verified on a device")
+    with opener() as link:
+        content = next(c for n, c in delivery.files.items() if n.endswith("_calib.bin"))
+        node = require_in_use(link, content, str(unit))
+        found = compare(take_samples(link, samples), python_routine(plan), plan.shape.output_q)
+        name = link.name
+    if found.differing:
+        raise RefusedError(
+            name,
+            f"{found.differing} of {found.samples} samples differ, by {found.largest_lsb} LSB at "
+            f"most; {found.first}",
+            remedy="the node does not run this unit's triax_comp.c",
+        )
+    say(
+        f"{name}: verified on device {node.serial}\n"
+        f"  samples         {found.samples}, largest difference 0 LSB; "
+        f"{found.flagged} with a status other than 0\n"
+        f"  |a| - g         {found.norm_error_mg:+.3f} mg of the mean, standard error "
+        f"{found.norm_error_sd_mg:.3f} mg; for a unit at rest only"
+    )

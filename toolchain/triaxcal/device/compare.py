@@ -1,0 +1,129 @@
+"""Raw and compensated samples of a node beside the integer model, bit for bit."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.device.link import SAMPLE, SAMPLE_SIZE, Link
+
+Int32Array = npt.NDArray[np.int32]
+Routine = Callable[[Int32Array, Int32Array], tuple[Int32Array, npt.NDArray[np.uint32]]]
+"""Temperature codes (n,) and raw codes (n, 3) to accelerations (n, 3) and status (n,)."""
+
+_SAMPLE = struct.Struct("<Iii3i3iI")
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What a node has measured and compensated.
+
+    Attributes
+    ----------
+    temp : array of int32, shape (n,)
+        Temperature codes.
+    raw, accel : array of int32, shape (n, 3)
+        Raw codes, and what the node made of them, in 2^-Q g.
+    status : array of uint32, shape (n,)
+        Status of each sample.
+    """
+
+    temp: Int32Array
+    raw: Int32Array
+    accel: Int32Array
+    status: npt.NDArray[np.uint32]
+
+    def __len__(self) -> int:
+        return len(self.temp)
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How the samples of a node compare with the integer model.
+
+    Attributes
+    ----------
+    samples : int
+        How many, all different ones.
+    differing : int
+        Those of which a bit of the result or of the status differs.
+    largest_lsb : int
+        Largest difference of a component, in 2^-Q g.
+    first : str
+        The first sample that differs, with both answers; "" where none does.
+    flagged : int
+        Samples whose status is not 0.
+    norm_error_mg : float
+        Length of the mean specific force, minus 1 g.
+    norm_error_sd_mg : float
+        Standard error of that by the scatter of |a|, as if the samples were independent.
+    """
+
+    samples: int
+    differing: int
+    largest_lsb: int
+    first: str
+    flagged: int
+    norm_error_mg: float
+    norm_error_sd_mg: float
+
+
+def take_samples(link: Link, count: int) -> Samples:
+    """Take samples, each a new one.
+
+    Raises
+    ------
+    RefusedError
+        When the node does not answer, or gives the same sample again and again.
+    """
+    rows: list[tuple[int, ...]] = []
+    repeated = 0
+    while len(rows) < count:
+        row = _SAMPLE.unpack(link.read(SAMPLE, 0, SAMPLE_SIZE))
+        if rows and row[0] == rows[-1][0]:
+            repeated += 1
+            if repeated > 10 * count + 100:
+                raise RefusedError(
+                    link.name, f"sample {row[0]} again and again", remedy="does the sensor run?"
+                )
+            continue
+        rows.append(row)
+    table = np.array(rows, np.int64)
+    return Samples(
+        table[:, 1].astype(np.int32),
+        table[:, 3:6].astype(np.int32),
+        table[:, 6:9].astype(np.int32),
+        table[:, 9].astype(np.uint32),
+    )
+
+
+def compare(samples: Samples, routine: Routine, output_q: int) -> Agreement:
+    """Hold a node's results against the routine's; `output_q` is the Q of its accelerations."""
+    accel, status = routine(samples.temp, samples.raw)
+    difference = np.abs(accel.astype(np.int64) - samples.accel)
+    differs = (difference > 0).any(axis=1) | (status != samples.status)
+    first = ""
+    if differs.any():
+        i = int(differs.argmax())
+        first = (
+            f"sample {i}, temp_code {samples.temp[i]}, raw_code {samples.raw[i].tolist()}: "
+            f"{samples.accel[i].tolist()} status {samples.status[i]}, "
+            f"expected {accel[i].tolist()} status {status[i]}"
+        )
+    force_g = samples.accel * 2.0**-output_q
+    norms = np.linalg.norm(force_g, axis=1)
+    n = len(samples)
+    return Agreement(
+        samples=n,
+        differing=int(differs.sum()),
+        largest_lsb=int(difference.max()),
+        first=first,
+        flagged=int((samples.status != 0).sum()),
+        norm_error_mg=1e3 * (float(np.linalg.norm(force_g.mean(axis=0))) - 1),
+        norm_error_sd_mg=1e3 * float(norms.std(ddof=1)) / float(np.sqrt(n)) if n > 1 else np.nan,
+    )

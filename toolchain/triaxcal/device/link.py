@@ -1,0 +1,343 @@
+"""One node on a bus: reading, writing and storing, whatever frames are lost or come twice.
+
+A command that gets no answer, or another one than it can have, is repeated after a SYNCH. What was
+read or written counts only when the node's CRC over it is the same.
+"""
+
+from __future__ import annotations
+
+import logging
+import struct
+import time
+import zlib
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
+
+import can
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.device.master import (
+    Command,
+    ConstructError,
+    Master,
+    XcpResponseError,
+    XcpTimeoutError,
+    create_application_from_config,
+)
+
+T = TypeVar("T")
+
+REQUEST_ID, RESPONSE_ID = 0x650, 0x651
+"""CAN ids of the example node."""
+FILE, INFO, SAMPLE = 0, 1, 2
+"""Address extensions, as triax_xcp.h has them."""
+FLASH_PAGE, RAM_PAGE = 0, 1
+INFO_SIZE, SAMPLE_SIZE = 32, 40
+INFO_VERSION = 1
+BUSY, DONE = 1, 2
+"""Status of a store, as triax_store.h has it."""
+ANSWER_S = 0.5
+"""Longest time for an answer. Nodes answer in milliseconds."""
+STORE_S = 30.0
+"""Longest time for a store. Erasing a large sector takes seconds, in which a node may be silent."""
+QUIET_S = 0.02
+"""After a disturbance: what is on its way has come by then."""
+ATTEMPTS = 5
+_UPLOAD, _DOWNLOAD = 7, 6
+_FOR_XCP, _FOR_APPLICATION = 0x02, 0x01
+_STORE_CAL_REQ = 1
+_ASCII, _EPK = 0, 5
+
+_MEANINGS = {
+    0x20: "it does not know the command",
+    0x22: "the address is outside of what the node has",
+    0x23: "the page is write-protected",
+    0x24: "it has no calibration in flash",
+    0x26: "the page holds no calibration that its loader accepts",
+}
+_STORE_MEANINGS = {
+    3: "its loader refuses the calibration",
+    4: "the flash cannot be erased",
+    5: "the flash cannot be written",
+}
+
+
+class SilentError(RefusedError):
+    """The node gives no answer, or none that the command can have."""
+
+
+class AnsweredError(RefusedError):
+    """The node answers with an error of XCP."""
+
+
+@dataclass(frozen=True)
+class Info:
+    """What a node says of itself: words of address extension 1."""
+
+    version: int
+    shape: int
+    file_size: int
+    slot: int
+    sequence: int
+    store: int
+    slot_size: int
+    page_used: int
+
+
+class Link:
+    """A node behind a bus of python-can, connected.
+
+    Parameters
+    ----------
+    bus : can.BusABC
+        Open; closed with the link.
+    name : str
+        The bus, for messages.
+    request_id, response_id : int
+        CAN ids of what the node takes and sends.
+    answer_s, store_s : float
+        Longest time for an answer and for a store, seconds.
+
+    Raises
+    ------
+    RefusedError
+        When no node answers, or the node is none of triaxcal's.
+    """
+
+    def __init__(
+        self,
+        bus: can.BusABC,
+        name: str,
+        request_id: int = REQUEST_ID,
+        response_id: int = RESPONSE_ID,
+        *,
+        answer_s: float = ANSWER_S,
+        store_s: float = STORE_S,
+    ) -> None:
+        self.name = f"{name}, node {request_id:#x}"
+        self._bus = bus
+        self._answer_s, self._store_s = answer_s, store_s
+        settings = {
+            "Transport": {"CAN": {"can_id_master": request_id, "can_id_slave": response_id}},
+            "General": {"disable_error_handling": True, "diagnostics_on_failure": False},
+        }
+        application = create_application_from_config(settings, log_level=logging.CRITICAL)
+        application.transport.timeout = answer_s
+        self._master = Master("can", config=application, transport_layer_interface=bus)
+        self._master.transport.connect()
+        try:
+            self.connect()
+        except BaseException:
+            self.close()
+            raise
+
+    def connect(self) -> Info:
+        """CONNECT, as after a power cycle too."""
+        self._repeat("CONNECT", self._master.connect)
+        try:
+            info = self.info()
+        except AnsweredError as error:
+            raise self._foreign(f"its answer to a read of extension {INFO} is an error") from error
+        if info.version != INFO_VERSION:
+            raise self._foreign(f"its information has version {info.version}")
+        return info
+
+    def _foreign(self, found: str) -> RefusedError:
+        return RefusedError(
+            self.name,
+            f"an XCP node, but {found}",
+            expected=f"firmware_ref/xcp, version {INFO_VERSION}",
+            remedy="check --request-id and --response-id",
+        )
+
+    def close(self) -> None:
+        """Disconnect, and close the bus."""
+        with suppress(XcpTimeoutError, XcpResponseError, ConstructError, can.CanError, OSError):
+            self._master.disconnect()
+        self._master.close()
+        self._bus.shutdown()
+
+    def info(self) -> Info:
+        """What the node says of itself now."""
+        return Info(*struct.unpack("<8I", self.read(INFO, 0, INFO_SIZE)))
+
+    def texts(self) -> tuple[str, str]:
+        """Serial number of the hardware, and version of its firmware; "" where it has none."""
+        return self._text(_ASCII), self._text(_EPK)
+
+    def _text(self, kind: int) -> str:
+        def ask() -> bytes:
+            (length,) = struct.unpack("<3xI", self._request(Command.GET_ID, bytes([kind]), 7))
+            if length > 256:
+                raise ValueError(length)
+            data = b""
+            while len(data) < length:
+                data += self._upload(min(_UPLOAD, length - len(data)))
+            return data
+
+        return self._repeat("GET_ID", ask).decode(errors="replace")
+
+    def use(self, page: int) -> None:
+        """Let the application take its constants from a page."""
+        self._set_page(_FOR_APPLICATION, page)
+
+    def choose(self, page: int) -> None:
+        """Read and write a page from now on."""
+        self._set_page(_FOR_XCP, page)
+
+    def _set_page(self, mode: int, page: int) -> None:
+        data = bytes([mode, 0, page])
+        self._repeat("SET_CAL_PAGE", lambda: self._request(Command.SET_CAL_PAGE, data))
+
+    def read(self, extension: int, address: int, size: int) -> bytes:
+        """Bytes from an address on.
+
+        Raises
+        ------
+        RefusedError
+            When the node gives none, or others each time.
+        """
+        for _ in range(ATTEMPTS):
+            data = self._read_once(extension, address, size)
+            # A new sample is taken where address 0 is set.
+            skipped = 1 if extension == SAMPLE else 0
+            if self._crc(extension, address + skipped, size - skipped) == zlib.crc32(
+                data[skipped:]
+            ):
+                return data
+            self._synchronise()
+        raise self._disturbed("read")
+
+    def write(self, data: bytes) -> None:
+        """Write the RAM page from its first byte on, and check its CRC."""
+        for _ in range(ATTEMPTS):
+            self._write_once(data)
+            if self._crc(FILE, 0, len(data)) == zlib.crc32(data):
+                return
+            self._synchronise()
+        raise self._disturbed("written")
+
+    def _disturbed(self, what: str) -> RefusedError:
+        return RefusedError(
+            self.name,
+            f"what is {what} has another CRC in the node, {ATTEMPTS} times",
+            remedy="look for a second node or master with these CAN ids",
+        )
+
+    def store(self) -> Info:
+        """Have the RAM page stored in flash, and wait until it is.
+
+        Raises
+        ------
+        RefusedError
+            When the node refuses or fails, or is not ready in time.
+        """
+        end = time.monotonic() + self._store_s
+        with suppress(SilentError):
+            request = bytes([_STORE_CAL_REQ, 0, 0])
+            self._repeat("SET_REQUEST", lambda: self._request(Command.SET_REQUEST, request))
+        info = None
+        while info is None or info.store == BUSY:
+            if time.monotonic() > end:
+                raise RefusedError(self.name, f"has not stored within {self._store_s:g} s")
+            with suppress(SilentError):
+                info = self.info()
+        if info.store != DONE:
+            raise RefusedError(
+                self.name,
+                f"has not stored: {_STORE_MEANINGS.get(info.store, 'no store was begun')}",
+                remedy="the calibration before is still in use",
+            )
+        return info
+
+    def _read_once(self, extension: int, address: int, size: int) -> bytes:
+        data = b""
+        while len(data) < size:
+            at, count = address + len(data), min(_UPLOAD, size - len(data))
+            step = self._placed(extension, at, partial(self._upload, count))
+            data += self._repeat("UPLOAD", step)
+        return data
+
+    def _write_once(self, data: bytes) -> None:
+        for at in range(0, len(data), _DOWNLOAD):
+            part = data[at : at + _DOWNLOAD]
+            order = bytes([len(part)]) + part
+            step = self._placed(FILE, at, partial(self._request, Command.DOWNLOAD, order))
+            self._repeat("DOWNLOAD", step)
+
+    def _placed(self, extension: int, address: int, then: Callable[[], T]) -> Callable[[], T]:
+        """An order whose address is set before it, so that it can be repeated."""
+
+        def run() -> T:
+            place = struct.pack("<2xBI", extension, address)
+            self._request(Command.SET_MTA, place)
+            return then()
+
+        return run
+
+    def _upload(self, count: int) -> bytes:
+        return self._request(Command.UPLOAD, bytes([count]), count)
+
+    def _crc(self, extension: int, address: int, size: int) -> int:
+        order = partial(self._request, Command.BUILD_CHECKSUM, struct.pack("<3xI", size), 7)
+        answer = self._repeat("BUILD_CHECKSUM", self._placed(extension, address, order))
+        return int.from_bytes(answer[3:7], "little")
+
+    def _request(self, command: Command, data: bytes, size: int = 0) -> bytes:
+        """The `size` bytes of an answer behind its first.
+
+        pyxcp's own methods for reading wait for ever when an answer is too short, as that to
+        another command is.
+        """
+        self._clear()
+        answer = bytes(self._master.transport.request(command, *data))
+        if len(answer) != size:
+            raise ValueError(answer)
+        return answer
+
+    def _repeat(self, command: str, ask: Callable[[], T]) -> T:
+        """The answer to a command that may be repeated."""
+        refused: RefusedError | None = None
+        for _ in range(ATTEMPTS):
+            try:
+                return ask()
+            except XcpTimeoutError:
+                refused = self._silent(command, f"no answer within {self._answer_s:g} s")
+            except XcpResponseError as error:
+                refused = self._answered(command, error)
+            except (ConstructError, struct.error, ValueError, IndexError, TypeError):
+                refused = self._silent(command, "an answer that belongs to another command")
+            except (can.CanError, OSError) as error:
+                raise RefusedError(self.name, f"the bus cannot be written: {error}") from error
+            if command != "CONNECT":  # before which SYNCH has no answer
+                self._synchronise()
+        assert refused is not None
+        raise refused
+
+    def _answered(self, command: str, error: XcpResponseError) -> AnsweredError:
+        code = error.get_error_code()
+        meaning = _MEANINGS.get(int(code), "see the XCP standard")
+        return AnsweredError(f"{self.name}, {command}", f"the node answers {code}: {meaning}")
+
+    def _silent(self, command: str, found: str) -> SilentError:
+        return SilentError(
+            f"{self.name}, {command}",
+            f"{found}, {ATTEMPTS} times",
+            remedy="check the node's power, its bit rate, --request-id and --response-id",
+        )
+
+    def _clear(self) -> None:
+        """Forget answers that nobody waits for."""
+        self._master.transport.resQueue.clear()
+
+    def _synchronise(self) -> None:
+        """Have the node answer a SYNCH, whose answer is that of no other command."""
+        for _ in range(2):
+            time.sleep(QUIET_S)
+            self._clear()
+            with suppress(XcpTimeoutError, XcpResponseError, ConstructError):
+                if bytes(self._master.transport.request(Command.SYNCH)) == b"\0":
+                    break
