@@ -18,6 +18,7 @@ import triaxcal
 from triaxcal.base.extras import install_command
 from triaxcal.cli.main import main
 from triaxcal.codegen.elf import Linked, linked_constants
+from triaxcal.codegen.image import constant_words
 from triaxcal.codegen.names import names_of
 from triaxcal.delivery.firmware import Firmware, make_firmware
 from triaxcal.delivery.saved import calibration_json
@@ -140,6 +141,58 @@ def test_without_the_text_there_is_no_address_of_the_epk(made: Firmware, tmp_pat
     assert "DATA FLASH INTERN" in text
 
 
+LOADS = """
+#include "triax_comp.h"
+triax_calib_t calib;
+static triax_calib_t other;
+int twice;
+int main(void)
+{
+    static const uint8_t image[TRIAX_FILE_SIZE];
+    triax_calib_load(&other, image, 1);
+    return (int)triax_calib_load(&calib, image, TRIAX_FILE_SIZE);
+}
+"""
+
+
+def test_a_variable_that_is_loaded_from_an_image(made: Firmware, tmp_path: Path) -> None:
+    for name, content in made.files.items():
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "main.c").write_text(LOADS, encoding="ascii")
+    (tmp_path / "more.c").write_text("static int other[3]; int *kept = other;\n", encoding="ascii")
+    command = ["gcc", "main.c", "more.c", "triax_comp.c", "-o", "fw.elf"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    elf = tmp_path / "fw.elf"
+    linked = linked_constants(elf, made.plan, "", "calib")
+    listed = subprocess.run(["nm", elf], capture_output=True, text=True, check=True).stdout
+    found = re.search(r"^(\w+) \w calib$", listed, re.MULTILINE)
+    assert found is not None
+    assert (linked.address, linked.writable) == (int(found[1], 16), True)
+    assert linked.size == 4 * len(constant_words(made.plan))
+    text = calib_a2l(made, linked).decode()
+    assert addresses(text)["TRIAX_temp_max"] == linked.address + 4
+    assert 'SYMBOL_LINK "calib" 4\n' in text
+    assert "DATA RAM INTERN" in text
+    for variable, told in (
+        ("none", f"{elf}: no variable none; expected one triax_calib_t of this name; give its"),
+        ("other", f"{elf}: 2 variables other; expected one triax_calib_t of this name; give it a"),
+        ("twice", f"{elf}: twice has 4 bytes; expected the 260 bytes of triax_calib_t of this"),
+    ):
+        with pytest.raises(triaxcal.RefusedError) as refusal:
+            linked_constants(elf, made.plan, "", variable)
+        assert str(refusal.value).startswith(told)
+    # The size is the same, the conversions are not.
+    other_q = replace(made.plan, shape=replace(made.plan.shape, output_q=23))
+    with pytest.raises(triaxcal.RefusedError) as refusal:
+        linked_constants(elf, other_q, "", "calib")
+    shapes = [names_of(plan).shape for plan in (made.plan, other_q)]
+    assert f"the routine triax has the shape {shapes[0]}; expected the shape {shapes[1]}" in (
+        str(refusal.value)
+    )
+    with pytest.raises(triaxcal.RefusedError, match="routine left has no name with a shape"):
+        linked_constants(elf, replace(made.plan, prefix="left"), "", "calib")
+
+
 @pytest.mark.parametrize("extended", [False, True])
 def test_another_parser_reads_segment_epk_and_xcp(
     made: Firmware, tmp_path: Path, extended: bool
@@ -148,7 +201,7 @@ def test_another_parser_reads_segment_epk_and_xcp(
     from pya2l import model
     from pya2l.aml.ifdata_parser import IfDataParser
 
-    linked = Linked(0x0800048C, 260, not extended, extended, 0x0800046C)
+    linked = Linked("calib", 0x0800048C, 260, not extended, extended, 0x0800046C)
     ids = (0x18FF0001, 0x18FF0002) if extended else (0x555, 0x666)
     path = tmp_path / "fw.a2l"
     path.write_bytes(calib_a2l(made, linked, XcpOnCan(*ids, None if extended else 500_000)))

@@ -153,6 +153,7 @@ class Firmware:
         elf: str | Path,
         path: str | Path | None = None,
         *,
+        variable: str | None = None,
         can_ids: tuple[int, int] | None = None,
         bitrate: int | None = None,
     ) -> Path:
@@ -164,6 +165,9 @@ class Firmware:
             The program as the linker wrote it, with its symbols.
         path : path or None
             File to write; None is triax_calib.a2l beside the program.
+        variable : str or None
+            A `triax_calib_t` that the program loads from an image. None is the constants that
+            triax_calib.c defines; they must be these.
         can_ids : tuple of two int, or None
             CAN identifiers of the XCP commands and of the answers; above 0x7FF they are extended
             ones. None leaves XCP on CAN to the tool.
@@ -183,7 +187,7 @@ class Firmware:
             raise RefusedError("bitrate", "stated", expected="CAN identifiers as well")
         xcp = None if can_ids is None else XcpOnCan(*can_ids, bitrate)
         program = Path(elf)
-        linked = linked_constants(program, self.plan, self._made.provenance.epk)
+        linked = linked_constants(program, self.plan, self._made.provenance.epk, variable)
         name = names_of(self.plan).file("triax_calib.a2l")
         target = program.with_name(name) if path is None else Path(path)
         renew({target.name: calib_a2l(self._made, linked, xcp)}, target.parent)

@@ -13,6 +13,7 @@ from triaxcal.cli.options import DELIVERED, HexNumber, UnitFolder, command, exam
     epilog=example(
         "triaxcal a2l AT-SIM --elf firmware.elf",
         "triaxcal a2l AT-SIM --elf firmware.elf --can-ids 0x555 0x666",
+        "triaxcal a2l AT-SIM --elf firmware.elf --variable calib",
     )
 )
 @click.argument("unit", type=UnitFolder(files=True))
@@ -29,6 +30,10 @@ from triaxcal.cli.options import DELIVERED, HexNumber, UnitFolder, command, exam
     help="Write this file; default: triax_calib.a2l beside the program.",
 )
 @click.option(
+    "--variable",
+    help="Variable that the program loads an image into, in place of its linked constants.",
+)
+@click.option(
     "--can-ids",
     type=(HexNumber(), HexNumber()),
     metavar="COMMANDS ANSWERS",
@@ -41,16 +46,18 @@ def a2l(
     *,
     elf: Path,
     to: Path | None,
+    variable: str | None,
     can_ids: tuple[int, int] | None,
     bitrate: int | None,
 ) -> None:
-    """Write the A2L of constants that are linked into a program.
+    """Write the A2L of the constants in a linked program.
 
-    UNIT is a unit, whose calibration is in build/UNIT, or a delivered folder. The constants in the
-    program must be those of the unit. Addresses and byte order are those of the program.
+    UNIT is a unit, whose calibration is in build/UNIT, or a delivered folder. Constants that are
+    linked into the program must be those of the unit. Addresses and byte order are the program's.
     """
     import triaxcal  # noqa: PLC0415
     from triaxcal.api.delivery import delivered_file  # noqa: PLC0415
 
     made = triaxcal.firmware(triaxcal.load(delivered_file(unit, build)))
-    say(f"{made.write_a2l(elf, to, can_ids=can_ids, bitrate=bitrate)} written")
+    path = made.write_a2l(elf, to, variable=variable, can_ids=can_ids, bitrate=bitrate)
+    say(f"{path} written")

@@ -31,6 +31,8 @@ class Linked:
 
     Attributes
     ----------
+    symbol : str
+        Their name in the program.
     address, size : int
         Of the constants.
     little_endian : bool
@@ -41,6 +43,7 @@ class Linked:
         Where the text of TRIAX_CALIB_EPK stands, if the program has it.
     """
 
+    symbol: str
     address: int
     size: int
     little_endian: bool
@@ -48,8 +51,11 @@ class Linked:
     epk_address: int | None
 
 
-def linked_constants(path: Path, plan: Plan, epk: str) -> Linked:
-    """Find the constants of a plan in an ELF file, and compare them with the plan's integers.
+def linked_constants(path: Path, plan: Plan, epk: str, variable: str | None = None) -> Linked:
+    """Find the constants of a plan in an ELF file.
+
+    Constants that `triax_calib.c` defines are compared with the plan's integers. `variable` names a
+    `triax_calib_t` that the program loads from an image instead; its size is compared.
 
     Raises
     ------
@@ -77,7 +83,7 @@ def linked_constants(path: Path, plan: Plan, epk: str) -> Linked:
             remedy="not the HEX or the bin that is made of it",
         )
     try:
-        return _found(str(path), ELFFile(io.BytesIO(content)), plan, epk)
+        return _found(str(path), ELFFile(io.BytesIO(content)), plan, epk, variable)
     except RefusedError:
         raise
     except Exception as error:  # a damaged file makes pyelftools raise errors of many kinds
@@ -88,30 +94,39 @@ def linked_constants(path: Path, plan: Plan, epk: str) -> Linked:
         ) from error
 
 
-def _found(place: str, elf: ELFFile, plan: Plan, epk: str) -> Linked:
+def _found(place: str, elf: ELFFile, plan: Plan, epk: str, variable: str | None) -> Linked:
     if elf["e_type"] not in _LINKED:
         raise RefusedError(
             place,
             f"not linked ({elf['e_type']}): its addresses are not final",
             expected="the program as the linker wrote it",
         )
-    symbol = _symbol(place, elf, plan)
-    section = elf.get_section(symbol["st_shndx"])
+    symbols = _defined(place, elf)
     words = constant_words(plan)
-    at, size = symbol["st_value"] - section["sh_addr"], 4 * len(words)
-    _compare(place, section.data()[at : at + size], words, elf.little_endian)
-    if symbol["st_value"] + size > 2**32:
+    size = 4 * len(words)
+    if variable is None:
+        symbol = _symbol(place, symbols, plan)
+    else:
+        _refuse_other_routine(place, symbols, plan)
+        symbol = _variable(place, symbols, variable, size)
+    section = elf.get_section(symbol["st_shndx"])
+    address = symbol["st_value"]
+    if variable is None:
+        at = address - section["sh_addr"]
+        _compare(place, section.data()[at : at + size], words, elf.little_endian)
+    if address + size > 2**32:
         raise RefusedError(
             place,
-            f"the constants stand at 0x{symbol['st_value']:X}",
+            f"the constants stand at 0x{address:X}",
             expected="an address within 32 bits, as ASAP2 has them",
         )
     writable = bool(section["sh_flags"] & _WRITABLE)
-    return Linked(symbol["st_value"], size, elf.little_endian, writable, _text_address(elf, epk))
+    text_at = _text_address(elf, epk)
+    return Linked(symbol.name, address, size, elf.little_endian, writable, text_at)
 
 
-def _symbol(place: str, elf: ELFFile, plan: Plan) -> Any:
-    """The symbol of the constants; refused with what there is instead."""
+def _defined(place: str, elf: ELFFile) -> list[Any]:
+    """Symbols that stand in a section."""
     symbols = list(_symbols(elf))
     if not symbols:
         raise RefusedError(
@@ -120,9 +135,52 @@ def _symbol(place: str, elf: ELFFile, plan: Plan) -> Any:
             expected="the program as the linker wrote it",
             remedy="strip a copy, and give the file before",
         )
+    return [s for s in symbols if isinstance(s["st_shndx"], int)]
+
+
+def _refuse_other_routine(place: str, symbols: list[Any], plan: Plan) -> None:
+    """A variable has no shape in its name: that of the routine must be the plan's."""
+    names = names_of(plan)
+    routine = re.compile(rf"{names.triad}_([0-9a-f]{{8}})_\w+")
+    shapes = {m[1] for s in symbols if (m := routine.match(s.name))}
+    if names.shape not in shapes:
+        found = f"the shape {' and '.join(sorted(shapes))}" if shapes else "no name with a shape"
+        raise RefusedError(
+            place,
+            f"the routine {names.triad} has {found}",
+            expected=f"the shape {names.shape} of the unit",
+            remedy="name a unit whose image this program takes"
+            if shapes
+            else "link triax_comp.c; -flto may have dissolved its functions",
+        )
+
+
+def _variable(place: str, symbols: list[Any], name: str, size: int) -> Any:
+    """The symbol of a variable of the program."""
+    found = {s["st_value"]: s for s in symbols if s.name == name}
+    if len(found) != 1:
+        raise RefusedError(
+            place,
+            f"{len(found)} variables {name}" if found else f"no variable {name}",
+            expected="one triax_calib_t of this name",
+            remedy="give it a name of its own" if found else "give its name as in the map file",
+        )
+    (symbol,) = found.values()
+    if symbol["st_size"] != size:
+        raise RefusedError(
+            place,
+            f"{name} has {symbol['st_size']} bytes",
+            expected=f"the {size} bytes of triax_calib_t of this unit's shape",
+            remedy="name the variable that triax_calib_load writes, or the unit's own program",
+        )
+    return symbol
+
+
+def _symbol(place: str, symbols: list[Any], plan: Plan) -> Any:
+    """The symbol of the constants; refused with what there is instead."""
     names = names_of(plan)
     wanted = f"{names.linked}_calib_constants"
-    defined = {s.name: s for s in symbols if isinstance(s["st_shndx"], int)}
+    defined = {s.name: s for s in symbols}
     if wanted in defined:
         return defined[wanted]
     matches = [m for m in map(_CONSTANTS.fullmatch, defined) if m]

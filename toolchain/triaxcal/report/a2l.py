@@ -118,7 +118,7 @@ def calib_a2l(
         "serial": provenance.serial,
         "epk": provenance.epk,
         "TRIAD": names.triad.upper(),
-        "symbol": f"{names.linked}_calib_constants",
+        "symbol": linked.symbol if linked else f"{names.linked}_calib_constants",
         "words": words,
         "methods": list({w.method.name: w.method for w in words}.values()),
         "linked": linked,
