@@ -73,9 +73,11 @@ static int identity_is_legal(const uint8_t *file, size_t constants, size_t size)
 {
     reader_t crc_of_constants = {file, size, 0};
     reader_t reader = {file, size, constants};
+    const uint32_t magic = next_word(&reader);
+    const uint32_t version = next_word(&reader);
+    const uint32_t repeated = next_word(&reader);
     crc_of_constants.at = constants - 4;
-    if (next_word(&reader) != 0x44495254u || next_word(&reader) != 1u ||
-        next_word(&reader) != next_word(&crc_of_constants)) {
+    if (magic != 0x44495254u || version != 1u || repeated != next_word(&crc_of_constants)) {
         return 0;
     }
     reader.at = size - 4;

@@ -133,7 +133,7 @@ def broken(build: ImuBuild, folder: Path, old: str, new: str) -> imu.Both:
         ("gcc_sanitizers", ("raw_gyro, accel, rate", "raw_gyro, raw_accel, rate"),
          "answers differ"),
         ("clang_sanitizers", ("accel_status | (", "gyro_status | ("), "answers differ"),
-        ("cppcheck", ("status |= triax_gyro_calib_check", "triax_gyro_calib_check"), "MISRA 17.7"),
+        ("cppcheck", ("status = triax_gyro_calib_check", "triax_gyro_calib_check"), "MISRA 17.7"),
     ],
 )  # fmt: skip
 def test_a_planted_mistake_in_what_joins_the_triads_is_found(

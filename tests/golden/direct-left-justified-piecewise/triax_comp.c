@@ -618,8 +618,8 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
 
 /* Words of the image: the header (magic, version, size, shape), two temperature codes, segments. */
 #define HEADER_WORDS 15u
-#define SEGMENTS_AT (HEADER_WORDS + 2u)
-#define SEGMENT_WORDS (3u + (12u * ((uint32_t)TRIAX_ORDER + 1u)))
+#define SEGMENTS_AT ((size_t)HEADER_WORDS + 2u)
+#define SEGMENT_WORDS ((size_t)3u + (12u * ((size_t)TRIAX_ORDER + 1u)))
 
 static uint32_t word_at(const uint8_t *image, size_t index)
 {
@@ -723,15 +723,15 @@ static uint32_t constants_fit(const uint8_t *image)
     const int32_t temp_min_code = int_at(image, HEADER_WORDS);
     const int32_t temp_max_code = int_at(image, HEADER_WORDS + 1u);
     uint32_t fits = 1u;
-    uint32_t s;
+    size_t s;
     if (int_at(image, SEGMENTS_AT) != temp_min_code) {
         fits = 0u;
     }
-    for (s = 0u; s < (uint32_t)TRIAX_SEGMENTS; s++) {
+    for (s = 0u; s < (size_t)TRIAX_SEGMENTS; s++) {
         triax_segment_t segment;
         int32_t last = temp_max_code;
         read_segment(&segment, image, s);
-        if ((s + 1u) < (uint32_t)TRIAX_SEGMENTS) {
+        if ((s + 1u) < (size_t)TRIAX_SEGMENTS) {
             const int32_t next = int_at(image, SEGMENTS_AT + ((s + 1u) * SEGMENT_WORDS));
             if ((next > temp_min_code) && (next <= temp_max_code)) {
                 last = next - 1;
@@ -786,7 +786,7 @@ static uint32_t image_fits(const uint8_t *image, size_t size)
     uint32_t fits = 0u;
 
     if ((size == TRIAX_IMAGE_SIZE) || (size == TRIAX_FILE_SIZE)) {
-        uint32_t i;
+        size_t i;
         fits = 1u;
         for (i = 0u; i < HEADER_WORDS; i++) {
             if (word_at(image, i) != header[i]) {
@@ -805,11 +805,11 @@ static uint32_t image_fits(const uint8_t *image, size_t size)
 
 static void read_calib(triax_calib_t *calib, const uint8_t *image)
 {
-    uint32_t s;
+    size_t s;
 
     calib->temp_min_code = int_at(image, HEADER_WORDS);
     calib->temp_max_code = int_at(image, HEADER_WORDS + 1u);
-    for (s = 0u; s < (uint32_t)TRIAX_SEGMENTS; s++) {
+    for (s = 0u; s < (size_t)TRIAX_SEGMENTS; s++) {
         read_segment(&calib->segment[s], image, s);
     }
 }
