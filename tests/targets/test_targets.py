@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -27,7 +28,7 @@ from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import render_routine
 from triaxcal.targets import bench_table, counting, matrix
 from triaxcal.targets.bench import Subject, _write_subject, cost_of
-from triaxcal.targets.build import TargetError, Toolset, build, emulate
+from triaxcal.targets.build import TargetError, Toolset, build, compiled, emulate
 from triaxcal.targets.cores import registry as cores
 from triaxcal.targets.counting import build_plugin, measure
 from triaxcal.targets.matrix import (
@@ -42,6 +43,7 @@ from triaxcal.targets.matrix import (
 )
 from triaxcal.targets.shapes import (
     CUBIC,
+    CUBIC_LEFT,
     GYRO,
     RATE_ALONE,
     Case,
@@ -316,3 +318,22 @@ def test_assembly_at_the_limits_of_every_shape(name: str) -> None:
     ways = (("Cortex-M0", THUMB1), ("Cortex-M3", THUMB2), ("Cortex-M4F", THUMB2))
     builds = [Build(case, Toolset(by_name[core], "gcc", "-O2", form)) for core, form in ways]
     assert [o.detail for o in run_builds(builds)] == ["", "", ""]
+
+
+@pytest.mark.parametrize("optimisation", ["-O0", "-O2"])
+@pytest.mark.parametrize("name", [CUBIC, CUBIC_LEFT, "AT-SIM", RATE_ALONE])
+def test_the_assembly_leaves_r9_to_the_platform(
+    name: str, optimisation: str, tmp_path: Path
+) -> None:
+    """gcc has no macro for -ffixed-r9, so the routine could not refuse it."""
+    need("arm-none-eabi-gcc", "arm-none-eabi-objdump")
+    case = case_named(name)
+    for file, text in case.files.items():
+        (tmp_path / file).write_text(text)
+    toolset = Toolset(M3, "gcc", optimisation, THUMB2, ("-ffixed-r9",))
+    (made,) = compiled(toolset, [tmp_path / "triax_comp.c"], [tmp_path], tmp_path / "made")
+    shown = subprocess.run(
+        ["arm-none-eabi-objdump", "-d", made], capture_output=True, text=True, check=True
+    ).stdout
+    assert "smlal" in shown
+    assert not [line for line in shown.splitlines() if re.search(r"\b(r9|sb)\b", line)]

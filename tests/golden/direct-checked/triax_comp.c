@@ -175,82 +175,82 @@ static void evaluate_state(triax_state_t *state, const triax_segment_t *segment,
 #if defined(__ARM_FEATURE_DSP)
     __asm__ volatile(
         "1:\n\t"
-        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "ldmia %[c]!, {r8, r10, r11}\n\t"
         "smmla r12, r11, %[x], r10\n\t"
-        "smmla r4, r12, %[x], r9\n\t"
-        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smmla r4, r12, %[x], r8\n\t"
+        "ldmia %[c]!, {r8, r10, r11}\n\t"
         "smmla r12, r11, %[x], r10\n\t"
-        "smmla r5, r12, %[x], r9\n\t"
-        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smmla r5, r12, %[x], r8\n\t"
+        "ldmia %[c]!, {r8, r10, r11}\n\t"
         "smmla r12, r11, %[x], r10\n\t"
-        "smmla r6, r12, %[x], r9\n\t"
-        "ldmia %[c]!, {r9, r10, r11}\n\t"
+        "smmla r6, r12, %[x], r8\n\t"
+        "ldmia %[c]!, {r8, r10, r11}\n\t"
         "smmla r12, r11, %[x], r10\n\t"
-        "smmla r9, r12, %[x], r9\n\t"
-        "lsl r8, r9, #29\n\t"
-        "asr r9, r9, #3\n\t"
-        "stmia %[row]!, {r4, r5, r6, r8, r9}\n\t"
+        "smmla r8, r12, %[x], r8\n\t"
+        "asr r10, r8, #3\n\t"
+        "lsl r8, r8, #29\n\t"
+        "stmia %[row]!, {r4, r5, r6, r8, r10}\n\t"
         "subs %[left], %[left], #1\n\t"
         "bne 1b"
         : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
         : [x] "r"(x_q31)
-        : "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "cc", "memory");
+        : "r4", "r5", "r6", "r8", "r10", "r11", "r12", "lr", "cc", "memory");
 #else
     __asm__ volatile(
         "1:\n\t"
-        "ldmia %[c]!, {r9, r10, r11}\n\t"
-        "smull r8, r12, r11, %[x]\n\t"
+        "ldmia %[c]!, {r8, r10, r11}\n\t"
+        "smull lr, r12, r11, %[x]\n\t"
         "add r12, r10, r12\n\t"
-        "smull r8, r12, r12, %[x]\n\t"
-        "add r4, r9, r12\n\t"
-        "ldmia %[c]!, {r9, r10, r11}\n\t"
-        "smull r8, r12, r11, %[x]\n\t"
+        "smull lr, r12, r12, %[x]\n\t"
+        "add r4, r8, r12\n\t"
+        "ldmia %[c]!, {r8, r10, r11}\n\t"
+        "smull lr, r12, r11, %[x]\n\t"
         "add r12, r10, r12\n\t"
-        "smull r8, r12, r12, %[x]\n\t"
-        "add r5, r9, r12\n\t"
-        "ldmia %[c]!, {r9, r10, r11}\n\t"
-        "smull r8, r12, r11, %[x]\n\t"
+        "smull lr, r12, r12, %[x]\n\t"
+        "add r5, r8, r12\n\t"
+        "ldmia %[c]!, {r8, r10, r11}\n\t"
+        "smull lr, r12, r11, %[x]\n\t"
         "add r12, r10, r12\n\t"
-        "smull r8, r12, r12, %[x]\n\t"
-        "add r6, r9, r12\n\t"
-        "ldmia %[c]!, {r9, r10, r11}\n\t"
-        "smull r8, r12, r11, %[x]\n\t"
+        "smull lr, r12, r12, %[x]\n\t"
+        "add r6, r8, r12\n\t"
+        "ldmia %[c]!, {r8, r10, r11}\n\t"
+        "smull lr, r12, r11, %[x]\n\t"
         "add r12, r10, r12\n\t"
-        "smull r8, r12, r12, %[x]\n\t"
-        "add r9, r9, r12\n\t"
-        "lsl r8, r9, #29\n\t"
-        "asr r9, r9, #3\n\t"
-        "stmia %[row]!, {r4, r5, r6, r8, r9}\n\t"
+        "smull lr, r12, r12, %[x]\n\t"
+        "add r8, r8, r12\n\t"
+        "asr r10, r8, #3\n\t"
+        "lsl r8, r8, #29\n\t"
+        "stmia %[row]!, {r4, r5, r6, r8, r10}\n\t"
         "subs %[left], %[left], #1\n\t"
         "bne 1b"
         : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
         : [x] "r"(x_q31)
-        : "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "cc", "memory");
+        : "r4", "r5", "r6", "r8", "r10", "r11", "r12", "lr", "cc", "memory");
 #endif
 }
 
-/* The sum starts from the offset. r0 to r4 are for operands, r7 for a frame pointer. */
+/* The sum starts from the offset. r0 to r3 and lr are for operands; r7 may be a frame pointer, r9 the platform's. */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz,
                        int32_t accel[3])
 {
     const int32_t *row = state->row[0];
     __asm__ volatile(
-        "ldmia %[row]!, {r5, r6, r8, r9, r10}\n\t"
-        "smlal r9, r10, r5, %[ux]\n\t"
-        "smlal r9, r10, r6, %[uy]\n\t"
-        "smlal r9, r10, r8, %[uz]\n\t"
-        "ldmia %[row]!, {r5, r6, r8, r9, r11}\n\t"
-        "smlal r9, r11, r5, %[ux]\n\t"
-        "smlal r9, r11, r6, %[uy]\n\t"
-        "smlal r9, r11, r8, %[uz]\n\t"
-        "ldmia %[row]!, {r5, r6, r8, r9, r12}\n\t"
-        "smlal r9, r12, r5, %[ux]\n\t"
-        "smlal r9, r12, r6, %[uy]\n\t"
-        "smlal r9, r12, r8, %[uz]\n\t"
+        "ldmia %[row]!, {r4, r5, r6, r8, r10}\n\t"
+        "smlal r8, r10, r4, %[ux]\n\t"
+        "smlal r8, r10, r5, %[uy]\n\t"
+        "smlal r8, r10, r6, %[uz]\n\t"
+        "ldmia %[row]!, {r4, r5, r6, r8, r11}\n\t"
+        "smlal r8, r11, r4, %[ux]\n\t"
+        "smlal r8, r11, r5, %[uy]\n\t"
+        "smlal r8, r11, r6, %[uz]\n\t"
+        "ldmia %[row]!, {r4, r5, r6, r8, r12}\n\t"
+        "smlal r8, r12, r4, %[ux]\n\t"
+        "smlal r8, r12, r5, %[uy]\n\t"
+        "smlal r8, r12, r6, %[uz]\n\t"
         "stmia %[accel], {r10, r11, r12}"
         : [row] "+&r"(row)
         : [ux] "r"(ux), [uy] "r"(uy), [uz] "r"(uz), [accel] "r"(accel)
-        : "r5", "r6", "r8", "r9", "r10", "r11", "r12", "memory");
+        : "r4", "r5", "r6", "r8", "r10", "r11", "r12", "memory");
 }
 #endif
 

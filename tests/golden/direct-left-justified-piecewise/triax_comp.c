@@ -172,72 +172,73 @@ static void evaluate_state(triax_state_t *state, const triax_segment_t *segment,
 #if defined(__ARM_FEATURE_DSP)
     __asm__ volatile(
         "1:\n\t"
-        "ldmia %[c]!, {r9, r10}\n\t"
-        "smmla r4, r10, %[x], r9\n\t"
-        "ldmia %[c]!, {r9, r10}\n\t"
-        "smmla r5, r10, %[x], r9\n\t"
-        "ldmia %[c]!, {r9, r10}\n\t"
-        "smmla r6, r10, %[x], r9\n\t"
-        "ldmia %[c]!, {r9, r10}\n\t"
-        "smmla r9, r10, %[x], r9\n\t"
+        "ldmia %[c]!, {r8, r10}\n\t"
+        "smmla r4, r10, %[x], r8\n\t"
+        "ldmia %[c]!, {r8, r10}\n\t"
+        "smmla r5, r10, %[x], r8\n\t"
+        "ldmia %[c]!, {r8, r10}\n\t"
+        "smmla r6, r10, %[x], r8\n\t"
+        "ldmia %[c]!, {r8, r10}\n\t"
+        "smmla r10, r10, %[x], r8\n\t"
         "mov r8, #0\n\t"
-        "stmia %[row]!, {r4, r5, r6, r8, r9}\n\t"
+        "stmia %[row]!, {r4, r5, r6, r8, r10}\n\t"
         "subs %[left], %[left], #1\n\t"
         "bne 1b"
         : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
         : [x] "r"(x_q31)
-        : "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "cc", "memory");
+        : "r4", "r5", "r6", "r8", "r10", "r11", "r12", "lr", "cc", "memory");
 #else
     __asm__ volatile(
         "1:\n\t"
-        "ldmia %[c]!, {r9, r10}\n\t"
-        "smull r8, r12, r10, %[x]\n\t"
-        "add r4, r9, r12\n\t"
-        "ldmia %[c]!, {r9, r10}\n\t"
-        "smull r8, r12, r10, %[x]\n\t"
-        "add r5, r9, r12\n\t"
-        "ldmia %[c]!, {r9, r10}\n\t"
-        "smull r8, r12, r10, %[x]\n\t"
-        "add r6, r9, r12\n\t"
-        "ldmia %[c]!, {r9, r10}\n\t"
-        "smull r8, r12, r10, %[x]\n\t"
-        "add r9, r9, r12\n\t"
+        "ldmia %[c]!, {r8, r10}\n\t"
+        "smull lr, r12, r10, %[x]\n\t"
+        "add r4, r8, r12\n\t"
+        "ldmia %[c]!, {r8, r10}\n\t"
+        "smull lr, r12, r10, %[x]\n\t"
+        "add r5, r8, r12\n\t"
+        "ldmia %[c]!, {r8, r10}\n\t"
+        "smull lr, r12, r10, %[x]\n\t"
+        "add r6, r8, r12\n\t"
+        "ldmia %[c]!, {r8, r10}\n\t"
+        "smull lr, r12, r10, %[x]\n\t"
+        "add r10, r8, r12\n\t"
         "mov r8, #0\n\t"
-        "stmia %[row]!, {r4, r5, r6, r8, r9}\n\t"
+        "stmia %[row]!, {r4, r5, r6, r8, r10}\n\t"
         "subs %[left], %[left], #1\n\t"
         "bne 1b"
         : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
         : [x] "r"(x_q31)
-        : "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "cc", "memory");
+        : "r4", "r5", "r6", "r8", "r10", "r11", "r12", "lr", "cc", "memory");
 #endif
 }
 
-/* The sum starts from the offset. r0 to r2 are for operands, r7 for a frame pointer. */
+/* The sum starts from the offset. r0 to r2 are for operands; r7 may be a frame pointer, r9 the platform's. */
 static void apply_rows(const triax_state_t *state, const int32_t raw_code[3],
                        int32_t accel[3])
 {
     const int32_t *row = state->row[0];
+    register const int32_t *raw __asm__("r1") = raw_code;
     __asm__ volatile(
-        "ldmia %[raw], {r3, r4, lr}\n\t"
-        "ldmia %[row]!, {r5, r6, r8, r9, r10}\n\t"
-        "smlal r9, r10, r5, r3\n\t"
-        "smlal r9, r10, r6, r4\n\t"
-        "smlal r9, r10, r8, lr\n\t"
+        "ldmia r1, {r1, r3, lr}\n\t"
+        "ldmia %[row]!, {r4, r5, r6, r8, r10}\n\t"
+        "smlal r8, r10, r4, r1\n\t"
+        "smlal r8, r10, r5, r3\n\t"
+        "smlal r8, r10, r6, lr\n\t"
         "asr r10, r10, #3\n\t"
-        "ldmia %[row]!, {r5, r6, r8, r9, r11}\n\t"
-        "smlal r9, r11, r5, r3\n\t"
-        "smlal r9, r11, r6, r4\n\t"
-        "smlal r9, r11, r8, lr\n\t"
+        "ldmia %[row]!, {r4, r5, r6, r8, r11}\n\t"
+        "smlal r8, r11, r4, r1\n\t"
+        "smlal r8, r11, r5, r3\n\t"
+        "smlal r8, r11, r6, lr\n\t"
         "asr r11, r11, #3\n\t"
-        "ldmia %[row]!, {r5, r6, r8, r9, r12}\n\t"
-        "smlal r9, r12, r5, r3\n\t"
-        "smlal r9, r12, r6, r4\n\t"
-        "smlal r9, r12, r8, lr\n\t"
+        "ldmia %[row]!, {r4, r5, r6, r8, r12}\n\t"
+        "smlal r8, r12, r4, r1\n\t"
+        "smlal r8, r12, r5, r3\n\t"
+        "smlal r8, r12, r6, lr\n\t"
         "asr r12, r12, #3\n\t"
         "stmia %[accel], {r10, r11, r12}"
-        : [row] "+&r"(row)
-        : [raw] "r"(raw_code), [accel] "r"(accel)
-        : "r3", "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "lr", "memory");
+        : [row] "+&r"(row), "+&r"(raw)
+        : [accel] "r"(accel)
+        : "r3", "r4", "r5", "r6", "r8", "r10", "r11", "r12", "lr", "memory");
 }
 #endif
 
