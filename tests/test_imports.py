@@ -32,6 +32,7 @@ MAY_IMPORT = {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
         "fixedpoint", "codegen", "uncertainty",
     },
+    "exports": {"base", "model", "unit", "fitting", "codegen", "delivery"},
     "targets": {
         "base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery",
     },

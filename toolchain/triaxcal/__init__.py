@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from triaxcal.api.calibration import Calibration, Diagnosis, fit, load
     from triaxcal.api.delivery import Delivered, deliver, update
     from triaxcal.api.diagnosis import diagnose
+    from triaxcal.api.export import ExportedFiles, export
     from triaxcal.api.files import key_schema, write_first_file
     from triaxcal.api.firmware import CompiledFirmware, Firmware, firmware
     from triaxcal.api.image import CalibrationImage, read_image
@@ -60,20 +61,21 @@ __version__ = "0.2.0.dev0"
 
 __all__ = [
     "Budget", "Calibration", "CalibrationImage", "CompiledFirmware", "Delivered", "Diagnosis",
-    "FieldCheck", "FieldUpdate", "Firmware", "Imu", "ImuCalibration", "ImuConstants", "ImuFirmware",
-    "ImuState", "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "SeriesResult",
-    "Study", "TableGrid", "Unit", "UsageError", "Verdict", "Verification", "__version__",
-    "calibrate_series", "compare_history", "cross_coupling", "deliver", "diagnose", "find_poses",
-    "firmware", "firmware_imu", "fit", "fit_imu", "key_schema", "learn_priors", "load", "load_imu",
-    "plan_measurements", "plan_motion", "read_image", "read_imu", "read_unit", "simulate",
-    "simulate_series", "study_angle_errors", "study_drift", "update", "verify_unit",
-    "write_first_file",
+    "ExportedFiles", "FieldCheck", "FieldUpdate", "Firmware", "Imu", "ImuCalibration",
+    "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck", "LivePair", "MeasurementPlan",
+    "RefusedError", "SeriesResult", "Study", "TableGrid", "Unit", "UsageError", "Verdict",
+    "Verification", "__version__", "calibrate_series", "compare_history", "cross_coupling",
+    "deliver", "diagnose", "export", "find_poses", "firmware", "firmware_imu", "fit", "fit_imu",
+    "key_schema", "learn_priors", "load", "load_imu", "plan_measurements", "plan_motion",
+    "read_image", "read_imu", "read_unit", "simulate", "simulate_series", "study_angle_errors",
+    "study_drift", "update", "verify_unit", "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
     "triaxcal.api.calibration": ("Calibration", "Diagnosis", "fit", "load"),
     "triaxcal.api.delivery": ("Delivered", "deliver", "update"),
     "triaxcal.api.diagnosis": ("diagnose",),
+    "triaxcal.api.export": ("ExportedFiles", "export"),
     "triaxcal.api.files": ("key_schema", "write_first_file"),
     "triaxcal.api.firmware": ("CompiledFirmware", "Firmware", "firmware"),
     "triaxcal.api.image": ("CalibrationImage", "read_image"),

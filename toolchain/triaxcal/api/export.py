@@ -1,0 +1,73 @@
+"""`export`: a delivery in the layout of a build system, or as parameters of an autopilot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.api.calibration import load
+from triaxcal.api.delivery import delivered_file
+from triaxcal.base.errors import RefusedError, refused_by_system
+from triaxcal.base.publish import renew
+from triaxcal.exports.registry import TARGETS
+from triaxcal.exports.target import Source
+
+
+@dataclass(frozen=True)
+class ExportedFiles:
+    """What was written.
+
+    Attributes
+    ----------
+    folder : Path
+    files : tuple of str
+        Paths below `folder`.
+    summary : str
+        What is said of it; of an autopilot, what its model costs.
+    """
+
+    folder: Path
+    files: tuple[str, ...]
+    summary: str
+
+
+def export(
+    unit: str | Path,
+    to: str,
+    into: str | Path | None = None,
+    build: str | Path = "build",
+) -> ExportedFiles:
+    """Write a delivered unit for a build system or an autopilot.
+
+    Parameters
+    ----------
+    unit : path
+        A unit, a delivered folder, or its calibration.json.
+    to : str
+        Name of a target, as `triaxcal export --help` lists them.
+    into : path or None
+        Folder for the files; None is `build`/NAME-TO.
+    build : path
+        Folder with the delivered units.
+
+    Raises
+    ------
+    RefusedError
+        When there is no such target or delivery, a delivered file has changed, or the target cannot
+        hold the calibration.
+    """
+    target = TARGETS[to]
+    path = delivered_file(Path(unit), Path(build))
+    done = load(path).fitted
+    made = target.make(Source(path.parent, done))
+    folder = Path(into) if into is not None else Path(build) / f"{done.unit.name}-{to}"
+    if folder.is_file():
+        raise RefusedError(str(folder), "a file", expected="a folder")
+    for name, content in made.files.items():
+        place = folder / name
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise refused_by_system(str(place.parent), "made", error) from error
+        renew({place.name: content}, place.parent)
+    return ExportedFiles(folder, tuple(made.files), made.summary)

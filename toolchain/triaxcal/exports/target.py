@@ -1,0 +1,79 @@
+"""A target of `triaxcal export`: files that are made of a delivered folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.delivery.fitted import Fitted
+
+
+@dataclass(frozen=True)
+class Source:
+    """What was delivered for a unit.
+
+    Attributes
+    ----------
+    folder : Path
+        With the C and verification.json.
+    fitted : Fitted
+        The fit in its calibration.json.
+    """
+
+    folder: Path
+    fitted: Fitted
+
+    def c_files(self) -> dict[str, bytes]:
+        """Name and content of the C and the image, which are those that were checked.
+
+        Raises
+        ------
+        RefusedError
+            When one is missing, or is not the one in verification.json.
+        """
+        path = self.folder / "verification.json"
+        try:
+            hashes: dict[str, str] = json.loads(path.read_bytes())["files_sha256"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise RefusedError(
+                str(path),
+                "missing, or does not name the files of the firmware",
+                expected="a delivered folder",
+                remedy="run `triaxcal calib` for the unit first",
+            ) from error
+        return {name: self._checked(name, digest) for name, digest in hashes.items()}
+
+    def _checked(self, name: str, digest: str) -> bytes:
+        path = self.folder / name
+        content = path.read_bytes() if path.is_file() else b""
+        if hashlib.sha256(content).hexdigest() != digest:
+            raise RefusedError(
+                str(path),
+                "is missing or is not the file that was checked",
+                expected=f"SHA-256 {digest[:16]}..., as in verification.json",
+                remedy="run `triaxcal calib` for the unit again",
+            )
+        return content
+
+
+@dataclass(frozen=True)
+class Exported:
+    """Files by their path below the folder that receives them, and what is said of them."""
+
+    files: dict[str, bytes]
+    summary: str
+
+
+@dataclass(frozen=True)
+class Target:
+    """Entry of a target; `make` gives the same for the same delivery."""
+
+    name: str
+    label: str
+    doc: str
+    make: Callable[[Source], Exported]
+    rank: int = 100

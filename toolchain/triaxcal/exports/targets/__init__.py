@@ -1,0 +1,1 @@
+"""What a delivery can be exported to: a file each."""
