@@ -374,6 +374,7 @@ def test_the_c_is_written_whole(fw: triaxcal.Firmware, tmp_path: Path) -> None:
     paths = fw.write(tmp_path / "out")
     assert {p.name for p in paths} == {
         "triax_comp.h", "triax_comp.c", "triax_calib.h", "triax_calib.c", "triax_calib.bin",
+        "triax_selftest.h", "triax_selftest.c",
     }  # fmt: skip
     assert all(p.read_bytes() == fw.files[p.name] for p in paths)
 

@@ -32,6 +32,8 @@ FILES = [
     "triax_calib.h",
     "triax_comp.c",
     "triax_comp.h",
+    "triax_selftest.c",
+    "triax_selftest.h",
     "verification.json",
 ]
 

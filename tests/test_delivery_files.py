@@ -89,6 +89,7 @@ def test_json_files_are_valid_and_their_hashes_match(
     assert isinstance(hashes, dict)
     assert set(hashes) == {
         "triax_calib.h", "triax_calib.c", "triax_comp.h", "triax_comp.c", "triax_calib.bin",
+        "triax_selftest.h", "triax_selftest.c",
     }  # fmt: skip
     for name, digest in hashes.items():
         assert digest == hashlib.sha256(files[unit][name]).hexdigest()

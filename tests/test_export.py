@@ -250,7 +250,7 @@ def test_command_line(delivered: Path, tmp_path: Path) -> None:
         main, ["export", str(delivered), "--to", "make", "--into", str(tmp_path)]
     )
     assert ran.exit_code == 0, ran.output
-    assert "5 delivered files and triax.mk" in ran.output
+    assert "7 delivered files and triax.mk" in ran.output
     listed = CliRunner().invoke(main, ["export", "--help"]).output
     assert all(target.name in listed for target in TARGETS)
 

@@ -187,7 +187,8 @@ def test_the_gyros_files_have_names_of_their_own(built_imu: ImuBuild) -> None:
     assert set(files) == {
         "triax_comp.h", "triax_comp.c", "triax_calib.h", "triax_calib.c", "triax_gyro_comp.h",
         "triax_gyro_comp.c", "triax_gyro_calib.h", "triax_gyro_calib.c", "triax_imu.h",
-        "triax_imu.c",
+        "triax_imu.c", "triax_selftest.h", "triax_selftest.c", "triax_gyro_selftest.h",
+        "triax_gyro_selftest.c",
     }  # fmt: skip
     header = files["triax_gyro_comp.h"]
     assert "#define TRIAX_GYRO_RATE_Q 19 /* angular rate LSB = 2^-19 deg/s" in header

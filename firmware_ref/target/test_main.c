@@ -2,7 +2,7 @@
  * test_main.c - the generated routine and the reference on the target, over vectors made here.
  *
  * target_case.h (written by triaxcal/targets/vectors.py) has the ranges, the boundary tables and
- * the image. Printed: digests that Python computes from its own integer model, and how many
+ * the image. Printed: the answer of the self-test, digests that Python computes from its own integer model, and how many
  * damaged and truncated images each loader refused.
  */
 #include <stddef.h>
@@ -14,14 +14,17 @@
 
 #ifdef CASE_GYRO
 #include "triax_gyro_calib.h"
+#include "triax_gyro_selftest.h"
 #define triax_calib_t triax_gyro_calib_t
 #define triax_state_t triax_gyro_state_t
 #define triax_calib_load triax_gyro_calib_load
 #define TRIAX_CALIB TRIAX_GYRO_CALIB
 #define TRIAX_IMAGE_SIZE TRIAX_GYRO_IMAGE_SIZE
 #define TRIAX_RAW_MIN TRIAX_GYRO_RAW_MIN
+#define triax_selftest triax_gyro_selftest
 #else
 #include "triax_calib.h"
+#include "triax_selftest.h"
 #endif
 
 static triax_ref_t ref;
@@ -248,6 +251,7 @@ static void try_damage(void)
 
 int main(void)
 {
+    print_line("selftest", triax_selftest());
     print_line("generated", digest_generated(&TRIAX_CALIB));
     try_damage();
     print_line("load", triax_calib_load(&loaded, CASE_IMAGE, sizeof CASE_IMAGE));

@@ -90,12 +90,7 @@ def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
     """Damaged images, images at the limits of step R, and wild ones."""
     shape = plan.shape
     names = header_names(plan)
-    terms = terms_word(plan)
-    columns, limit = _TABLES[terms & (QUADRATIC | SENSITIVITY)]
-    layout = Layout(
-        len(names), shape.segments, shape.order, shape.form == INVERSE, columns, limit,
-        bool(terms & RATE),
-    )  # fmt: skip
+    layout = layout_of(plan)
     words = list(struct.unpack(f"<{len(image) // 4}i", image))[:-1]
     cases = [ImageCase(name, damaged, False) for name, damaged in _damaged(image, names)]
     cases += _identities(image)
@@ -112,6 +107,16 @@ def image_cases(plan: Plan, image: bytes) -> list[ImageCase]:
             changed[index] = value
         cases.append(ImageCase(name, _sealed(changed), layout.is_safe(changed)))
     return cases
+
+
+def layout_of(plan: Plan) -> Layout:
+    """Where the words of a plan's image stand."""
+    shape, terms = plan.shape, terms_word(plan)
+    columns, limit = _TABLES[terms & (QUADRATIC | SENSITIVITY)]
+    return Layout(
+        len(header_names(plan)), shape.segments, shape.order, shape.form == INVERSE, columns,
+        limit, bool(terms & RATE),
+    )  # fmt: skip
 
 
 Change = tuple[str, dict[int, int]]

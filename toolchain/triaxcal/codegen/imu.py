@@ -28,6 +28,7 @@ from triaxcal.codegen.routines import (
     routines_of,
     start_generated_imu,
 )
+from triaxcal.codegen.selftest import check_selftest, render_selftest
 from triaxcal.codegen.templates import render
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.integer_model import STATUS_BAD_IMAGE, STATUS_OK, apply, set_temperature
@@ -99,6 +100,8 @@ def build_imu(
             _check(accel, routines_of(accel.rate, library, reference), random_vectors),
             _check(gyro, (GyroGenerated(library), GyroReference(reference)), random_vectors),
         )
+        for plan in (accel, gyro):
+            check_selftest(plan, library)
         vectors = _check_both(
             accel, gyro, GeneratedImu(library), files[names_of(accel).file(IMU_IMAGE_FILE)]
         )
@@ -121,6 +124,7 @@ def render_imu(
     texts = {**render_routine(accel), **render_routine(gyro)}
     for plan, triad in zip((accel, gyro), triads, strict=True):
         texts |= render_constants(plan, triad.temperature_sensor, provenance)
+        texts |= render_selftest(plan, provenance)
     names, context = names_of(accel), imu_context(accel, gyro)
     shapes = f"shapes {names.shape} and {names_of(gyro).shape}"
     texts |= dict(render(name, shapes, names, **context) for name in IMU_FILES)

@@ -17,7 +17,7 @@ from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.terms import PRODUCT_NAMES
 
 ROUTINE_FILES = ("triax_comp.h", "triax_comp.c")
-_TERM_TABLES = (
+TERM_TABLES = (
     {"name": "quadratic", "columns": 6, "limit": QUADRATIC_LIMIT},
     {"name": "sensitivity", "columns": 3, "limit": SENSITIVITY_LIMIT},
 )
@@ -67,7 +67,7 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "header_names": header_names(plan),
         "row_limit": shape.row_limit,
         "products": PRODUCT_NAMES,
-        "terms": _TERM_TABLES[shape.gyro],
+        "terms": TERM_TABLES[shape.gyro],
         "force_q": plan.force_q,
         "rate_q": RATE_Q,
         "final_rounding": 1 << max(0, shape.output_shift - 33),

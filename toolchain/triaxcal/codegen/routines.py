@@ -62,9 +62,12 @@ def start_generated_imu(folder: Path, target: Path, prefix: str = DEFAULT_PREFIX
 def _start(
     folder: Path, target: Path, prefix: str, names: Sequence[str], batches: Sequence[str]
 ) -> Compilation:
+    """Compile the files of `names`, and the self-tests where there are any."""
     source = shipped("firmware_ref")
     shim = write_shim(target / "names", prefix)
     sources = [folder / f"{prefix}_{name}.c" for name in names]
+    tests = (folder / f"{prefix}_{name}.c" for name in ("selftest", "gyro_selftest"))
+    sources += [test for test in tests if test.exists()]
     sources += [source / f"{DEFAULT_PREFIX}_{name}.c" for name in batches]
     library = target / f"{prefix}_{names[-1]}.so"
     return compile_library(sources, library, include=[folder, *shim, source])

@@ -6,10 +6,13 @@ from pathlib import Path
 
 from triaxcal.unit.prefix import DEFAULT_PREFIX
 
-_HEADERS = ("comp.h", "calib.h", "gyro_comp.h", "gyro_calib.h", "imu.h")
+_HEADERS = (
+    "comp.h", "calib.h", "selftest.h", "gyro_comp.h", "gyro_calib.h", "gyro_selftest.h", "imu.h",
+)  # fmt: skip
 _TRIADS = ("", "gyro_", "imu_")
 _NAMES = (
     "calib_t", "state_t", "set_temperature", "set_temperature_rate", "apply", "calib_load",
+    "selftest",
 )  # fmt: skip
 _MACROS = ("CALIB", "IMAGE_SIZE", "RAW_MIN", "RAW_MAX", "RATE_Q", "SHAPE")
 

@@ -23,15 +23,15 @@ Samples = tuple[np.ndarray[tuple[int], np.dtype[np.int32]],
                 np.ndarray[tuple[int, int], np.dtype[np.int32]]]  # fmt: skip
 
 
-def ties(plan: Plan) -> Samples:
-    """Temperature codes (n,) and raw codes (n, 3) on borders, up to `PER_AXIS` for each axis.
+def ties(plan: Plan, per_axis: int = PER_AXIS) -> Samples:
+    """Temperature codes (n,) and raw codes (n, 3) on borders, up to `per_axis` for each axis.
 
     For each there is the same sample one raw code lower, where the range has it, and where the raw
     codes are not shifted one whose sum is one less than a border.
     """
     rng = Random(SEED)
     shape = plan.shape
-    codes = [rng.randint(plan.temp_min_code, plan.temp_max_code) for _ in range(PER_AXIS)]
+    codes = [rng.randint(plan.temp_min_code, plan.temp_max_code) for _ in range(per_axis)]
     state, _ = set_temperature(plan, np.array(codes, dtype=np.int64))
     rows = []
     for axis in range(3):

@@ -24,6 +24,7 @@ from triaxcal.codegen.routines import (
     routines_of,
     start_generated,
 )
+from triaxcal.codegen.selftest import check_selftest
 from triaxcal.codegen.tryout import MethodResult, run_on_dwells
 from triaxcal.delivery.firmware import Firmware, compensation_of, make_firmware, rate_codes
 from triaxcal.delivery.fitted import Fitted, fit_folder, refuse_beyond_limits
@@ -127,6 +128,7 @@ def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delive
         tried = routines_of(plan.rate, ours, theirs)
         check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
         check = replace(check, images=check_images(plan, cases, *tried))
+        check_selftest(plan, ours)
         _refuse_wrong_bound(unit, bound, check)
         methods = _on_dwells(fitted, plan, ours, Reference(theirs))
         compiler = Generated(ours).compiler

@@ -20,8 +20,8 @@ from triaxcal.report.words.numbers import g_in_words, significant, thousands
 
 VERIFICATION_FILE = "verification.json"
 C_FILES = (
-    "*_comp.h", "*_comp.c", "*_calib.h", "*_calib.c", "*_imu.h", "*_imu.c", "*_imu.bin",
-    VERIFICATION_FILE,
+    "*_comp.h", "*_comp.c", "*_calib.h", "*_calib.c", "*_selftest.h", "*_selftest.c", "*_imu.h",
+    "*_imu.c", "*_imu.bin", VERIFICATION_FILE,
 )  # fmt: skip
 """What a unit with [device] receives besides; * is its prefix."""
 NO_C = "none: unit.toml has no [device]; add it with " + ", ".join(REQUIRED)

@@ -120,7 +120,7 @@ def _outcome(planned: Build, folder: Path, expected: dict[str, int], place: Path
         return Outcome(planned, NOT_DONE, detail)
     firmware = shipped("firmware_ref")
     sources = [
-        *(folder / name for name in planned.case.sources),
+        *(folder / name for name in (*planned.case.sources, planned.case.selftest)),
         firmware / "triax_ref.c",
         firmware / "triax_ref_image.c",
         firmware / "target" / "test_main.c",

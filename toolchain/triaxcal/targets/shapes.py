@@ -12,6 +12,7 @@ from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.names import Names, names_of
 from triaxcal.codegen.render import render_routine
+from triaxcal.codegen.selftest import render_selftest
 from triaxcal.delivery.firmware import compensation_of
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.core.calibration import Calibration
@@ -35,7 +36,7 @@ class Case:
     note : str
         What is particular about it.
     files : dict
-        triax_comp.h and .c, triax_calib.h and .c.
+        triax_comp.h and .c, triax_calib.h and .c, triax_selftest.h and .c.
     """
 
     name: str
@@ -46,8 +47,13 @@ class Case:
 
     @property
     def sources(self) -> list[str]:
-        """Names of the C files, the routine first."""
-        return sorted((n for n in self.files if n.endswith(".c")), reverse=True)
+        """Names of the C files that a firmware needs, the routine first."""
+        return [self.names.file(name) for name in ("triax_comp.c", "triax_calib.c")]
+
+    @property
+    def selftest(self) -> str:
+        """Name of the C file of the self-test."""
+        return self.names.file("triax_selftest.c")
 
     @property
     def names(self) -> Names:
@@ -154,4 +160,5 @@ def made_case(folder: Path, name: str, note: str, change: Change, terms: Terms) 
     told = f"shape {name}: {note}" if note else f"shape {name}"
     provenance = Provenance(unit.serial, inputs_sha256(folder), (told,))
     files |= render_constants(plan, unit.temperature_sensor, provenance)
+    files |= render_selftest(plan, provenance)
     return Case(name, note, plan, files, image_bytes(plan))

@@ -13,7 +13,7 @@ from triaxcal.codegen.names import names_of
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.tools import BrokenToolError, Tool, run
-from triaxcal.verify.workspace import CONSTANTS, ROUTINE, Workspace
+from triaxcal.verify.workspace import CONSTANTS, ROUTINE, SELFTEST, Workspace
 
 CPPCHECK = Tool("cppcheck", "cppcheck")
 DEVIATIONS = Path(__file__).with_name("misra_deviations.toml")
@@ -32,11 +32,12 @@ the assembly would be refused."""
 
 USER = "verify_user.c"
 _USES = """#include "{triad}_calib.h"
+#include "{triad}_selftest.h"
 uint32_t use_{triad}(const uint8_t *image)
 {{
     static {triad}_state_t state;
     (void){triad}_set_temperature(&state, &{TRIAD}_CALIB, {triad}_calib_constants.temp_min_code);
-    return {triad}_calib_check(image, {TRIAD}_FILE_SIZE);
+    return {triad}_calib_check(image, {TRIAD}_FILE_SIZE) | {triad}_selftest();
 }}
 """
 _RULE = re.compile(r"misra-c2012-(\d+\.\d+)")
@@ -75,7 +76,7 @@ class Deviation:
 
 
 def check(work: Workspace) -> Outcome:
-    """The routine and the constants."""
+    """The routine, the constants and the self-test."""
     return judge(find_all(work))
 
 
@@ -113,7 +114,8 @@ def find_all(work: Workspace) -> list[Finding]:
     ------
     MissingToolError, BrokenToolError
     """
-    return find_in(work.folder, [work.named(ROUTINE), work.named(CONSTANTS)], [work.plan])
+    sources = [work.named(file) for file in (ROUTINE, CONSTANTS, SELFTEST)]
+    return find_in(work.folder, sources, [work.plan])
 
 
 def find_in(folder: Path, sources: Sequence[str], plans: Sequence[Plan]) -> list[Finding]:

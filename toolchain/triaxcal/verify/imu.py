@@ -23,7 +23,7 @@ from triaxcal.verify import analyzers, cppcheck, eva
 from triaxcal.verify.campaign import delivery_outcomes, guarded, verify_files
 from triaxcal.verify.image_reader import image_length
 from triaxcal.verify.outcome import Outcome
-from triaxcal.verify.workspace import CONSTANTS, IMAGE, LIMBS, PORTABLE, ROUTINE, SHIM
+from triaxcal.verify.workspace import CONSTANTS, IMAGE, LIMBS, PORTABLE, ROUTINE, SELFTEST, SHIM
 
 ACCELEROMETER, GYRO, BOTH = "accelerometer", "gyro", "both_triads"
 _DRIVER = "verify_eva_imu.c"
@@ -58,6 +58,12 @@ class Both:
         triads = [names_of(self.build.accel), names_of(self.build.gyro)]
         own = triads[0].file("triax_imu.c")
         return own, *(names.file(name) for names in triads for name in (ROUTINE, CONSTANTS))
+
+    @property
+    def selftests(self) -> tuple[str, ...]:
+        """Names of the C files of the self-tests."""
+        plans = self.build.accel, self.build.gyro
+        return tuple(names_of(plan).file(SELFTEST) for plan in plans)
 
 
 def verify_imu(folder: Path, build: ImuBuild) -> dict[str, tuple[Outcome, ...]]:
@@ -112,7 +118,9 @@ def _ranges(build: ImuBuild) -> dict[str, object]:
 def _cppcheck(work: Both) -> Outcome:
     """triax_imu.c and its header; the findings in the files of the triads are theirs."""
     own = {names_of(work.build.accel).file(name) for name in IMU_FILES}
-    found = cppcheck.find_in(work.folder, work.sources, [work.build.accel, work.build.gyro])
+    found = cppcheck.find_in(
+        work.folder, (*work.sources, *work.selftests), [work.build.accel, work.build.gyro]
+    )
     return cppcheck.judge([finding for finding in found if finding.file in own])
 
 

@@ -16,6 +16,7 @@ from triaxcal.verify.image_reader import image_length
 
 ROUTINE = "triax_comp.c"
 CONSTANTS = "triax_calib.c"
+SELFTEST = "triax_selftest.c"
 HEADERS = ("triax_comp.h", "triax_calib.h")
 IMAGE = "triax_calib.bin"
 PORTABLE: tuple[str, ...] = ()
