@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,17 @@ from test_recordings import calibrated
 from test_table_terms import AIR, GRID, HEADER, NOISE, T0, Sensor
 
 from triaxcal.fitting.core.calibration import Calibration
+from triaxcal.fitting.core.noise import NoisePrior
+from triaxcal.fitting.core.outliers import CHANCE
+from triaxcal.fitting.recorded.cubes import scalar_cubes
+from triaxcal.fitting.recorded.magnitude import fit_with_prior
+from triaxcal.fitting.recorded.prior import FULL, Known
+from triaxcal.fitting.recorded.scalar import scalar_data
+from triaxcal.fitting.recorded.solution import ScalarFit
 from triaxcal.model.orientation import AIRCRAFT, gravity_direction
+from triaxcal.model.terms import products
 from triaxcal.model.types import FloatArray
+from triaxcal.unit.priors import Priors
 
 ROWS = 'rows = "poses"\nacceleration = ["ax", "ay", "az"]\nacceleration_unit = "m/s^2"'
 SD_G = 5e-6
@@ -56,6 +66,41 @@ def test_no_cube_is_said_of_noise(tmp_path: Path) -> None:
     """A chance of 1e-3 in each of 8 units."""
     said = [cubes_said(poses(tmp_path / str(n), np.zeros(3), n, 30)) for n in range(8)]
     assert not any(said)
+
+
+def fit_of_all_terms(count: int, seed: int, size: float, k3: float = 0.0) -> ScalarFit:
+    """A unit whose constants are `size` of the default priors, with 1 mg of noise."""
+    random, p = np.random.default_rng(seed), Priors()
+    cross = np.triu(p.cross_term_rad * random.standard_normal((3, 3)), 1)
+    scales = p.scale_factor * random.standard_normal(3) + p.mean_scale * random.standard_normal()
+    Q = p.product_g_per_g2 * random.standard_normal((3, 6))
+    Q[range(3), range(3)] = p.own_square_g_per_g2 * random.standard_normal(3)
+    force = directions(count, seed)
+    linear = force
+    for _ in range(15):
+        linear = force - size * products(linear) @ Q.T
+    matrix = np.eye(3) + size * (np.diag(scales) + cross + cross.T)
+    readings = (linear + k3 * linear**3) @ matrix.T
+    readings += size * p.bias_g * random.standard_normal(3)
+    readings += 1e-3 * random.standard_normal(force.shape)
+    data = scalar_data(readings, np.ones((count, 1)), np.ones(count), 1.0)
+    data = replace(data, count=np.ones(count))
+    return fit_with_prior(FULL, data, 1, Known(p, 1.0, np.zeros(3)))
+
+
+@pytest.mark.parametrize("size", [1.0, 0.0])
+def test_few_poses_of_sound_units_show_no_cubes(size: float) -> None:
+    """Priors tell most constants of 18 to 20 poses, be they as large as these say, or 0."""
+    found = [scalar_cubes(fit_of_all_terms(18 + n % 3, n, size), NoisePrior()) for n in range(300)]
+    # CHANCE of 300 is 0.3: more than 4 are once in 1e5 runs.
+    assert sum(c is not None and c.chance < CHANCE for c in found) <= 4
+
+
+def test_a_large_cube_is_found_in_few_poses_with_priors() -> None:
+    """Of constants as large as the priors say, by 30 poses: 6e-3 is six times the noise."""
+    found = [scalar_cubes(fit_of_all_terms(30, n, 0.3, 6e-3), NoisePrior()) for n in range(20)]
+    # 107 of 150 others were found.
+    assert sum(c is not None and c.chance < CHANCE for c in found) >= 8
 
 
 def test_the_budget_carries_a_cube_that_the_c_leaves_out(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from triaxcal.fitting.recorded.magnitude import fit_with_prior
 from triaxcal.fitting.recorded.prior import FULL, LINEAR, Known
 from triaxcal.fitting.recorded.scalar import ScalarModel, scalar_data
 from triaxcal.fitting.recorded.scales import ScaleEvidence, scales_of
-from triaxcal.unit.priors import Priors
+from triaxcal.fitting.recorded.terms import ODDS
+from triaxcal.unit.priors import FirmwareChoice, Priors
 
 CROSS, SCALE = 1.5e-3, 0.015
 
@@ -95,3 +96,7 @@ def test_what_the_poses_do_not_show_keeps_its_scale() -> None:
     assert scales.priors.cross_term_rad == pytest.approx(0.010, rel=0.1)
     assert scales.priors.product_g_per_g2 == pytest.approx(3e-4, rel=0.1)
     assert scales.factors["cross_term_rad"] == pytest.approx(math.e, rel=0.1)
+
+
+def test_the_key_states_the_odds_of_the_rule() -> None:
+    assert f"the poses {ODDS:g} times as probable" in " ".join(str(FirmwareChoice.__doc__).split())

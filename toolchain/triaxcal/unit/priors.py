@@ -50,10 +50,11 @@ class FirmwareChoice:
     Attributes
     ----------
     terms
-        Terms beyond the twelve constants in the C. auto: those whose effect at T0 and 1 g
-        matters against the uncertainty. linear: none. own-squares: the square of each axis' own
-        acceleration. quadratic: all products; not on a tilter. State it so that all units of a
-        series run one routine.
+        Terms beyond the twelve constants in the C. auto: of a recording of poses, those that make
+        the poses 10 times as probable and whose largest effect at T0 and 1 g is above its standard
+        uncertainty; on a tilter, own squares that matter and that held-out readings confirm.
+        linear: none. own-squares: the square of each axis' own acceleration. quadratic: all
+        products; not on a tilter. State it so that all units of a series run one routine.
     prefix
         What the names of functions, types, macros and files in the C begin with. Give each sensor
         of a program its own.

@@ -10,6 +10,13 @@ d ~ N(0, V0) the constants and V their covariance with the readings known,
 
 is the estimate of all K3 and all constants together, without another fit: at the most probable
 constants (s^2 + J V0 J^T)^-1 of the readings is r / s^2.
+
+A fit that knows K3 as well has a smaller sum of squares, of which the prior's is a part: it falls
+by k^T A k s^2 from |r|^2 + s^2 |z|^2, with z the constants' distance from d = 0 in standard
+deviations of V0. Of n readings and constants as large as V0 says, what is left is s^2 chi^2 of
+n - k degrees of freedom; of constants that are much smaller, of n - k less those that the readings
+determine. The latter is taken: noise then makes a finding no more often than it says, whatever the
+constants are.
 """
 
 from __future__ import annotations
@@ -49,7 +56,13 @@ class Cubes:
 
 
 def cubes_of(
-    axes: str, residual: FloatArray, columns: FloatArray, absorbed: FloatArray, dof: float
+    axes: str,
+    residual: FloatArray,
+    columns: FloatArray,
+    absorbed: FloatArray,
+    dof: float,
+    *,
+    prior_squares: float = 0.0,
 ) -> Cubes | None:
     """K3 from residuals.
 
@@ -61,6 +74,8 @@ def cubes_of(
         C, and J V J^T C / s^2: what the constants take up of it.
     dof : float
         Degrees of freedom of the residuals.
+    prior_squares : float
+        s^2 |z|^2 of a fit with priors, g^2.
 
     Returns
     -------
@@ -74,7 +89,8 @@ def cubes_of(
         return None
     found = np.linalg.solve(left, columns.T @ residual)
     explained = float(found @ left @ found)
-    variance = max(float(residual @ residual) - explained, _ROUNDING_G**2) / (dof - count)
+    squares = float(residual @ residual) + prior_squares
+    variance = max(squares - explained, _ROUNDING_G**2) / (dof - count)
     ratio = explained / count / variance
     return Cubes(
         axes,

@@ -107,7 +107,7 @@ def calibrate_poses(
     outlier = _outliers(unit, found, delivered.full, poses)
     findings = found.findings + outlier
     findings += [BEYOND_1_G] if len(delivered.own.fit.model.quadratic) else []
-    findings += cube_findings([scalar_cubes(delivered.full.fit)])
+    findings += cube_findings([scalar_cubes(delivered.full.fit, found.known.noise)])
     shown = climate.rates if best.trial.rate else None
     measurements = MeasurementSet(poses.source, pose_dwells(poses, found.temps, shown))
     others = [row for row in thermal if row is not best]
