@@ -142,6 +142,16 @@ def test_scales_that_are_wrong_are_named(tmp_path: Path) -> None:
     assert best.name.endswith("range, from pose 10 (line 11) on 0.5 times as much")
 
 
+@pytest.mark.parametrize(("unit", "one_g"), [("m/s^2", 65536.0), ("m/s^2", 7966.0), ("g", 16.4)])
+def test_readings_in_no_unit_are_refused_as_by_calib(
+    tmp_path: Path, unit: str, one_g: float
+) -> None:
+    folder = unit_of(tmp_path / "U", np.rint(readings(16) * one_g * 4.0) / 4.0, unit)
+    with pytest.raises(RefusedError, match=r"long; expected about .*; if these are raw") as refusal:
+        triaxcal.diagnose(folder)
+    assert str(refusal.value) == refusal_of(folder)
+
+
 def test_noise_with_wild_poses_is_no_cause_of_the_list(tmp_path: Path) -> None:
     wild = 0.06 * np.random.default_rng(8).standard_normal((24, 1))
     best = diagnosed(tmp_path / "U", readings(24) * (1.0 + wild)).answer[0]

@@ -37,8 +37,8 @@ def diagnose(unit: Unit | str | Path, readings: Any = None) -> Diagnosis:
     Raises
     ------
     RefusedError
-        When the readings break a rule of the file formats, hold no pose, or are poses whose angles
-        are known.
+        When the readings break a rule of the file formats, hold no pose, are neither in the stated
+        unit nor in another one or of another full scale, or are poses whose angles are known.
     """
     if isinstance(unit, str | Path):
         unit = read_unit(unit)
@@ -70,6 +70,7 @@ def _of_recording(
             remedy="run `triaxcal calib`: it names wrong rows, exchanged columns and lost signs",
         )
     from triaxcal.diagnosis.poses.answer import diagnose_poses  # noqa: PLC0415
+    from triaxcal.diagnosis.poses.causes.scale import factors  # noqa: PLC0415
     from triaxcal.fitting.recorded.faces import face_measurements  # noqa: PLC0415
     from triaxcal.poses.poses import find_poses  # noqa: PLC0415
     from triaxcal.readings.samples import read_samples  # noqa: PLC0415
@@ -77,4 +78,6 @@ def _of_recording(
     samples = read_samples(folder, layout, unit.temperature_sensor, columns)
     if layout.faces:
         return _diagnose(unit, face_measurements(unit, layout, samples))
-    return diagnose_poses(unit, layout, find_poses(samples, layout, any_unit=True))
+    one_g = layout.reading_of_1_g
+    poses = find_poses(samples, layout, factors=factors(one_g) if one_g else ())
+    return diagnose_poses(unit, layout, poses)

@@ -30,10 +30,17 @@ ALIKE_DEG = 5.0
 """Poses nearer than this to each other are one orientation."""
 
 
-def find_poses(samples: Samples, layout: RecordingLayout, *, any_unit: bool = False) -> PoseSet:
+def find_poses(
+    samples: Samples,
+    layout: RecordingLayout,
+    *,
+    any_unit: bool = False,
+    factors: Iterable[float] = (),
+) -> PoseSet:
     """Poses of samples: one a row, one a section or labelled face, or found by stillness.
 
-    `any_unit` takes readings in another unit than stated as they are.
+    `any_unit` takes readings in another unit than stated as they are; `factors` are those of other
+    units and scales that are taken so.
 
     Raises
     ------
@@ -44,7 +51,7 @@ def find_poses(samples: Samples, layout: RecordingLayout, *, any_unit: bool = Fa
     steps = Steps.of(samples)
     found = _found(samples, layout, steps)
     if not any_unit:
-        refuse_wrong_unit(found.source, found.readings, layout, steps)
+        refuse_wrong_unit(found.source, found.readings, layout, steps, factors)
     return found
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
@@ -11,11 +13,17 @@ from triaxcal.unit.recording import RecordingLayout
 
 _COUNTS_MIN = 50.0
 """Length of 1 g in counts: a code of a 50th of 1 g, 20 mg, is coarser than any sensor."""
+NEAR = 1.6
+"""Factor within which biases and scale errors leave what a sound sensor reads."""
 _SIZES = {"m/s^2": 9.80665, "g": 1.0, "mg": 1e3}
 
 
 def refuse_wrong_unit(
-    source: str, readings: FloatArray, layout: RecordingLayout, steps: Steps | None = None
+    source: str,
+    readings: FloatArray,
+    layout: RecordingLayout,
+    steps: Steps | None = None,
+    factors: Iterable[float] = (),
 ) -> None:
     """Refuse readings whose length is not near 1 g in the unit that is stated.
 
@@ -26,6 +34,8 @@ def refuse_wrong_unit(
     readings : array, shape (poses, 3)
     steps : Steps or None
         Of the recording; they tell codes from measured values.
+    factors : iterable of float
+        Lengths in 1 g, as stated, that are accepted beside 1.
     """
     one_g = layout.reading_of_1_g
     length = float(np.median(np.linalg.norm(readings, axis=1)))
@@ -33,7 +43,7 @@ def refuse_wrong_unit(
     if one_g is None:
         _refuse_no_counts(source, layout, length, near)
         return
-    if 0.5 * one_g <= length <= 2.0 * one_g:
+    if 0.5 * one_g <= length <= 2.0 * one_g or any(near_1(length / one_g / f) for f in factors):
         return
     codes = "" if steps is None or near else _codes(steps)
     if codes:
@@ -50,6 +60,11 @@ def refuse_wrong_unit(
         expected=f"about {one_g:g} at rest",
         remedy=remedy,
     )
+
+
+def near_1(length_g: float) -> bool:
+    """Whether a sound sensor may read this length at rest, in 1 g."""
+    return 1.0 / NEAR < length_g < NEAR
 
 
 def _codes(steps: Steps) -> str:

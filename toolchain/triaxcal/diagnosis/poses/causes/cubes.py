@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from triaxcal.diagnosis.core.cause import Cause, Parameter
 from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis
 from triaxcal.diagnosis.poses.core.readings import PoseReadings
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
+from triaxcal.poses.stated import near_1
 
 
 def _without(readings: PoseReadings, amplitudes: FloatArray) -> PoseReadings:
@@ -16,6 +19,9 @@ def _without(readings: PoseReadings, amplitudes: FloatArray) -> PoseReadings:
 
 
 def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
+    lengths = np.linalg.norm(known.readings.outputs, axis=1)
+    if not near_1(float(np.median(lengths)) / known.readings.gravity_g):
+        return  # its size is that of a sensor at 1 g
     yield PoseHypothesis(
         "",
         _without,

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from triaxcal.diagnosis.core.cause import Cause
-from triaxcal.diagnosis.poses.causes.scale import NEAR, POWERS
+from triaxcal.diagnosis.poses.causes.scale import POWERS
 from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis, PoseUndo
 from triaxcal.diagnosis.poses.core.readings import PoseReadings
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
+from triaxcal.poses.stated import near_1
 
 
 def _divided(i: int, factor: float) -> PoseUndo:
@@ -28,7 +29,7 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
     for i, axis in enumerate(AXES):
         others = float(np.delete(span, i).max())
         for factor in POWERS:
-            if not 1.0 / NEAR < span[i] / factor / others < NEAR:
+            if not near_1(span[i] / factor / others):
                 continue
             yield PoseHypothesis(
                 f"output {axis}, {factor:g} times the others",

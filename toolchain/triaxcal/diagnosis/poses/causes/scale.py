@@ -10,12 +10,26 @@ from triaxcal.diagnosis.core.cause import Cause
 from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis, PoseUndo
 from triaxcal.diagnosis.poses.core.readings import PoseReadings
 from triaxcal.model.types import FloatArray
+from triaxcal.poses.stated import near_1
 from triaxcal.unit.recording import ACCELERATION_UNITS
 
 POWERS = (2.0, 0.5, 4.0, 0.25)
 """Of another full scale or gain."""
-NEAR = 1.6
-"""Factor within which biases and scale errors leave what a sound sensor reads."""
+
+
+def factors(one_g: float) -> dict[float, str]:
+    """Lengths of readings in another unit or of another scale, in 1 g as stated, with the remedy.
+
+    `one_g` is the reading of 1 g in the stated unit.
+    """
+    found = {
+        size / one_g: f'with acceleration_unit = "{unit}"'
+        for unit, size in ACCELERATION_UNITS.items()
+        if size is not None and size != one_g
+    }
+    for factor in POWERS:
+        found[factor] = f"with a full scale {1 / factor:g} times the stated one"
+    return found
 
 
 def _divided(factor: float) -> PoseUndo:
@@ -29,16 +43,10 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
     readings = known.readings
     if not readings.nominal:
         return
-    changes = {
-        size / readings.one_g: f'with acceleration_unit = "{unit}"'
-        for unit, size in ACCELERATION_UNITS.items()
-        if size is not None and size != readings.one_g
-    }
-    for factor in POWERS:
-        changes[factor] = f"with a full scale {1 / factor:g} times the stated one"
+    changes = factors(readings.one_g)
     length = float(np.median(np.linalg.norm(readings.outputs, axis=1))) / readings.gravity_g
     for factor, change in changes.items():
-        if not 1.0 / NEAR < length / factor < NEAR:
+        if not near_1(length / factor):
             continue
         yield PoseHypothesis(
             f"{factor:.6g} times what {known.unit} would be",
