@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 import triaxcal
-from fit_cases import TABLE_TEMPS, TABLES, cubic_truth, readings, unit, with_checks
+from fit_cases import SEVEN, TABLE_TEMPS, TABLES, cubic_truth, readings, unit, with_checks
+from triaxcal.delivery.causes import is_certain_fault
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.delivery.judgement import Verdict, judge, limits_that_apply
+from triaxcal.diagnosis import diagnose
+from triaxcal.diagnosis.answer import Amplitude
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.limits import Limits
@@ -94,7 +97,8 @@ def test_one_wrong_dwell_at_an_outer_temperature_is_refused(position):
 
 
 @pytest.mark.parametrize(
-    "powers", [(8.0, 4.0, 1.0), (-15.0, 8.0, -2.5), (1.0, 20.0, 2.0), (15.0, 8.0, 3.0, 0.5)]
+    "powers",
+    [(8.0, 4.0, 1.0), (8.0, 4.0, 2.0), (-15.0, 8.0, -2.5), (1.0, 20.0, 2.0), (15.0, 8.0, 3.0, 0.5)],
 )
 @pytest.mark.parametrize("temps", [(-40.0, 0.0, 20.0, 70.0), FIVE])
 def test_a_sound_unit_with_few_temperatures_and_much_curvature_passes(temps, powers):
@@ -111,6 +115,31 @@ def test_a_sound_unit_with_few_temperatures_and_much_curvature_passes(temps, pow
     between = np.linspace(-40.0, 70.0, 56)
     missed = (calibration.thermal.constants_at(between) - truth(between))[:, 9:] / 0.55
     assert np.abs(missed).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    "powers", [(8.0, 4.0, 2.0), (20.0, -10.0, 5.0), (1.0, 20.0, 2.0), (15.0, 8.0, -20.0)]
+)
+@pytest.mark.parametrize("temps", [TABLE_TEMPS, (-40.0, 0.0, 20.0, 70.0), FIVE, SEVEN])
+def test_bent_curves_of_the_biases_are_no_fault(temps, powers):
+    """Sensitivities that hardly bend, known to 0.2 micro-g, must not say that biases do not."""
+    data = readings(curved(powers), temps, sd_v=1e-7, count=100)
+    found = diagnose(unit(), data)
+    assert not is_certain_fault(found, 1e-3), found.sentence
+    assert "step" not in {s.cause for s in found.answer}
+
+
+def test_a_fault_is_certain_only_where_each_cause_of_the_answer_spoils_constants():
+    data = readings(curved((8.0, 4.0)), NINE, sd_v=1e-5, count=400, spread_degc=0.05)
+    away = with_temperature(data, -40.0, 200.0)
+    found = diagnose(unit(), with_temperature(with_temperature(away, 70.0, -40.0), 200.0, 70.0))
+    assert is_certain_fault(found, 1e-3)
+    best = found.answer[0]
+    symptom = replace(best, spoils=False, log_evidence=best.log_evidence - 1.0)
+    assert not is_certain_fault(replace(found, answer=(*found.answer, symptom)), 1e-3)
+    small = replace(best, amplitudes=(Amplitude("step", "mg", 0.5, 0.1, 0.5e-3),))
+    assert not is_certain_fault(replace(found, answer=(*found.answer, small)), 1e-3)
+    assert not is_certain_fault(replace(found, answer=()), 1e-3)
 
 
 def test_a_curve_through_all_temperatures_is_taken_where_the_simpler_one_misses_them():

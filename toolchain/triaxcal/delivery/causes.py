@@ -80,8 +80,7 @@ def refuse_certain_fault(
     Raises
     ------
     RefusedError
-        When the odds of a fault that spoils constants are beyond `CERTAIN`, and it is larger than
-        the limit.
+        Where `is_certain_fault` of the limit over the range.
     """
     doubtful = _doubtful(unit, measurements, calibration)
     untested = 1 < len(calibration.points) <= calibration.shape.parameters
@@ -91,13 +90,9 @@ def refuse_certain_fault(
         found = causes_of(unit, measurements, calibration)
     except (RefusedError, np.linalg.LinAlgError):
         return
-    if not found.answer or found.answer[0].log_evidence < CERTAIN:
+    if not is_certain_fault(found, unit.limits.over_range_g):
         return
-    best, limit = found.answer[0], unit.limits.over_range_g
-    largest = max((a.moves_g for a in best.amplitudes), default=np.inf)
-    if not best.spoils or largest <= limit:
-        return
-    if best.amplitudes and not doubtful:
+    if not doubtful and any(s.amplitudes for s in found.answer):
         return  # an amount is what strongly bent curves look like as well
     refusal = RefusedError(
         measurements.source,
@@ -108,6 +103,20 @@ def refuse_certain_fault(
         raise _at_its_rows(refusal, found, measurements.source)
     raise RefusedError(
         refusal.place, refusal.found, expected=refusal.expected, remedy=_advice(found, unit)
+    )
+
+
+def is_certain_fault(found: Diagnosis, limit_g: float) -> bool:
+    """Whether readings have a fault that spoils constants by more than a limit.
+
+    The odds against a sound unit are beyond `CERTAIN`, and the readings leave no other cause: each
+    one of the answer spoils constants, and is larger than the limit.
+    """
+    if not found.answer or found.answer[0].log_evidence < CERTAIN:
+        return False
+    return all(
+        s.spoils and max((a.moves_g for a in s.amplitudes), default=np.inf) > limit_g
+        for s in found.answer
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.delivery.causes import CERTAIN, DOUBT
+from triaxcal.delivery.causes import DOUBT, is_certain_fault
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.poses.poseset import PoseSet
 from triaxcal.unit.description import UnitDescription
@@ -60,17 +60,14 @@ def refuse_certain_fault_of_poses(unit: UnitDescription, calibration: Calibratio
     Raises
     ------
     RefusedError
-        When the odds of a fault that spoils constants are beyond `CERTAIN`, and it is larger than
-        the limit.
+        Where `delivery.causes.is_certain_fault` of the larger limit.
     """
     if not doubtful_poses(unit, calibration):
         return
     found, recording = causes_of_poses(unit, calibration), calibration.recording
-    if found is None or recording is None or not found.answer:
+    if found is None or recording is None:
         return
-    best, limit = found.answer[0], max(unit.limits.at_t0_g, unit.limits.over_range_g)
-    largest = max((a.moves_g for a in best.amplitudes), default=np.inf)
-    if best.log_evidence < CERTAIN or not best.spoils or largest <= limit:
+    if not is_certain_fault(found, max(unit.limits.at_t0_g, unit.limits.over_range_g)):
         return
     refusal = RefusedError(
         recording.poses.source,

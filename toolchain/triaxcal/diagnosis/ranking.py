@@ -29,7 +29,14 @@ _ODD = 8
 """Dwells of which one may be wrong: the others stand out less."""
 _SEVERAL = 6
 """Dwells that may be wrong at once."""
-_USUAL = {"noise": 1.4, "tilt": 40e-6, "seat": 100e-6, "curvature": 3.0, "bend": 50e-6}
+_USUAL = {
+    "noise": 1.4,
+    "tilt": 40e-6,
+    "seat": 100e-6,
+    "bias_curvature": 3.0,
+    "curvature": 3.0,
+    "bend": 50e-6,
+}
 """Scales that a sound unit mostly has at the most."""
 _SCATTER = 2.0
 """Of a sum of squares, in its standard deviations."""
@@ -87,7 +94,7 @@ def _alone(sound: Sound, nominal: Nominal) -> list[Ranked]:
     """One cause, by falling evidence."""
     readings = sound.readings
     # What the sound unit takes for noise, tilts and curvature may be the mistake.
-    curved = replace(Scales(), curvature=max(sound.scales.curvature, 3.0))
+    curved = _curved(sound.scales)
     screen = Screen(sound.system, (sound.scales, Scales(), curved))
     known = Known(
         readings, sound.fit.theta, screen.odd_dwells(_ODD), screen.standing_out(_SEVERAL), *nominal
@@ -150,7 +157,7 @@ def _pairs(ranked: Ranked, readings: Readings, nominal: Nominal) -> list[Pair]:
     first = ranked.best
     mended = first.hypothesis.undo(readings, first.amplitudes)
     system = System(mended, first.system.linear_about, first.system.unused)
-    curved = replace(Scales(), curvature=max(first.scales.curvature, 3.0))
+    curved = _curved(first.scales)
     screen = Screen(system, (first.scales, Scales(), curved), first.added)
     known = Known(
         mended, first.fit.theta, screen.odd_dwells(_ODD), screen.standing_out(_SEVERAL), *nominal
@@ -168,6 +175,15 @@ def _pairs(ranked: Ranked, readings: Readings, nominal: Nominal) -> list[Pair]:
 def _by_readings(second: Screened) -> float:
     """Log evidence without what makes a place more probable beforehand: it is the first's too."""
     return second.log_evidence - max(second.hypothesis.log_prior, 0.0)
+
+
+def _curved(found: Scales) -> Scales:
+    """Usual scales, but with curves that bend much."""
+    return replace(
+        Scales(),
+        bias_curvature=max(found.bias_curvature, 3.0),
+        curvature=max(found.curvature, 3.0),
+    )
 
 
 def _sound(readings: Readings) -> Sound:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.diagnosis.core.readings import Readings
+from triaxcal.diagnosis.core.scales import Scales
 from triaxcal.model.types import FloatArray
 
 ORDERS = 5
@@ -15,7 +16,7 @@ _BEND_DEGC = 10.0
 
 
 def _prior_sd() -> tuple[FloatArray, FloatArray]:
-    """Of the constants, shape (3, 4, ORDERS): fixed, and to be multiplied by `curvature`."""
+    """Of the constants, shape (3, 4, ORDERS): fixed, and to be multiplied by the curvatures."""
     fixed, curved = np.zeros((3, 4, ORDERS)), np.zeros((3, 4, ORDERS))
     for i in range(3):
         fixed[i, 0, :2] = 0.5, 0.03
@@ -24,13 +25,19 @@ def _prior_sd() -> tuple[FloatArray, FloatArray]:
             own = i == j
             fixed[i, 1 + j, :2] = (0.05, 0.02) if own else (0.03, 1e-3)
             curved[i, 1 + j, 2:] = (5e-4, 2e-4, 7e-5) if own else (1e-4, 4e-5, 1.5e-5)
-    return fixed.ravel(), curved.ravel()
+    return fixed, curved
 
 
-FIXED_SD, CURVED_SD = _prior_sd()
+_FIXED_SD, _CURVED_SD = _prior_sd()
 MEAN = np.zeros((3, 4, ORDERS))
 """Prior mean of the constants: outputs are in g."""
 MEAN[(0, 1, 2), (1, 2, 3), 0] = 1.0
+
+
+def prior_sd(scales: Scales) -> FloatArray:
+    """Prior standard deviations of the constants, shape (3 * 4 * ORDERS,)."""
+    curvature = np.array([scales.bias_curvature, *3 * [scales.curvature]])[:, None]
+    return np.asarray(np.hypot(_FIXED_SD, curvature * _CURVED_SD)).ravel()
 
 
 def powers(temps_degc: FloatArray, t0_degc: float) -> FloatArray:

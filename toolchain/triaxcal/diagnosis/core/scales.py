@@ -19,8 +19,9 @@ class Scales:
         Of one placement, rad.
     seat : float
         Of a position at all temperatures (squareness and reproducible errors of the rig), rad.
-    curvature : float
-        Of the curves, as a multiple of that of a usual sensor.
+    bias_curvature, curvature : float
+        Of the curves of the biases and of the sensitivities, as multiples of those of a usual
+        sensor. Biases that bend much say nothing of sensitivities.
     bend : float
         Of what no polynomial follows, g.
     """
@@ -28,15 +29,18 @@ class Scales:
     noise: float = 1.0
     tilt: float = 30e-6
     seat: float = 100e-6
+    bias_curvature: float = 1.0
     curvature: float = 1.0
     bend: float = 0.0
 
 
+_CURVATURES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0), 1.5, 1.5
 _CHOICES: dict[str, tuple[tuple[float, ...], float, float]] = {
     "noise": ((0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), 1.0, 0.5),
     "tilt": ((4e-6, 10e-6, 20e-6, 40e-6, 80e-6, 160e-6), 30e-6, 0.8),
     "seat": ((15e-6, 40e-6, 80e-6, 160e-6), 80e-6, 0.6),  # 33": what is more is squareness
-    "curvature": ((0.1, 0.3, 1.0, 3.0, 10.0, 30.0), 1.5, 1.5),
+    "bias_curvature": _CURVATURES,
+    "curvature": _CURVATURES,
     "bend": ((0.0, 50e-6, 100e-6, 200e-6), 70e-6, 0.8),
 }
 """Values of each scale, and mean and standard deviation of its logarithm."""

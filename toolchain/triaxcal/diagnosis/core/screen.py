@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from triaxcal.diagnosis.core.cause import Hypothesis, either, unchanged
-from triaxcal.diagnosis.core.curves import CURVED_SD, FIXED_SD, ORDERS, powers
+from triaxcal.diagnosis.core.curves import ORDERS, powers, prior_sd
 from triaxcal.diagnosis.core.evidence import linked, log_prior
 from triaxcal.diagnosis.core.readings import POSITIONS, Readings
 from triaxcal.diagnosis.core.scales import Scales
@@ -169,7 +169,7 @@ def log_evidence_of_tests(readings: Readings, scales: Scales, unused: BoolArray 
     names = np.array([p for p, t in zip(readings.positions, test, strict=True) if t])
     own = np.array([names == p for p in POSITIONS]).T * scales.seat
     first = 4 * ORDERS
-    sd = np.sqrt(FIXED_SD**2 + (scales.curvature * CURVED_SD) ** 2).reshape(3, 1, first)
+    sd = prior_sd(scales).reshape(3, 1, first)
     whole = np.empty((3, count, first + len(POSITIONS) + 2))
     whole[:, :, :first] = (one[:, :, None] * basis[:, None, :]).reshape(count, first) * sd
     whole[:, :, first] = SQUARE_SD * force.T**2

@@ -18,12 +18,11 @@ from functools import cached_property
 import numpy as np
 
 from triaxcal.diagnosis.core.curves import (
-    CURVED_SD,
-    FIXED_SD,
     MEAN,
     BendFeatures,
     constants,
     powers,
+    prior_sd,
     seen_force,
 )
 from triaxcal.diagnosis.core.readings import POSITIONS, Readings
@@ -247,7 +246,7 @@ class System:
     def columns(self, scales: Scales) -> tuple[FloatArray, FloatArray]:
         """Columns of all parameters of a sound unit, and their prior standard deviations."""
         sds = [
-            np.sqrt(FIXED_SD**2 + (scales.curvature * CURVED_SD) ** 2),
+            prior_sd(scales),
             np.full(3, SQUARE_SD),
             np.full(self._seat.shape[1], scales.seat),
         ]
