@@ -60,7 +60,7 @@ def diagnosed(fault: str, size: str, temps: int, checks: bool, seed: int) -> dic
     seconds = time.process_time() - started
     return {
         "fault": fault, "size": size, "temps": temps, "checks": checks, "seed": seed,
-        "answer": [s.cause for s in found.answer], "doubtful": found.doubtful,
+        "answer": [s.cause for s in found.answer], "doubtful": found.clear,
         "best": found.answer[0].name if found.answer else "", "ms": round(1e3 * seconds),
     }  # fmt: skip
 

@@ -17,13 +17,13 @@ from triaxcal.delivery import causes
 from triaxcal.delivery.causes import causes_of, with_cause
 from triaxcal.delivery.fitted import fit_folder, refuse_beyond_limits
 from triaxcal.diagnosis import diagnose
-from triaxcal.diagnosis.answer import MARGIN
 from triaxcal.diagnosis.causes.registry import CAUSES
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Parameter
 from triaxcal.diagnosis.core.readings import readings_of
 from triaxcal.diagnosis.core.scales import Scales
 from triaxcal.diagnosis.core.screen import log_evidence_of_tests
 from triaxcal.diagnosis.core.sound import System
+from triaxcal.fitting.recorded.wrong import MARGIN
 from triaxcal.readings.measurements import MeasurementSet, write_measurements
 from triaxcal.unit.description import UnitDescription, read_unit
 
@@ -66,9 +66,9 @@ def test_a_cause_that_is_hardly_more_probable_is_no_verdict() -> None:
     unit, measurements, _ = simulated("hysteresis", 3e-3, 2)
     found = diagnose(unit, measurements)
     weak = replace(found, answer=(replace(found.answer[0], log_evidence=MARGIN - 0.1),))
-    assert found.doubtful
+    assert found.clear
     assert "sound unit" not in found.sentence
-    assert not weak.doubtful
+    assert not weak.clear
     assert weak.sentence.startswith("perhaps hysteresis")
     assert "or a sound unit" in weak.sentence or "from a sound unit" in weak.sentence
 
@@ -172,7 +172,7 @@ def test_squares_in_the_calibration_are_no_fault_and_hide_none(tmp_path: Path) -
     assert done.calibration.squares is not None
     assert done.calibration.squares.included
     assert diagnose(unit, measurements).answer[0].cause == "own_square"
-    assert not causes_of(unit, done.measurements, done.calibration).doubtful
+    assert not causes_of(unit, done.measurements, done.calibration).clear
     bad = next(d for d in measurements.dwells if d.position == "CP6")
     dwells = tuple(
         replace(d, voltage_v=d.voltage_v + np.array([2e-3, 0, 0])) if d is bad else d

@@ -27,14 +27,14 @@ def test_a_fault_of_two_milli_g_is_named(fault: str) -> None:
     unit, measurements, _ = simulated(fault, 2e-3, 11)
     found = diagnose(unit, measurements)
     assert CAUSE_OF[fault] in [s.cause for s in found.answer]
-    assert found.doubtful
+    assert found.clear
 
 
 @pytest.mark.parametrize("fault", sorted(UNLISTED))
 def test_what_is_not_in_the_list_has_no_wrong_name(fault: str) -> None:
     unit, measurements, _ = simulated(fault, 2e-3, 11)
     found = diagnose(unit, measurements)
-    assert not found.doubtful or found.answer[0].symptom
+    assert not found.clear or found.answer[0].symptom
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -43,7 +43,7 @@ def test_a_sound_unit_is_not_accused(seed: int) -> None:
     unit, measurements, _ = simulated(
         "none", 0.0, seed, bump_g=0.2e-3, noise=1.5, squareness=30 * ARC
     )
-    assert not diagnose(unit, measurements).doubtful
+    assert not diagnose(unit, measurements).clear
 
 
 def case(name: str) -> Diagnosis:

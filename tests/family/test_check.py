@@ -112,7 +112,8 @@ def test_two_disturbed_poses_are_named(cal: triaxcal.Calibration) -> None:
     poses[11] *= 0.992
     (only,) = cal.check(columns(poses)).result.explanations
     assert re.match(
-        r"pose 9, line \d+ by \+[56]\S* mg and pose 12, line \d+ by -[78]\S* mg alone", only.words
+        r"only pose 9, line \d+ \(by \+[56]\S* mg\) and pose 12, line \d+ \(by -[78]\S* mg\) were",
+        only.words,
     )
     assert "the other 12 poses agree" in only.words
 
@@ -220,7 +221,7 @@ def test_one_bumped_pose_is_named(cal: triaxcal.Calibration) -> None:
     poses[8] *= 1.006
     found = cal.check(columns(poses)).result
     assert not found.passed
-    assert found.explanations[0].words.startswith("pose 9, line ")
+    assert found.explanations[0].words.startswith("only pose 9, line ")
     assert len(found.explanations) == 1
 
 

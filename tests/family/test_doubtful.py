@@ -15,9 +15,10 @@ from test_recordings import WITH_GYRO, calibrated, left_handed
 from test_tables import AIR, HEADER, rows_of, table
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fitting.core.outliers import fisher_tail, worst_outlier
+from triaxcal.fitting.core.outliers import CHANCE, fisher_tail, noncentrality, worst_outlier
 from triaxcal.model.types import FloatArray
 from triaxcal.report.words.temperatures import with_room
+from triaxcal.uncertainty.expected import exceeded_with
 
 
 def findings(folder: Path) -> str:
@@ -41,6 +42,19 @@ def test_the_tail_of_f_is_scipys(components: int) -> None:
             rel = 8 * np.finfo(float).eps * sum(map(abs, sizes))
             found = fisher_tail(components, dof, ratio)
             assert found == pytest.approx(expected, rel=rel, abs=5e-324)
+
+
+@pytest.mark.parametrize(("components", "dof"), [(6, 1), (6, 5), (6, 10), (14, 1_000_000)])
+def test_a_change_is_found_as_often_as_stated_by_few_degrees_of_freedom(
+    components: int, dof: int
+) -> None:
+    """Chi-squares are drawn; the standard error of 95 % by 40 000 is 0.11 %."""
+    ratio = exceeded_with(CHANCE, components, dof) / components
+    h = noncentrality(0.95, components, dof, ratio)
+    random = np.random.default_rng(3)
+    own = random.noncentral_chisquare(components, h, 40_000) / components
+    found = own / (random.chisquare(dof, 40_000) / dof) > ratio
+    assert found.mean() == pytest.approx(0.95, abs=0.0055)
 
 
 def test_the_f_of_a_pose_left_out_is_fishers() -> None:

@@ -19,6 +19,7 @@ from triaxcal.diagnosis import Diagnosis
 from triaxcal.diagnosis.core.cause import Cause
 from triaxcal.diagnosis.poses.causes.registry import POSE_CAUSES
 from triaxcal.diagnosis.poses.core.cause import PoseHypothesis
+from triaxcal.diagnosis.poses.core.readings import PoseReadings
 from triaxcal.model.types import FloatArray
 
 GAIN = np.array([[1.012, 0.006, -0.004], [0.003, 0.991, 0.008], [-0.007, 0.002, 1.004]])
@@ -51,7 +52,7 @@ def refusal_of(folder: Path) -> str:
 def test_no_cause_is_told_of_sound_poses(tmp_path: Path, count: int) -> None:
     for seed, sd in ((0, 2e-4), (1, 3e-3)):
         found = diagnosed(tmp_path / f"{seed}", readings(count, seed, sd))
-        assert not found.doubtful
+        assert not found.clear
         assert found.sentence == "no cause is more probable than a sound unit"
 
 
@@ -82,6 +83,18 @@ def test_small_wrong_poses_are_told_together_where_the_unit_passes(tmp_path: Pat
     assert "check them, remove them" in told
 
 
+def test_many_poses_are_named_by_their_numbers_alone() -> None:
+    """No good pose is among those that are named."""
+    one = np.ones(24)
+    numbers = np.arange(1, 25)
+    own = PoseReadings(
+        numbers, numbers + 1, readings(24), 0 * one, one, one, one, 1.0, 1.0, nominal=True
+    )
+    some = np.array([1, 4, 5, 6, 13, 16, 19])
+    assert own.words(some) == "poses 2, 5-7, 14, 17, 20"
+    assert own.words(some[:2]) == "pose 2 (line 3) and pose 5 (line 6)"
+
+
 def test_a_dead_output_is_no_plane(tmp_path: Path) -> None:
     poses = readings(16)
     poses[:, 1] = 0.01
@@ -94,7 +107,7 @@ def test_poses_in_a_plane_are_no_dead_output(tmp_path: Path) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     a = np.column_stack([np.zeros(16), np.cos(angle), np.sin(angle)])
     poses = a @ GAIN.T + BIAS + 5e-4 * np.random.default_rng(3).standard_normal(a.shape)
-    assert not diagnosed(tmp_path / "U", poses).doubtful
+    assert not diagnosed(tmp_path / "U", poses).clear
 
 
 @pytest.mark.parametrize(("sign", "words"), [(1.0, "repeats"), (-1.0, "is the negative of")])
@@ -132,14 +145,17 @@ def test_scales_that_are_wrong_are_named(tmp_path: Path) -> None:
     assert (whole.cause, whole.change) == ("scale", 'with acceleration_unit = "g"')
     # 12 bits of +-4 g: 512 counts for 1 g, under the name of mg.
     counts = diagnosed(tmp_path / "C", np.rint(512.0 * poses), "mg").answer[0]
-    assert (counts.cause, counts.place) == ("scale", "0.5 times what mg would be")
+    assert (counts.cause, counts.place) == ("scale", "they are 0.5 times what they would be in mg")
     one = poses.copy()
     one[:, 1] *= 2.0
-    assert diagnosed(tmp_path / "O", one).answer[0].place == "output y, 2 times the others"
+    assert (
+        diagnosed(tmp_path / "O", one).answer[0].place
+        == "output y is 2 times as large as the others"
+    )
     changed = poses.copy()
     changed[9:] *= 0.5
     best = diagnosed(tmp_path / "R", changed).answer[0]
-    assert best.name.endswith("range, from pose 10 (line 11) on 0.5 times as much")
+    assert best.name.endswith("range, from pose 10 (line 11) on they are 0.5 times as large")
 
 
 @pytest.mark.parametrize(("unit", "one_g"), [("m/s^2", 65536.0), ("m/s^2", 7966.0), ("g", 16.4)])

@@ -126,7 +126,7 @@ def test_one_bumped_pose_of_six_is_named(cal: triaxcal.Calibration, tmp_path: Pa
     poses = directions(6).copy()
     poses[3] *= 1.02
     path = recorded(tmp_path, poses, bias=U0)
-    alone = r"pose 4, line 6\d\d by \+[12]\S* mg alone is off; the other 5 poses agree"
+    alone = r"only pose 4, line 6\d\d \(by \+[12]\S* mg\) was disturbed; the other 5 poses agree"
     with pytest.raises(RefusedError, match=alone):
         cal.update(path, bias_drift_mg=1.0)
 

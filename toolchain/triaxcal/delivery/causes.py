@@ -160,7 +160,7 @@ def with_cause(
         found = causes_of(unit, measurements, calibration)
     except (RefusedError, np.linalg.LinAlgError):
         return refusal
-    if not found.doubtful:
+    if not found.clear:
         return refusal
     remedy = _advice(found, unit)
     symptom = found.answer[0].symptom

@@ -45,7 +45,7 @@ def with_pose_cause(
     recording = calibration.recording
     if found is None or recording is None or not found.answer:
         return refusal
-    if found.answer[0].symptom or not found.doubtful:
+    if found.answer[0].symptom or not found.clear:
         remedy = f"{refusal.remedy}; {found.sentence}"
         return RefusedError(refusal.place, refusal.found, expected=refusal.expected, remedy=remedy)
     return _refused(refusal, found, recording.poses)

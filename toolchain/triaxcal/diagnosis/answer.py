@@ -17,12 +17,11 @@ from triaxcal.diagnosis.core.readings import Readings, readings_of
 from triaxcal.diagnosis.nextdwell import Request, next_dwell
 from triaxcal.diagnosis.ranking import TOGETHER, Ranked, rank
 from triaxcal.diagnosis.remaining import remaining
+from triaxcal.fitting.recorded.wrong import MARGIN
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.description import UnitDescription
 
-MARGIN = 3.0
-"""Log evidence within which causes are one answer: odds of 20 to 1."""
 _EQUIVALENT = 0.5
 """Difference of log likelihood below which readings cannot tell two causes at all."""
 _PLACES = 8.0
@@ -161,7 +160,7 @@ class Diagnosis:
     request: Request | None
 
     @property
-    def doubtful(self) -> bool:
+    def clear(self) -> bool:
         """Whether the readings tell a cause from a sound unit: odds of 20 to 1 and more."""
         return bool(self.answer and self.answer[0].log_evidence > MARGIN)
 
@@ -171,9 +170,9 @@ class Diagnosis:
         if not self.answer:
             return "no cause is more probable than a sound unit"
         best = self.answer[0]
-        text = f"{'most probably' if self.doubtful else 'perhaps'} {self._best_in_words}"
+        text = f"{'most probably' if self.clear else 'perhaps'} {self._best_in_words}"
         others = [s.name for s in self.answer[1:]]
-        if not self.doubtful:
+        if not self.clear:
             others.append("a sound unit")
         if others:
             text += f"; the readings cannot tell it from {' or '.join(others)}"

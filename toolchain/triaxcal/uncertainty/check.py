@@ -20,15 +20,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.fitting.core.outliers import CHANCE
+from triaxcal.fitting.core.outliers import CHANCE, noncentrality
 from triaxcal.fitting.field.poses import FieldPoses, inside_range
 from triaxcal.fixedpoint.integer_model import STATUS_RAW_RANGE, STATUS_SATURATED
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 from triaxcal.uncertainty.expected import Expected, chance_of, exceeded_with, expectation
 from triaxcal.uncertainty.explain import Explanation, Parts, why
 
-_POWER = 1.645
-"""Normal quantile of 95 %: how surely a change is to be seen."""
+_POWER = 0.95
+"""How surely a change is to be seen."""
 _SEEN_MAX_G = 0.5
 """A larger change of a bias is no small one any more: it counts as not seen."""
 _STATUS = (
@@ -178,15 +178,14 @@ def check_poses(
 def _seen_bias(found: Expected) -> FloatArray:
     """Change of each bias that makes chi-square fail in 95 of 100 cases, shape (3,), g.
 
-    Chi-square of n values with the non-centrality h is about normal with the mean n + h and the
-    variance 2 n + 4 h; it has to exceed the quantile that `CHANCE` allows.
+    A change adds a non-centrality to chi-square, which over its n values is Fisher's F of n and nu
+    degrees of freedom: it has to exceed the quantile that `CHANCE` allows.
     """
     u = found.force_g / np.linalg.norm(found.force_g, axis=1, keepdims=True)
     information = (u * found.solve(u)).sum(axis=0)
-    count, h = len(u), 0.0
+    count = len(u)
     quantile = exceeded_with(CHANCE, count, found.dof)
-    for _ in range(50):
-        h = quantile - count + _POWER * math.sqrt(2.0 * count + 4.0 * h)
+    h = noncentrality(_POWER, count, found.dof, quantile / count)
     seen = np.sqrt(h / np.maximum(information, 1e-300))
     result: FloatArray = np.where(seen < _SEEN_MAX_G, seen, np.inf)
     return result

@@ -195,7 +195,7 @@ def _explanation(cause: _Cause, values: FloatArray, sd: FloatArray, left: Expect
 
 
 def _disturbed(found: Expected, poses: FieldPoses) -> Explanation | None:
-    """A few poses that are off while the others agree; of n poses the worst pays for n tests."""
+    """A few disturbed poses, the others agreeing; of n poses the worst pays for n tests."""
     kept, off, rest = list(range(len(poses))), list[int](), found
     while len(kept) > 2 and len(off) < max(1, len(poses) // 4):
         worst = int(np.abs(rest.left_out).argmax())
@@ -205,9 +205,9 @@ def _disturbed(found: Expected, poses: FieldPoses) -> Explanation | None:
         rest = rest.without(worst)
         chance = chance_of(rest.chi_square, len(kept), rest.dof)
         if chance > _ORDINARY:
-            each = [f"{poses.names[k]} by {found.error_g[k] * 1e3:+.3g} mg" for k in sorted(off)]
-            alone = "alone is off" if len(off) == 1 else "alone are off"
-            words = f"{' and '.join(each)} {alone}; the other {len(kept)} poses agree"
+            each = [f"{poses.names[k]} (by {found.error_g[k] * 1e3:+.3g} mg)" for k in sorted(off)]
+            verb = "was" if len(off) == 1 else "were"
+            words = f"only {' and '.join(each)} {verb} disturbed; the other {len(kept)} poses agree"
             return Explanation(words, len(off), chance)
     return None
 

@@ -202,13 +202,15 @@ def _clusters(temps_degc: list[float]) -> list[int]:
 
 def rows_in_words(rows: IntArray) -> str:
     """Lines of a file: "row 7", "rows 13-18", "rows 2, 5, 9"."""
-    ordered = sorted(int(r) for r in rows)
-    if len(ordered) == 1:
-        return f"row {ordered[0]}"
+    return f"row{'s' * (len(rows) != 1)} {in_runs(rows)}"
+
+
+def in_runs(numbers: IntArray) -> str:
+    """Numbers, of which those that follow each other are one run: "2, 5-9"."""
     runs: list[list[int]] = []
-    for row in ordered:
-        if runs and row == runs[-1][-1] + 1:
-            runs[-1].append(row)
+    for number in sorted(int(n) for n in numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
         else:
-            runs.append([row])
-    return "rows " + ", ".join(f"{r[0]}-{r[-1]}" if len(r) > 1 else str(r[0]) for r in runs)
+            runs.append([number])
+    return ", ".join(f"{r[0]}-{r[-1]}" if len(r) > 1 else str(r[0]) for r in runs)

@@ -47,7 +47,15 @@ _CHOICES: dict[str, tuple[tuple[float, ...], float, float]] = {
 
 
 def log_prior(scales: Scales) -> float:
-    """Logarithm of the prior density of the scales."""
+    """Logarithm of what makes scales less probable than the usual ones; 0 for those.
+
+    It is no density: of each hypothesis the scales are maximised, on these few values, and not
+    integrated out as the noise of poses is (`fitting.core.noise`). So a hypothesis that
+    needs particular scales pays for how unusual they are, and not for how narrow their choice is.
+    Hypotheses that need equally narrow ones pay too little alike, and `MARGIN` holds between them;
+    between others its odds of 20 to 1 are approximate. How often a sound unit is taken for a faulty
+    one is therefore counted on simulated units (bench/diagnosis.py).
+    """
     total = 0.0
     for name, (choices, middle, spread) in _CHOICES.items():
         if not choices[0] <= getattr(scales, name) <= choices[-1]:

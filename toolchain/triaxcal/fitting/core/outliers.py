@@ -22,6 +22,8 @@ from triaxcal.model.types import FloatArray
 
 CHANCE = 1e-3
 """Probability that a pose of a good recording is reported."""
+_OF_NONCENTRALITY = 1e-6
+"""Relative precision of it: no figure shows more digits."""
 _NEVER = 5.0
 """An F below this has a chance above `CHANCE` with up to three components: chi2(3) / 3 is 5.4."""
 _MOST_TERMS = 10_000
@@ -113,3 +115,23 @@ def fisher_tail(components: int, dof: int, ratio: float) -> float:
             break
     beta = math.lgamma(a) + math.lgamma(b) - math.lgamma(a + b)
     return math.exp(a * math.log(x) + b * math.log(y) - beta) * fraction / a
+
+
+def noncentrality(power: float, components: int, dof: int, ratio: float) -> float:
+    """Non-centrality with which F of `components` and `dof` exceeds `ratio` with a chance `power`.
+
+    The numerator is non-central; F without it must exceed `ratio` more rarely than that.
+    """
+    # Of a check alone: SciPy takes long to import.
+    from scipy.special import ncfdtr  # noqa: PLC0415
+
+    def misses(h: float) -> bool:
+        return float(ncfdtr(components, dof, h, ratio)) > 1.0 - power
+
+    low, high = 0.0, 1.0
+    while misses(high):
+        low, high = high, 2.0 * high
+    while high - low > _OF_NONCENTRALITY * high:
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if misses(middle) else (low, middle)
+    return high

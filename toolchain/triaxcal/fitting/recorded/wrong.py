@@ -29,10 +29,10 @@ from triaxcal.model.types import FloatArray, IntArray
 
 SIZES_G = (0.5e-3, 5e-3, 50e-3, 500e-3)
 """Standard deviations of a shift of |a|; each as probable as the others."""
-FAULT_LOG_ODDS = -2.0
+WRONG_LOG_ODDS = -2.0
 """Before the poses, of wrong ones against none: one recording by hand in 8 has some."""
 MARGIN = 3.0
-"""Ln of odds of 20 to 1: within it sets of poses are one answer."""
+"""Ln of odds of 20 to 1: within it sets of poses, and causes, are one answer."""
 _AMONG = 15
 """Poses that stand out most, of which all sets of three are tried."""
 _MOST = 6
@@ -235,4 +235,4 @@ def _evidence(parts: list[tuple[FloatArray, FloatArray]], base: FloatArray) -> F
 def log_prior(count: int, wrong: int) -> float:
     """Of one set of so many of `count` poses, against no wrong pose."""
     several = _SEVERAL if wrong > 1 else 0.0
-    return FAULT_LOG_ODDS - several - math.log(math.comb(count, wrong))
+    return WRONG_LOG_ODDS - several - math.log(math.comb(count, wrong))

@@ -143,7 +143,7 @@ class Passport:
         if worst(errors) <= DOUBT:
             return ""
         found = causes_of(done.unit, done.measurements, done.calibration)
-        return found.sentence if found.doubtful else ""
+        return found.sentence if found.clear else ""
 
     @property
     def _cause_of_poses(self) -> str:
@@ -151,7 +151,7 @@ class Passport:
         if not doubtful_poses(done.unit, done.calibration):
             return ""
         found = causes_of_poses(done.unit, done.calibration)
-        return found.sentence if found is not None and found.doubtful else ""
+        return found.sentence if found is not None and found.clear else ""
 
     @property
     def tested(self) -> bool:

@@ -31,7 +31,7 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
 
 ENTRY = Cause(
     name="larger",
-    label="constants beyond [priors]",
+    label="constants larger than [priors] says",
     doc="Scale factors, cross terms or squares are far larger than [priors] says.",
     hypotheses=_hypotheses,
     apart="the data sheet of the sensor; more poses",

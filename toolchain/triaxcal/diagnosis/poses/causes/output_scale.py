@@ -32,7 +32,7 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
             if not near_1(span[i] / factor / others):
                 continue
             yield PoseHypothesis(
-                f"output {axis}, {factor:g} times the others",
+                f"output {axis} is {factor:g} times as large as the others",
                 _divided(i, factor),
                 lines=known.readings.lines,
                 change=f"with output {axis} divided by {factor:g}",

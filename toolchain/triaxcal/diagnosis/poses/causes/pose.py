@@ -10,10 +10,10 @@ from triaxcal.diagnosis.core.cause import Cause, Parameter
 from triaxcal.diagnosis.core.evidence import FAULT_LOG_ODDS
 from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis, PoseUndo
 from triaxcal.diagnosis.poses.core.readings import PoseReadings
-from triaxcal.fitting.recorded.wrong import FAULT_LOG_ODDS as WRONG_POSES_LOG_ODDS
+from triaxcal.fitting.recorded.wrong import WRONG_LOG_ODDS
 from triaxcal.model.types import FloatArray
 
-MORE_OFTEN = WRONG_POSES_LOG_ODDS - FAULT_LOG_ODDS
+MORE_OFTEN = WRONG_LOG_ODDS - FAULT_LOG_ODDS
 """Wrong poses are more probable than other causes."""
 
 

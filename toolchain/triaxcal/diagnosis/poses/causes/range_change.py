@@ -36,7 +36,7 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
             if abs(ratio / factor - 1.0) > _NEAR or abs(step / factor - 1.0) > _NEAR:
                 continue
             yield PoseHypothesis(
-                f"from {readings.words(np.array([k]))} on {factor:g} times as much",
+                f"from {readings.words(np.array([k]))} on they are {factor:g} times as large",
                 _divided(np.arange(count) >= k, factor),
                 lines=readings.lines[k:],
                 change=f"with these readings divided by {factor:g}",

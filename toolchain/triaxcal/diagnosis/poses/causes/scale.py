@@ -49,7 +49,7 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
         if not near_1(length / factor):
             continue
         yield PoseHypothesis(
-            f"{factor:.6g} times what {known.unit} would be",
+            f"they are {factor:.6g} times what they would be in {known.unit}",
             _divided(factor),
             lines=readings.lines,
             change=change,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from triaxcal.diagnosis.core.readings import in_runs
 from triaxcal.fitting.recorded.prepared import Prepared
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.poses.poseset import PoseSet
@@ -55,10 +56,10 @@ class PoseReadings:
         return replace(self, **changes)  # type: ignore[arg-type]
 
     def words(self, some: IntArray) -> str:
-        """Poses by number and line: "pose 3 (line 120)"."""
+        """Poses by number and line: "pose 3 (line 120)"; of many the numbers, in runs."""
         named = [f"pose {self.numbers[k]} (line {self.lines[k]})" for k in some]
         if len(named) > _NAMED:
-            return f"poses {self.numbers[some[0]]} to {self.numbers[some[-1]]}"
+            return f"poses {in_runs(self.numbers[some])}"
         return " and ".join(filter(None, [", ".join(named[:-1]), named[-1]]))
 
 
