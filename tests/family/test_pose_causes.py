@@ -71,6 +71,22 @@ def test_wrong_poses_are_named_all_of_them(tmp_path: Path, wrong: tuple[int, ...
     assert sizes == pytest.approx(sorted((50.0, -40.0, 60.0)[: len(wrong)]), abs=6.0)
 
 
+def test_what_is_held_out_without_wrong_poses_is_that_of_the_others_alone(tmp_path: Path) -> None:
+    poses, wrong = readings(24), [5, 15]
+    alone = diagnosed(tmp_path / "A", np.delete(poses, wrong, axis=0)).sound
+    poses[wrong] *= [[1.03], [0.97]]
+    best = diagnosed(tmp_path / "U", poses).suspects[0]
+    assert best.cause == "poses"
+    # The same readings and the same fit, but for the scale of the noise, found within 1 / sqrt(22).
+    assert best.remaining.held_out_g == pytest.approx(alone.held_out_g, rel=0.2)
+
+
+def test_nothing_is_held_out_of_poses_of_one_direction(tmp_path: Path) -> None:
+    one = np.tile([0.02, -0.03, 1.01], (8, 1))
+    one += 3e-4 * np.random.default_rng(2).standard_normal(one.shape)
+    assert "micro-g" not in str(diagnosed(tmp_path / "U", one))
+
+
 def test_small_wrong_poses_are_told_together_where_the_unit_passes(tmp_path: Path) -> None:
     poses = readings(30)
     poses[7] *= 1.009

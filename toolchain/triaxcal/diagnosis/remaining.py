@@ -8,6 +8,7 @@ import numpy as np
 
 from triaxcal.diagnosis.core.curves import powers
 from triaxcal.diagnosis.core.readings import Readings
+from triaxcal.fitting.tilter.heldout import LEAST_TEMPERATURES
 from triaxcal.model.types import FloatArray
 
 _CURVES = {1: "a straight line", 2: "a quadratic", 3: "a cubic"}
@@ -75,7 +76,11 @@ def remaining(readings: Readings) -> Remaining:
         rms = float(np.sqrt(np.mean(np.concatenate(known) ** 2)))
         if not best[1] <= rms:
             best = (name, rms, order)
-    return Remaining(best[0], best[1], _of_checks(readings, best[2]))
+    checks_g = _of_checks(readings, best[2])
+    # Of three temperatures, two determine but a line: `calib` holds nothing out either.
+    enough = len(np.unique(np.round(temps / 3.0))) >= LEAST_TEMPERATURES
+    held_out_g = best[1] if enough else float("nan")
+    return Remaining(best[0], held_out_g, checks_g)
 
 
 def _predicted(

@@ -80,9 +80,11 @@ def diagnose_poses(unit: UnitDescription, layout: RecordingLayout, poses: PoseSe
     least = max(fit.log_evidence + _HOPELESS, screened[0][1][0].log_evidence - _FAR)
     near = [item for item in screened if item[1][0].log_evidence > least]
     near += screened[len(near) : max(_FEWEST, len(near))]
-    suspects = [
-        _suspect(cause, quick.careful(s), fit.log_evidence) for cause, best in near for s in best
-    ]
+    judged = [(cause, quick.careful(s)) for cause, best in near for s in best]
+    if found.one_way:  # no pose says anything of another one's orientation
+        base = replace(base, held_out_g=math.nan)
+        judged = [(cause, replace(j, held_out_g=math.nan)) for cause, j in judged]
+    suspects = [_suspect(cause, j, fit.log_evidence) for cause, j in judged]
     return answered(suspects, HeldOut(base.held_out_g))
 
 

@@ -19,7 +19,7 @@ from triaxcal.fitting.core.noise import Linearised, noise_of
 from triaxcal.fitting.core.posterior import Posterior, Prior, fit_map
 from triaxcal.fitting.recorded.prior import FULL, Known
 from triaxcal.fitting.recorded.scalar import ScalarData, residual_of
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
 
 _SMALL = 1e-5
 
@@ -179,9 +179,16 @@ def _held_out(
     A.flat[:: len(A) + 1] += fit.scale**2
     leverage = (B * np.linalg.solve(A, B.T).T).sum(axis=1)
     # A pose that one constant, or one amplitude, is about alone says nothing held out.
-    tested = leverage < 1.0 - _SMALL
+    tested = (leverage < 1.0 - _SMALL) & ~_of_one_pose(slopes, hypothesis)[used]
     left = residual[used][tested] / (1.0 - leverage[tested])
     return float(np.sqrt(np.mean(left**2))) if tested.any() else math.nan
+
+
+def _of_one_pose(slopes: FloatArray, hypothesis: PoseHypothesis) -> BoolArray:
+    """Poses that have an amplitude of their own, (n,): the others say nothing of it."""
+    moved = slopes[:, slopes.shape[1] - len(hypothesis.parameters) :] != 0.0
+    found: BoolArray = moved[:, moved.sum(axis=0) == 1].any(axis=1)
+    return found
 
 
 @dataclass(frozen=True)
