@@ -7,21 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from triaxcal.diagnosis.core.cause import Cause
-from triaxcal.diagnosis.poses.causes.scale import POWERS
-from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis, PoseUndo
-from triaxcal.diagnosis.poses.core.readings import PoseReadings
+from triaxcal.diagnosis.poses.causes.scale import POWERS, divided
+from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis
 from triaxcal.model.positions import AXES
-from triaxcal.model.types import FloatArray
 from triaxcal.poses.stated import near_1
-
-
-def _divided(i: int, factor: float) -> PoseUndo:
-    def undo(readings: PoseReadings, _amplitudes: FloatArray) -> PoseReadings:
-        outputs = readings.outputs.copy()
-        outputs[:, i] /= factor
-        return readings.but(outputs=outputs)
-
-    return undo
 
 
 def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
@@ -33,7 +22,7 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
                 continue
             yield PoseHypothesis(
                 f"output {axis} is {factor:g} times as large as the others",
-                _divided(i, factor),
+                divided(factor, np.arange(3) == i),
                 lines=known.readings.lines,
                 change=f"with output {axis} divided by {factor:g}",
                 places=3.0 * len(POWERS),

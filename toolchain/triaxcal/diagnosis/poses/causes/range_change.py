@@ -7,22 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from triaxcal.diagnosis.core.cause import Cause
-from triaxcal.diagnosis.poses.causes.scale import POWERS
-from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis, PoseUndo
-from triaxcal.diagnosis.poses.core.readings import PoseReadings
-from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.diagnosis.poses.causes.scale import POWERS, divided
+from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis
 
 _NEAR = 0.2
 """Relative difference of lengths that biases and scale factors make."""
-
-
-def _divided(after: BoolArray, factor: float) -> PoseUndo:
-    def undo(readings: PoseReadings, _amplitudes: FloatArray) -> PoseReadings:
-        outputs = readings.outputs.copy()
-        outputs[after] /= factor
-        return readings.but(outputs=outputs)
-
-    return undo
 
 
 def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
@@ -37,7 +26,7 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
                 continue
             yield PoseHypothesis(
                 f"from {readings.words(np.array([k]))} on they are {factor:g} times as large",
-                _divided(np.arange(count) >= k, factor),
+                divided(factor, (np.arange(count) >= k)[:, None]),
                 lines=readings.lines[k:],
                 change=f"with these readings divided by {factor:g}",
                 places=float(len(POWERS) * count),

@@ -9,7 +9,7 @@ import numpy as np
 from triaxcal.diagnosis.core.cause import Cause
 from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis, PoseUndo
 from triaxcal.diagnosis.poses.core.readings import PoseReadings
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.poses.stated import near_1
 from triaxcal.unit.recording import ACCELERATION_UNITS
 
@@ -32,9 +32,11 @@ def factors(one_g: float) -> dict[float, str]:
     return found
 
 
-def _divided(factor: float) -> PoseUndo:
+def divided(factor: float, some: BoolArray | bool = True) -> PoseUndo:
+    """Undo a factor on some outputs: a mask that (n, 3) broadcasts with."""
+
     def undo(readings: PoseReadings, _amplitudes: FloatArray) -> PoseReadings:
-        return readings.but(outputs=readings.outputs / factor)
+        return readings.but(outputs=readings.outputs / np.where(some, factor, 1.0))
 
     return undo
 
@@ -50,7 +52,7 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
             continue
         yield PoseHypothesis(
             f"they are {factor:.6g} times what they would be in {known.unit}",
-            _divided(factor),
+            divided(factor),
             lines=readings.lines,
             change=change,
             places=float(len(changes)),
