@@ -10,18 +10,22 @@ import pytest
 from family_cases import directions
 
 from triaxcal.fitting.recorded.magnitude import fit_with_prior
-from triaxcal.fitting.recorded.prior import FULL, LINEAR, Known
-from triaxcal.fitting.recorded.scalar import ScalarModel, scalar_data
-from triaxcal.fitting.recorded.scales import ScaleEvidence, scales_of
-from triaxcal.fitting.recorded.terms import ODDS
+from triaxcal.fitting.recorded.prior import FULL, LINEAR, OWN_SQUARES, Known
+from triaxcal.fitting.recorded.scalar import GROUPS, ScalarModel, scalar_data
+from triaxcal.fitting.recorded.scales import MOST_OF_A_UNIT, ScaleEvidence, scales_of
+from triaxcal.fitting.recorded.terms import ODDS, scaled_by_poses
+from triaxcal.fitting.recorded.trials import PoseClimate, Trial, judge
+from triaxcal.model.thermal.polynomial import PolynomialShape
 from triaxcal.unit.priors import FirmwareChoice, Priors
 
 CROSS, SCALE = 1.5e-3, 0.015
 
 
-def evidence_of(model: ScalarModel, count: int = 14, seed: int = 7) -> ScaleEvidence:
+def evidence_of(
+    model: ScalarModel, count: int = 14, seed: int = 7, cross_rad: float = CROSS
+) -> ScaleEvidence:
     random = np.random.default_rng(seed)
-    cross = np.triu(CROSS * random.standard_normal((3, 3)), 1)
+    cross = np.triu(cross_rad * random.standard_normal((3, 3)), 1)
     matrix = np.eye(3) + np.diag(SCALE * random.standard_normal(3)) + cross + cross.T
     poses = directions(count, seed=seed) @ matrix.T + 0.02
     poses += 5e-4 * random.standard_normal(poses.shape)
@@ -96,6 +100,51 @@ def test_what_the_poses_do_not_show_keeps_its_scale() -> None:
     assert scales.priors.cross_term_rad == pytest.approx(0.010, rel=0.1)
     assert scales.priors.product_g_per_g2 == pytest.approx(3e-4, rel=0.1)
     assert scales.factors["cross_term_rad"] == pytest.approx(math.e, rel=0.1)
+
+
+def test_a_series_far_from_the_defaults_shows_its_scale() -> None:
+    """0.2 rad is 3 standard deviations of the hyperprior above the default; a unit stops at 2."""
+    units = [evidence_of(LINEAR, seed=seed, cross_rad=0.2) for seed in range(10)]
+    found = scales_of(units, Priors())
+    # 30 numbers show a scale to 13 %; three of that, and what the hyperprior pulls: 3 sd^2.
+    assert found.priors.cross_term_rad == pytest.approx(0.2, rel=0.45)
+    assert 1.08 < found.factors["cross_term_rad"] < 1.25
+    alone = scales_of(units[:1], Priors(), MOST_OF_A_UNIT)
+    assert alone.priors.cross_term_rad == pytest.approx(0.010 * math.exp(2.0), rel=1e-6)
+    assert set(alone.factors) == {"scale_factor"}
+
+
+@pytest.mark.parametrize(("model", "groups"), [(LINEAR, 2), (OWN_SQUARES, 3), (FULL, 4)])
+def test_a_model_knows_its_groups(model: ScalarModel, groups: int) -> None:
+    assert model.groups == GROUPS[:groups]
+    one = replace(model, quadratic=FULL.quadratic[1:2])
+    assert one.groups == (*GROUPS[:2], "product_g_per_g2")
+
+
+def odds_of_squares(seed: int, loss: str) -> float:
+    """Ln of the odds for squares that are not there, of 24 poses with two wrong by 1 %."""
+    random = np.random.default_rng(seed)
+    poses = directions(24, seed=seed) + 3e-4 * random.standard_normal((24, 3))
+    poses[random.choice(24, 2, replace=False)] *= 1.01
+    data = scalar_data(poses + 0.02, np.ones((24, 1)), np.ones(24), 1.0)
+    data = replace(data, count=np.ones(24))
+    climate = PoseClimate(np.full(24, 20.0), None, loss)
+    trial = Trial(
+        FULL,
+        PolynomialShape.over(np.full(24, 20.0), 20.0, 0),
+        1,
+        known=Known(Priors(), 1.0, np.zeros(3)),
+    )
+    full = judge(trial, data, climate, [])
+    trials = [replace(trial, model=model) for model in (LINEAR, OWN_SQUARES, FULL)]
+    linear, *others = (scaled_by_poses(t, data, climate, [], full.fit) for t in trials)
+    return max(other.log_evidence for other in others) - linear.log_evidence
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_odds_under_a_robust_loss_are_of_one_set_of_weights(loss: str) -> None:
+    odds = [odds_of_squares(seed, loss) for seed in range(12)]
+    assert max(odds) < math.log(ODDS)
 
 
 def test_the_key_states_the_odds_of_the_rule() -> None:

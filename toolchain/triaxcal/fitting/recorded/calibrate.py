@@ -98,8 +98,8 @@ def calibrate_poses(
     base = thermal[0].trial
     models = [_with(quadratic, model) for model in models_of(unit)]
     trials = [replace(best.trial, model=model) for model in models]
-    scaled = [scaled_by_poses(trial, found.data, climate, turns.all) for trial in trials]
     full = judge(trials[-1], found.data, climate, turns.all)
+    scaled = [scaled_by_poses(trial, found.data, climate, turns.all, full.fit) for trial in trials]
     delivered = choose_terms(unit, full, scaled)
     rows = [*(s.row for s in scaled), best] + [full] * (len(models) > 1)
     plain = _plain_rows(unit, found, climate, replace(base, known=None), turns)

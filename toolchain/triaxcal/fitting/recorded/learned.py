@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.fitting.recorded.calibrate import fit_of_all_terms
-from triaxcal.fitting.recorded.scales import GROUPS, ScaleEvidence, scales_of
+from triaxcal.fitting.recorded.scalar import GROUPS
+from triaxcal.fitting.recorded.scales import ScaleEvidence, scales_of
 from triaxcal.readings.samples import read_samples
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.priors import Priors

@@ -76,8 +76,7 @@ class Known:
         zero_sd = p.bias_g * gain
         bias = zero_sd**2 * np.eye(3)
         biases = _over_temperature(bias, bias, data.basis, ones)
-        own_square = np.einsum("qij,ij->q", model.quadratic, SQUARES.sum(axis=0)) > 0.0
-        Q = np.where(own_square, p.own_square_g_per_g2, p.product_g_per_g2)
+        Q = np.where(model.own_square, p.own_square_g_per_g2, p.product_g_per_g2)
         covariance = np.zeros((m * g + 3 * P + len(Q),) * 2)
         covariance[: m * g, : m * g] = gains
         covariance[m * g : m * g + 3 * P, m * g : m * g + 3 * P] = biases

@@ -56,6 +56,10 @@ def _square(i: int) -> FloatArray:
     return matrix
 
 
+GROUPS = ("cross_term_rad", "scale_factor", "own_square_g_per_g2", "product_g_per_g2")
+"""Keys of [priors] whose scales poses show."""
+
+
 @dataclass(frozen=True)
 class ScalarModel:
     """Which constants are free.
@@ -83,6 +87,18 @@ class ScalarModel:
     def parameters(self) -> int:
         """Free constants at one temperature."""
         return len(self.gain) + 3 + len(self.quadratic)
+
+    @property
+    def own_square(self) -> BoolArray:
+        """Which of `quadratic` are the square of an axis' own acceleration, (q,)."""
+        result: BoolArray = np.einsum("qij,ij->q", self.quadratic, SQUARES.sum(axis=0)) > 0.0
+        return result
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Those of `GROUPS` that have a constant here; with priors, K has all its entries."""
+        own = self.own_square
+        return GROUPS[:2] + GROUPS[2:3] * bool(own.any()) + GROUPS[3:] * bool((~own).any())
 
 
 _NONE = np.zeros((0, 3, 6))

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from triaxcal.fitting.core.noise import Linearised, noise_of
+from triaxcal.fitting.core.posterior import Posterior
 from triaxcal.fitting.recorded.prior import Known
 from triaxcal.fitting.recorded.solution import ScalarFit
 from triaxcal.model.types import FloatArray
@@ -25,14 +26,13 @@ from triaxcal.unit.priors import Priors
 
 SPREAD = 1.0
 """Standard deviation of ln(scale / stated): a factor of 2.7."""
-GROUPS = ("cross_term_rad", "scale_factor", "own_square_g_per_g2", "product_g_per_g2")
-"""Keys of [priors] whose scales are found, in the order in which a model has them."""
 Score = Callable[[FloatArray], float]
 _COARSE = (-2.4, -1.6, -0.8, 0.0, 0.8, 1.6)
 """Ln of the factors that are tried first: the likelihood of a scale may have two maxima."""
-_MOST = 2.0
-"""Standard deviations by which a scale may exceed the stated one: beyond, the poses contradict it,
-which is said (`recorded.contradicted`) and not healed."""
+MOST_OF_A_UNIT = 2.0
+"""Standard deviations by which the scale of one unit may exceed the stated one: beyond, its poses
+contradict it, which is said (`recorded.contradicted`) and not healed. A series has no such limit:
+its stated scales are the defaults, of sensors of any type."""
 _STEP = 0.25
 _ROUNDS = 40
 _SETTLED = 0.02
@@ -41,28 +41,32 @@ _SETTLED = 0.02
 
 @dataclass(frozen=True)
 class ScaleEvidence:
-    """One unit's poses, linearised about a fit with priors."""
+    """One unit's poses, linearised about a fit with priors.
+
+    Attributes
+    ----------
+    known : Known
+    fit : ScalarFit
+    weighed : Posterior or None
+        Whose weights the poses have, and whose count: fits with a robust loss are compared with
+        those of one of them, for each lowers the weights of what it does not explain itself. None
+        for the fit's own.
+    """
 
     known: Known
     fit: ScalarFit
-
-    @property
-    def groups(self) -> tuple[str, ...]:
-        """The scales that the model has."""
-        return GROUPS[: {0: 2, 3: 3}.get(len(self.fit.model.quadratic), 4)]
+    weighed: Posterior | None = None
 
     @cached_property
     def _triangle(self) -> tuple[FloatArray, FloatArray, float]:
         """Weighted slopes and residuals, as a triangle where rows are many, and their count."""
-        fit, posterior = self.fit, self.fit.posterior
-        assert posterior is not None
-        slopes = fit.jacobian * (posterior.weight / fit.data.weight)[:, None]
-        rows = np.column_stack([slopes, posterior.weight * fit.residual_g])
+        fit, weighed = self.fit, self.weighed or self.fit.posterior
+        assert weighed is not None
+        slopes = fit.jacobian * (weighed.weight / fit.data.weight)[:, None]
+        rows = np.column_stack([slopes, weighed.weight * fit.residual_g])
         if len(rows) > rows.shape[1]:
             rows = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
-        values = fit.data.values
-        count = float((posterior.weight**2).sum()) if values is None else values
-        return rows[:, :-1], rows[:, -1], count
+        return rows[:, :-1], rows[:, -1], weighed.at.values
 
     def log_evidence(self, priors: Priors) -> float:
         """Ln of the probability of the poses under other priors, but for a constant."""
@@ -83,7 +87,7 @@ class Scales:
     priors : Priors
     factors : dict
         By key: factor within which the scale is known, of one standard deviation, the others
-        being unknown as well.
+        being unknown as well. Keys whose scale is at its limit have none.
     log_evidence : float
         Ln of the probability of the poses, scales integrated out, but for a constant.
     """
@@ -93,9 +97,14 @@ class Scales:
     log_evidence: float
 
 
-def scales_of(units: Sequence[ScaleEvidence], stated: Priors) -> Scales:
-    """The scales under which the poses of all units together are most probable."""
-    keys = max((unit.groups for unit in units), key=len)
+def scales_of(units: Sequence[ScaleEvidence], stated: Priors, most: float = math.inf) -> Scales:
+    """The scales under which the poses of all units together are most probable.
+
+    `most` is by how many standard deviations of the hyperprior a scale may exceed the stated one.
+    The probability and the factors are those about the maximum without that limit: at the limit
+    the evidence still rises, and its curvature there says nothing.
+    """
+    keys = max((unit.fit.model.groups for unit in units), key=len)
     start = np.array([math.log(getattr(stated, key)) for key in keys])
 
     def priors_at(away: FloatArray) -> Priors:
@@ -112,14 +121,16 @@ def scales_of(units: Sequence[ScaleEvidence], stated: Priors) -> Scales:
             known[key] = evidence - 0.5 * float((away**2).sum())
         return known[key]
 
-    away = _climb(score, _coarse(score, len(keys)))
-    curvature = _curvature(score, away)
+    top = _climb(score, _coarse(score, len(keys)))
+    curvature = _curvature(score, top)
     # Over coordinates with a standard normal prior, the integral is the top over the root of the
     # determinant; a flat likelihood has 1.
     volume = 0.5 * math.log(float(np.linalg.det(curvature)))
     sd = np.sqrt(np.diag(np.linalg.inv(curvature)))
-    factors = np.exp(SPREAD * sd).tolist()
-    return Scales(priors_at(away), dict(zip(keys, factors, strict=True)), score(away) - volume)
+    factors = dict(zip(keys, np.exp(SPREAD * sd).tolist(), strict=True))
+    away = top if top.max() <= most else _climb(score, np.minimum(top, most), most)
+    free = {key: factors[key] for key, at in zip(keys, away, strict=True) if at < most}
+    return Scales(priors_at(away), free, score(top) - volume)
 
 
 def _coarse(score: Score, count: int) -> FloatArray:
@@ -131,8 +142,8 @@ def _coarse(score: Score, count: int) -> FloatArray:
     return at
 
 
-def _climb(score: Score, start: FloatArray) -> FloatArray:
-    """Maximum of a smooth function, coordinate by coordinate through parabolas.
+def _climb(score: Score, start: FloatArray, most: float = math.inf) -> FloatArray:
+    """Maximum of a smooth function up to `most`, coordinate by coordinate through parabolas.
 
     A step is at most 1: a factor of 2.7 of a scale.
     """
@@ -146,7 +157,7 @@ def _climb(score: Score, start: FloatArray) -> FloatArray:
             curvature = (2.0 * middle - low - high) / _STEP**2
             slope = (high - low) / (2.0 * _STEP)
             step = slope / curvature if curvature > 0.05 else math.copysign(0.5, slope)
-            step = min(max(step, -1.0), 1.0, _MOST - at[k])
+            step = min(max(step, -1.0), 1.0, most - at[k])
             while abs(step) > 1e-3 and score(at + side / _STEP * step) < middle:
                 step *= 0.5
             at[k] += step

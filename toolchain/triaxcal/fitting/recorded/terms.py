@@ -26,7 +26,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.recorded.prior import FULL, LINEAR, OWN_SQUARES
 from triaxcal.fitting.recorded.scalar import ScalarData, ScalarModel
-from triaxcal.fitting.recorded.scales import ScaleEvidence, scales_of
+from triaxcal.fitting.recorded.scales import MOST_OF_A_UNIT, ScaleEvidence, scales_of
 from triaxcal.fitting.recorded.solution import ScalarFit
 from triaxcal.fitting.recorded.trials import Judged, PoseClimate, Trial, Turn, judge
 from triaxcal.model.terms import products
@@ -97,13 +97,21 @@ def models_of(unit: UnitDescription) -> tuple[ScalarModel, ...]:
 
 
 def scaled_by_poses(
-    trial: Trial, data: ScalarData, poses: PoseClimate, left_out: Sequence[Turn]
+    trial: Trial,
+    data: ScalarData,
+    poses: PoseClimate,
+    left_out: Sequence[Turn],
+    full: ScalarFit,
 ) -> Scaled:
-    """A trial with the scales of its priors that the poses show, those held out among them."""
+    """A trial with the scales of its priors that the poses show, those held out among them.
+
+    The poses have the weights of the fit with all terms, `full`.
+    """
     known = trial.known
     assert known is not None
     fit = judge(trial, data, poses, []).fit
-    scales = scales_of([ScaleEvidence(known, fit)], known.priors)
+    evidence = ScaleEvidence(known, fit, full.posterior)
+    scales = scales_of([evidence], known.priors, MOST_OF_A_UNIT)
     model = replace(trial.model, label=f"{trial.model.label}{_SCALED}")
     own = replace(trial, model=model, known=replace(known, priors=scales.priors))
     return Scaled(judge(own, data, poses, left_out), scales.log_evidence)

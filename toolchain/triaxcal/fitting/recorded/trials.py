@@ -22,6 +22,7 @@ from triaxcal.fitting.recorded.checks import CONDITION_MAX
 from triaxcal.fitting.recorded.magnitude import fit_scalar, fit_with_prior
 from triaxcal.fitting.recorded.prior import Known
 from triaxcal.fitting.recorded.scalar import ScalarData, ScalarModel
+from triaxcal.fitting.recorded.scales import ScaleEvidence
 from triaxcal.fitting.recorded.solution import Held, ScalarFit
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import BoolArray, FloatArray
@@ -117,10 +118,12 @@ class Judged:
     errors_g: FloatArray | None = None
     expected_g: float | None = None
 
-    @property
-    def log_evidence(self) -> float:
-        """Of a fit with priors: ln of the probability of the poses."""
-        return -np.inf if self.fit.posterior is None else self.fit.posterior.log_evidence
+    def log_evidence(self, weighed: Judged) -> float:
+        """Ln of the probability of the poses with the weights that another fit gave them."""
+        known = self.trial.known
+        assert known is not None
+        evidence = ScaleEvidence(known, self.fit, weighed.fit.posterior)
+        return evidence.log_evidence(known.priors)
 
     def length_g(self, values: int) -> float | None:
         """Rms |a| - g of the first `values` held-out values, those of orientations; None for 0."""
@@ -239,11 +242,13 @@ def worth_judging(
 def choose(rows: Sequence[Judged]) -> Judged:
     """The simplest candidate that no other beats on what was held out (`beats`).
 
-    Where nothing was held out, the one that the poses make most probable.
+    Where nothing was held out, the one that the poses make most probable: fits with priors, and
+    the poses with the weights of the one with the most constants.
     """
     scored = [row for row in rows if row.errors_g is not None]
     if not scored:
-        return max(rows, key=lambda row: row.log_evidence)
+        full = max(rows, key=lambda row: row.trial.parameters)
+        return max(rows, key=lambda row: row.log_evidence(full))
     unbeaten = [
         row for row in scored if not any(beats(other.errors_g, row.errors_g) for other in scored)
     ]

@@ -8,7 +8,8 @@ and b = W^T C^-1 y, shifts of the standard deviation t make ln of the evidence l
 
     b^T (Q + I / t^2)^-1 b / 2 - ln det(I + t^2 Q) / 2.
 
-s is weighed with its prior. Each of the sets of k poses is as probable as the others. All sets of
+s is weighed with its prior. Each of the sets of k poses is as probable as the others of k
+(`log_prior`). All sets of
 up to three are tried among the poses that stand out most, then one pose more at a time. The search
 is repeated about the solution without the poses found.
 """
@@ -30,7 +31,7 @@ from triaxcal.model.types import FloatArray, IntArray
 SIZES_G = (0.5e-3, 5e-3, 50e-3, 500e-3)
 """Standard deviations of a shift of |a|; each as probable as the others."""
 WRONG_LOG_ODDS = -2.0
-"""Before the poses, of wrong ones against none: one recording by hand in 8 has some."""
+"""Ln of the odds of one wrong pose against none, before the poses: 1 to 7."""
 MARGIN = 3.0
 """Ln of odds of 20 to 1: within it sets of poses, and causes, are one answer."""
 _AMONG = 15
@@ -40,7 +41,8 @@ _SHARE = 4
 """At most one pose of four is looked for: beyond, nobody can say which are the wrong ones."""
 _ALL = 3
 _SEVERAL = math.log(5.0)
-"""Each number of wrong poses is as probable as the others."""
+"""Each number of wrong poses above one is a fifth as probable as one. With up to `_MOST` of them
+the odds of any against none are 0.27, one recording by hand in 5; with up to one, 1 in 8."""
 _NODES = 7
 _ROUNDS = 5
 
