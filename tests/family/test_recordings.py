@@ -10,6 +10,7 @@ import pytest
 from family_cases import COLUMNS, U0, K, csv_text, directions, log, write_unit
 from scipy.io import savemat
 
+import triaxcal
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import fit_folder, refuse_beyond_limits
 from triaxcal.delivery.unit import deliver
@@ -156,6 +157,11 @@ def test_a_clipped_axis_is_named(tmp_path: Path) -> None:
     reasons = {r.number: r.reason for r in calibration.recording.poses.refused}
     told = "axis z is clipped: it stays at 9.5, the largest or smallest reading of the file; "
     assert reasons == dict.fromkeys((1, 7), told + "measure with a wider range")
+    assert "output z above 9.5 m/s^2 is clipped, in poses 1, 7: " in "\n".join(calibration.findings)
+    words = triaxcal.fit(triaxcal.read_unit(tmp_path / "U")).verdict.words
+    assert words.endswith(
+        "; z above 9.5 m/s^2 not tested: clipped there; the change with temperature is unknown"
+    )
 
 
 def test_a_pose_that_drifts_has_its_drift_in_its_uncertainty(tmp_path: Path) -> None:

@@ -77,6 +77,7 @@ def verdict_on(fitted: Fitted, errors_g: FloatArray, found: Uncertainty) -> Verd
     unknown = [s for s in found.sources if s.unknown]
     if not untested and unknown:
         untested = tuple(f"{s.name} is unknown" for s in unknown)
+    untested = (*_clipped(calibration), *untested)
     result = PASSED
     if untested:
         result = AT_DWELLS if recording is None else AT_POSES
@@ -119,6 +120,13 @@ def not_tested(unit: UnitDescription, calibration: Calibration) -> tuple[str, ..
         return ("between the temperatures estimated, not tested",) * estimated
     one = len(calibration.points) == 1
     return ("nothing was held out" if one else "between the temperatures not tested",)
+
+
+def _clipped(calibration: Calibration) -> tuple[str, ...]:
+    """Ends at which an output stayed in poses: what lies beyond has not been measured."""
+    recording, unit = calibration.recording, calibration.reading_unit
+    ends = () if recording is None else recording.poses.clipped
+    return tuple(f"{end} {unit} not tested: clipped there" for end in ends)
 
 
 def _without_dwells(unit: UnitDescription, tested: Sequence[LimitCheck]) -> Iterator[str]:

@@ -82,15 +82,15 @@ def _found(samples: Samples, layout: RecordingLayout, steps: Steps) -> PoseSet:
 
 
 def _sorted_out(
-    judged: Iterable[tuple[Pose, str]],
+    judged: Iterable[tuple[Pose, tuple[str, str]]],
 ) -> tuple[tuple[Pose, ...], tuple[RefusedPose, ...]]:
-    """Poses, and the stretches at rest that are refused, with the reason."""
+    """Poses, and the stretches at rest that are refused, with the reason and a clipped end."""
     poses: list[Pose] = []
     refused: list[RefusedPose] = []
-    for pose, reason in judged:
+    for pose, (reason, end) in judged:
         if reason:
             refused.append(
-                RefusedPose(pose.number, pose.line, pose.start_s, pose.duration_s, reason)
+                RefusedPose(pose.number, pose.line, pose.start_s, pose.duration_s, reason, end)
             )
         else:
             poses.append(pose)
@@ -143,7 +143,7 @@ def _sections(samples: Samples, layout: RecordingLayout) -> Iterator[tuple[Pose,
 
 
 def _section_poses(samples: Samples, layout: RecordingLayout, steps: Steps) -> PoseSet:
-    poses, refused = _sorted_out(_sections(samples, layout))
+    poses, refused = _sorted_out((pose, (why, "")) for pose, why in _sections(samples, layout))
     if not poses:
         first = f": pose {refused[0].number}: {refused[0].reason}" if refused else ""
         labels = ""

@@ -82,13 +82,18 @@ class Pose:
 
 @dataclass(frozen=True)
 class RefusedPose:
-    """A still stretch that is no pose, and why."""
+    """A still stretch that is no pose, and why.
+
+    `clipped` has the end at which an output stays: "y above 7.5" in the unit of the readings; ""
+    where none does.
+    """
 
     number: int
     line: int
     start_s: float
     duration_s: float
     reason: str
+    clipped: str = ""
 
 
 @dataclass(frozen=True)
@@ -124,6 +129,15 @@ class PoseSet:
         """Shape (poses,); None when the recording has no temperature."""
         temps = [p.temp_degc for p in self.poses if p.temp_degc is not None]
         return np.array(temps) if len(temps) == len(self.poses) and temps else None
+
+    @property
+    def clipped(self) -> dict[str, list[int]]:
+        """Ends at which outputs stay, each with the refused stretches at rest that show it."""
+        found: dict[str, list[int]] = {}
+        for refused in self.refused:
+            if refused.clipped:
+                found.setdefault(refused.clipped, []).append(refused.number)
+        return found
 
     @property
     def length_sd(self) -> FloatArray | None:

@@ -44,14 +44,22 @@ class Steady:
         self._coarse = coarse
         self._low, self._high = samples.extremes(READING)
 
-    def reason(self, run: tuple[int, int], scatter: FloatArray) -> str:
-        """Why a still stretch is no pose; "" if it is one."""
+    def reason(self, run: tuple[int, int], scatter: FloatArray) -> tuple[str, str]:
+        """Why a still stretch is no pose, and the end at which an output stays; "" if it is one."""
         length_s = duration_s(self._samples, run)
         # Stretches are found in whole cells: a rounding is no reason.
         if length_s < self._layout.still_s - 0.5 * self._samples.step_s:
-            return f"{length_s:.1f} s at rest, needs {self._layout.still_s:.1f}"
+            return f"{length_s:.1f} s at rest, needs {self._layout.still_s:.1f}", ""
         first = self._samples.part(READING, run[0], run[0] + 1)[0]
-        return self._clipped(scatter, first) or self.moves(scatter)
+        axis = self._clipped(scatter, first)
+        if axis is None:
+            return self.moves(scatter), ""
+        reason = (
+            f"axis {AXES[axis]} is clipped: it stays at {first[axis]:g}, the largest or smallest "
+            "reading of the file; measure with a wider range"
+        )
+        side = "above" if first[axis] == self._high[axis] else "below"
+        return reason, f"{AXES[axis]} {side} {first[axis]:g}"
 
     def moves(self, scatter: FloatArray) -> str:
         """Whether readings of that standard deviation, shape (3,), were not held still."""
@@ -63,13 +71,10 @@ class Steady:
             f"{self._layout.acceleration_unit}: it is not held still"
         )
 
-    def _clipped(self, scatter: FloatArray, first: FloatArray) -> str:
+    def _clipped(self, scatter: FloatArray, first: FloatArray) -> int | None:
         for axis in range(3):
             moves = self._low[axis] < self._high[axis] and not self._coarse[axis]
             stuck = moves and scatter[axis] == 0.0 and (np.delete(scatter, axis) > 0.0).any()
             if stuck and first[axis] in (self._low[axis], self._high[axis]):
-                return (
-                    f"axis {AXES[axis]} is clipped: it stays at {first[axis]:g}, the largest or "
-                    "smallest reading of the file; measure with a wider range"
-                )
-        return ""
+                return axis
+        return None

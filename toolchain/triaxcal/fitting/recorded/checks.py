@@ -37,6 +37,16 @@ _SIGN_UNKNOWN = (
 )
 
 
+def clipped_findings(poses: PoseSet, layout: RecordingLayout) -> list[str]:
+    """Outputs that stay at an end: what lies beyond it is not measured."""
+    return [
+        f"output {end} {layout.acceleration_unit} is clipped, in pose{'s' * (len(shown) > 1)} "
+        f"{', '.join(map(str, shown))}: accelerations beyond are measured by no pose, and the C "
+        "does not see that such a reading is wrong; measure with a wider range"
+        for end, shown in poses.clipped.items()
+    ]
+
+
 def turned_columns(layout: RecordingLayout, order: Sequence[int], turned: Sequence[bool]) -> str:
     """Line for unit.toml: the layout's own columns in another order, some with the other sign."""
     words = []

@@ -9,6 +9,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.fitting.core.noise import NOISE
 from triaxcal.fitting.recorded.checks import (
+    clipped_findings,
     crowd_finding,
     open_finding,
     refuse_left_handed,
@@ -60,7 +61,7 @@ def prepare(
 
 def weighed(unit: UnitDescription, layout: RecordingLayout, poses: PoseSet) -> Prepared:
     """The same without what samples between the poses say of the axes."""
-    findings = [*poses.findings]
+    findings = [*poses.findings, *clipped_findings(poses, layout)]
     refuse_no_numbers(poses)
     recorded = poses.temps_degc
     temps = np.full(len(poses.poses), unit.t0_degc) if recorded is None else recorded
