@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.uncertainty.evaluate import uncertainty
+from triaxcal.uncertainty.source import Source
 from triaxcal.unit.priors import Priors
 
 TEMPS = (-40.0, 20.0, 70.0)
@@ -32,7 +33,7 @@ def output(force: FloatArray, temp: float, squares: FloatArray) -> FloatArray:
 
 def measured(
     squares: FloatArray, *, tilt_arcsec: float = 0.0, checks: int = 0, seed: int = 0,
-    sd_v: float = 5e-7,
+    sd_v: float = 5e-7, along: Sequence[tuple[float, float, float]] = (),
 ) -> MeasurementSet:  # fmt: skip
     """Six positions, each tilted the same at all temperatures, and check dwells at +20 degC."""
     random = np.random.default_rng(seed)
@@ -45,11 +46,13 @@ def measured(
         dwells.append(Dwell(len(dwells) + 2, position, temp, volts, 100, np.full(3, 10 * sd_v)))
 
     for temp in TEMPS:
-        for (position, along), tilt in zip(TEST_POSITIONS.items(), tilts, strict=True):
-            force = np.array(along, dtype=float)
+        for (position, up), tilt in zip(TEST_POSITIONS.items(), tilts, strict=True):
+            force = np.array(up, dtype=float)
             add(position, temp, force + np.cross(tilt, force))
     for k in range(checks):
         add(f"CP{k % 6 + 1}", 20.0, random.normal(size=3))
+    for direction in along:
+        add("CP1", 20.0, np.array(direction))
     return MeasurementSet("m.csv", tuple(dwells))
 
 
@@ -71,7 +74,8 @@ def test_a_unit_with_squares_is_compensated_in_any_direction(checks):
     own = unit()
     calibration = calibrate(own, data)
     assert calibration.squares.included
-    assert judge(Fitted(own, data, "", calibration)).passed
+    # Six positions alone do not tell a square from a saturated reading.
+    assert judge(Fitted(own, data, "", calibration)).passed == (checks > 0)
     random = np.random.default_rng(1)
     force = random.normal(size=(300, 3))
     force /= np.linalg.norm(force, axis=1)[:, None]
@@ -146,6 +150,71 @@ def test_the_squares_are_in_the_budget():
     sound = calibrate(own, measured(0.0 * K2, tilt_arcsec=20.0))
     keys = [s.key for s in uncertainty(own, measured(0.0 * K2), sound, None).sources]
     assert "own_squares" not in keys
+
+
+def saturated(limit_g: float, checks: Sequence[tuple[float, float, float]] = ()) -> MeasurementSet:
+    """A linear unit whose x output stops at `limit_g`, at +20 degC; check dwells along `checks`."""
+    dwells: list[Dwell] = []
+
+    def add(position: str, along: tuple[float, float, float]) -> None:
+        force = np.array(along) / np.linalg.norm(along)
+        dwells.append(Dwell(len(dwells) + 2, position, 20.0, stopped(force, limit_g), 100, SD))
+
+    for position, along in TEST_POSITIONS.items():
+        add(position, along)
+    for along in checks:
+        add("CP1", along)
+    return MeasurementSet("m.csv", tuple(dwells))
+
+
+SD = np.full(3, 5e-6)
+
+
+def stopped(force: FloatArray, limit_g: float) -> FloatArray:
+    """Readings of `output` without squares, x no farther than at `limit_g`."""
+    volts = output(force, 20.0, 0.0 * K2)
+    end = output(np.array([limit_g, 0.0, 0.0]), 20.0, 0.0 * K2)[0]
+    volts[0] = max(volts[0], end) if K[0, 0] < 0.0 else min(volts[0], end)
+    return volts
+
+
+def square_form(data: MeasurementSet) -> list[Source]:
+    calibration = calibrate(unit(), data)
+    sources = uncertainty(unit(), data, calibration, None).sources
+    return [s for s in sources if s.key == "square_form"]
+
+
+@pytest.mark.parametrize("limit_g", [0.95, 0.99])
+def test_a_saturated_position_is_not_passed_as_a_square(limit_g):
+    """Its error is within the stated uncertainty wherever the output is not saturated."""
+    data, own = saturated(limit_g), unit()
+    calibration = calibrate(own, data)
+    assert calibration.squares.included
+    assert not judge(Fitted(own, data, "", calibration)).passed
+    assert any("may as well be saturation" in n and "square of x" in n for n in calibration.notes)
+    angles = np.linspace(0.0, np.pi, 181)
+    force = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
+    force = force[force[:, 0] < limit_g]
+    volts = np.array([stopped(f, limit_g) for f in force])
+    found = calibration.terms.force_g(
+        force_from_voltage(calibration.thermal.constants_at(20.0), volts)
+    )
+    error = np.linalg.norm(found, axis=1) - 1.0
+    stated = uncertainty(own, data, calibration, None).force_u_in(force)[0, :, 3]
+    assert np.abs(error).max() > 0.5 * (1.0 - limit_g)
+    assert (np.abs(error) < stated).all()
+
+
+def test_check_dwells_off_the_faces_tell_a_square():
+    around = [(0.0, 0.8, 0.6), (0.0, -0.8, 0.6), (0.0, 0.6, -0.8)]
+    assert square_form(measured(K2))
+    both = [(0.8, 0.4, 0.4), (-0.8, 0.4, 0.4)]
+    assert not square_form(measured(K2, along=[*around, *both]))
+    (left,) = square_form(measured(K2, along=around))
+    # x has no check dwell: one of three forms, of which one is wrong by 2 Q g^2 at an end.
+    assert left.sd == pytest.approx(2.0 * K2[0] / np.sqrt(3.0), rel=0.01)
+    note = calibrate(unit(), measured(K2, along=around)).notes[1]
+    assert "the square of x may as well be saturation" in note
 
 
 def write_unit(folder: Path, data: MeasurementSet, more: Callable[[str], str] = str) -> Path:

@@ -24,7 +24,7 @@ from triaxcal.uncertainty.rig_sources import rig_sources
 from triaxcal.uncertainty.run_sources import run_source
 from triaxcal.uncertainty.scatter import Scatter, scatter
 from triaxcal.uncertainty.source import Source
-from triaxcal.uncertainty.terms_sources import pair_source, squares_source
+from triaxcal.uncertainty.terms_sources import pair_source, square_form_source, squares_source
 from triaxcal.unit.description import UnitDescription
 
 LENGTH = 3
@@ -180,6 +180,7 @@ def uncertainty(
         *run_source(p),
         thermal_model(p, s),
         *squares_source(p),
+        *square_form_source(p),
         *pair_source(p),
         *device_sources(p, device),
     ]

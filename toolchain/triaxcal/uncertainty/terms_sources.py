@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from triaxcal.fitting.core.recorded import RecordingFit, TermsCovariance
+from triaxcal.fitting.tilter.squares import END_FORMS
 from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.propagation import ROWS, Curves, Propagation, square
 from triaxcal.uncertainty.source import STUDENT, Source, direct
@@ -65,6 +66,36 @@ def squares_source(p: Propagation) -> list[Source]:
             origin="squareness and noise in the half-sums over opposite positions, with the prior",
             advice="square the tilter's faces, or add check dwells",
             force=square(factor),
+        )
+    ]
+
+
+def square_form_source(p: Propagation) -> list[Source]:
+    """Own-axis squares that may be one wrong reading at an end: `fitting.tilter.squares`.
+
+    The square and a wrong reading at each end that no check dwell has tested are as probable as one
+    another: variance of their n errors (one is zero), sum of squares by n.
+    """
+    squares = p.calibration.squares
+    if squares is None or not squares.included or not squares.untested.any():
+        return []
+    g = p.unit.gravity_g
+    forms = 1 + squares.untested.sum(axis=1)
+    size = np.abs(squares.per_g) / np.sqrt(forms) * (forms > 1)
+    factor = np.zeros((30, 3, 2))
+    for i in range(3):
+        factor[_QUADRATIC[7 * i], i] = size[i] * squares.untested[i]
+        factor[10 * i + i, i] = size[i] * squares.untested[i] * END_FORMS * g
+    return [
+        Source(
+            key="square_form",
+            name="the form of the nonlinearity between the positions",
+            sd=float(2.0 * size.max() * g**2),
+            unit="g",
+            distribution="two or three values",
+            origin="not tested between the positions: a square, or one wrong reading at an end",
+            advice="measure check dwells between the axes",
+            force=np.broadcast_to(square(factor.reshape(30, 6)), (len(p.temps_degc), 30, 30)),
         )
     ]
 

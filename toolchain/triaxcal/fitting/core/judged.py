@@ -119,6 +119,9 @@ class OwnSquares:
         |a| - g at check dwells. None where there are none.
     asked : str
         [firmware] terms.
+    untested : array, shape (3, 2)
+        Whether no check dwell tells each from a wrong reading, as a saturated one, at + 1 g, and
+        from one at - 1 g.
     """
 
     per_g: FloatArray
@@ -131,6 +134,7 @@ class OwnSquares:
     held_out_g: tuple[float, float] | None
     checks_g: tuple[float, float] | None
     asked: str
+    untested: BoolArray
 
     @property
     def significant(self) -> bool:

@@ -22,6 +22,11 @@ The squares go into the C where all of this holds, or where [firmware] terms say
 
 Where they do, readings are straightened: K (l - a) is taken off in each position, and all that
 follows is linear as ever.
+
+A square passes through any three values of an axis, at -g, 0 and +g. One reading that is wrong by
+2 Q g^2 at one end, by saturation or else, looks the same there. If it is that, the force with the
+square is wrong by Q (a^2 +- g a), up to 2 Q g^2 (`END_FORMS`). Check dwells tell it where this is
+more than they leave of |a| - g.
 """
 
 from __future__ import annotations
@@ -36,9 +41,11 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.grouping import TemperatureGroup
 from triaxcal.fitting.core.judged import OwnSquares
 from triaxcal.fitting.core.outliers import fisher_tail
+from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.terms import Terms, products
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.readings.measurements import Dwell
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.priors import AUTO, LINEAR
 
@@ -49,6 +56,10 @@ _LEVEL_ARCSEC = 20.0
 """Where [uncertainty] level_arcsec is not given, as in the budget."""
 _RADIANS_PER_ARCSEC = math.pi / 180.0 / 3600.0
 _ROUNDING_G = 1e-12
+END_FORMS = np.array([1.0, -1.0])
+"""Sign s of the error Q (a^2 + s g a) of a square that is one wrong reading at s g."""
+_SEEN = 3.0
+"""Times the rms of |a| - g at the check dwells: what one of them shows."""
 
 
 def own_squares(unit: UnitDescription, groups: Sequence[TemperatureGroup]) -> OwnSquares:
@@ -84,6 +95,7 @@ def own_squares(unit: UnitDescription, groups: Sequence[TemperatureGroup]) -> Ow
         held_out_g=held_out,
         checks_g=None,
         asked=unit.firmware_terms,
+        untested=np.ones((3, 2), dtype=np.bool_),
     )
 
 
@@ -128,7 +140,29 @@ def judged_by_checks(
     if not len(errors[0]):
         return squares
     without, having = (float(np.sqrt(np.mean(e**2))) for e in errors)
-    return replace(squares, checks_g=(without, having))
+    untested = _untested(squares, straightened, having)
+    return replace(squares, checks_g=(without, having), untested=untested)
+
+
+def _untested(squares: OwnSquares, straightened: Calibration, rms_g: float) -> BoolArray:
+    """Ends of which no check dwell shows that the reading there was right, shape (3, 2).
+
+    A dwell in the saturated part itself, the last 2 Q g^2, is wrong with the reading at the end.
+    """
+    force = np.array([_force_g(straightened, c.dwell) for c in straightened.check_dwells])
+    length = np.linalg.norm(force, axis=1)[:, None, None]
+    at, Q = force[:, :, None], squares.per_g[:, None]
+    error = Q * (at**2 + END_FORMS * length * at)
+    inside = END_FORMS * at < length - 2.0 * np.abs(Q) * length**2
+    shown = inside & (np.abs(error * at) > _SEEN * rms_g * length)
+    result: BoolArray = ~shown.any(axis=0)
+    return result
+
+
+def _force_g(calibration: Calibration, dwell: Dwell) -> FloatArray:
+    constants = calibration.thermal.constants_at(dwell.temp_degc)
+    linear = force_from_voltage(constants, dwell.voltage_v)
+    return calibration.terms.force_g(linear)
 
 
 def with_squares(terms: Terms, squares: OwnSquares) -> Terms:
@@ -176,14 +210,29 @@ def square_notes(squares: OwnSquares) -> tuple[str, ...]:
         f"{squares.prior_per_g * 1e3:g})"
     )
     if squares.included and squares.asked != AUTO:
-        return (f"{text}, in the C by [firmware] terms",)
+        return (f"{text}, in the C by [firmware] terms", *_untested_notes(squares))
     sizes = (
         f"{squares.effect_g * 1e3:.3g} mg at 1 g against {squares.matters_g * 1e3:.2g} mg, the "
         "standard uncertainty of a component without them"
     )
     if squares.included:
-        return (f"{text}, in the C: {sizes}{_held_out_words(squares)}",)
+        return (f"{text}, in the C: {sizes}{_held_out_words(squares)}", *_untested_notes(squares))
     return (f"{text}, not in the C: {sizes}{_held_out_words(squares)}",)
+
+
+def _untested_notes(squares: OwnSquares) -> tuple[str, ...]:
+    """The largest of the squares that no check dwell tells from one wrong reading."""
+    sizes = np.abs(squares.per_g) * squares.untested.any(axis=1)
+    if not squares.significant or sizes.max() <= squares.sd_per_g:
+        return ()
+    axis = AXES[int(sizes.argmax())]
+    text = (
+        f"the square of {axis} may as well be saturation at one end or one wrong dwell: the six "
+        "positions cannot tell them apart. If it is one of these, the C is wrong by up to "
+        f"{2e3 * sizes.max():.3g} mg between the positions; it is in the uncertainty. Measure "
+        f"check dwells with {axis} at about +0.8 and -0.8 g"
+    )
+    return (text,)
 
 
 def _held_out_words(squares: OwnSquares) -> str:
