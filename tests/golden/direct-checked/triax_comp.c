@@ -229,28 +229,28 @@ static void evaluate_state(triax_state_t *state, const triax_segment_t *segment,
 #endif
 }
 
-/* The sum starts from the offset. r0 to r3 and lr are for operands; r7 may be a frame pointer, r9 the platform's. */
+/* The sum starts from the offset. r0 to r4 are for operands; r7 may be a frame pointer, r9 the platform's. */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz,
                        int32_t accel[3])
 {
     const int32_t *row = state->row[0];
     __asm__ volatile(
-        "ldmia %[row]!, {r4, r5, r6, r8, r10}\n\t"
-        "smlal r8, r10, r4, %[ux]\n\t"
-        "smlal r8, r10, r5, %[uy]\n\t"
-        "smlal r8, r10, r6, %[uz]\n\t"
-        "ldmia %[row]!, {r4, r5, r6, r8, r11}\n\t"
-        "smlal r8, r11, r4, %[ux]\n\t"
-        "smlal r8, r11, r5, %[uy]\n\t"
-        "smlal r8, r11, r6, %[uz]\n\t"
-        "ldmia %[row]!, {r4, r5, r6, r8, r12}\n\t"
-        "smlal r8, r12, r4, %[ux]\n\t"
-        "smlal r8, r12, r5, %[uy]\n\t"
-        "smlal r8, r12, r6, %[uz]\n\t"
-        "stmia %[accel], {r10, r11, r12}"
+        "ldmia %[row]!, {r5, r6, r8, r10, r11}\n\t"
+        "smlal r10, r11, r5, %[ux]\n\t"
+        "smlal r10, r11, r6, %[uy]\n\t"
+        "smlal r10, r11, r8, %[uz]\n\t"
+        "ldmia %[row]!, {r5, r6, r8, r10, r12}\n\t"
+        "smlal r10, r12, r5, %[ux]\n\t"
+        "smlal r10, r12, r6, %[uy]\n\t"
+        "smlal r10, r12, r8, %[uz]\n\t"
+        "ldmia %[row]!, {r5, r6, r8, r10, lr}\n\t"
+        "smlal r10, lr, r5, %[ux]\n\t"
+        "smlal r10, lr, r6, %[uy]\n\t"
+        "smlal r10, lr, r8, %[uz]\n\t"
+        "stmia %[accel], {r11, r12, lr}"
         : [row] "+&r"(row)
         : [ux] "r"(ux), [uy] "r"(uy), [uz] "r"(uz), [accel] "r"(accel)
-        : "r4", "r5", "r6", "r8", "r10", "r11", "r12", "memory");
+        : "r5", "r6", "r8", "r10", "r11", "r12", "lr", "memory");
 }
 #endif
 
