@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -61,6 +62,19 @@ def test_residuals_are_those_of_the_compensated_force(made: Delivery) -> None:
             assert abs(residual.error_g - expected) < 1.5e-6
             compared += 1
     assert compared == 15
+
+
+def test_the_header_lists_the_terms_as_the_c_has_them(made: Delivery) -> None:
+    header = made.files["triax_calib.h"].decode()
+    assert "with quadratic terms and a term in dT/dt, fitted to " in header
+    assert " * a = l + Q p(l), l = K^-1 (U - U0) + r dT/dt, " in header
+    listed = {m[1]: float(m[2]) for m in re.finditer(r"(Q[xyz]\.[xyz]{2}) ([+-][.\d]+)", header)}
+    constants = made.files["triax_calib.c"].decode()
+    in_c = re.findall(r"/\* Q([xyz])([xyz]{2}): (\S+) g/g\^2", constants)
+    assert len(in_c) == len(listed) == 18
+    for axis, product, value in in_c:
+        # Five digits of a mg are listed.
+        assert listed[f"Q{axis}.{product}"] == pytest.approx(1e3 * float(value), abs=0.6e-5)
 
 
 def test_the_a2l_words_stand_where_the_compiler_puts_them(made: Delivery) -> None:

@@ -92,7 +92,7 @@ def test_a_unit_with_squares_is_compensated_in_any_direction(checks):
 def test_the_note_has_the_rule_and_its_numbers():
     calibration = calibrate(unit(), measured(K2, checks=12))
     note = next(n for n in calibration.notes if "own-axis squares" in n)
-    assert "own-axis squares x +5, y -4, z +2 mg/g^2" in note
+    assert "own-axis squares (a = l + Q l^2) Qx.xx -5, Qy.yy +4, Qz.zz -2 mg/g^2" in note
     assert "100 % from the readings, the rest from the prior of 5" in note
     assert "in the C: 5 mg at 1 g against 0.097 mg, the standard uncertainty" in note
     assert "at temperatures held out they leave" in note

@@ -167,10 +167,11 @@ def _files(firmware: Firmware) -> dict[str, bytes]:
     low, high = calibration.range_degc
     reading = calibration.reading_unit
     method = METHODS[firmware.compensation.method].label
+    more = f", with {calibration.terms.words}" if calibration.terms.words else ""
     summary = (
         f"method {method}: {_FORMS[plan.shape.form]}, {low:g} to {high:g} degC",
         f"functions of order {plan.shape.order} on {plan.shape.segments} segment(s)",
-        f"thermal model: {calibration.shape.label}, fitted to {fitted_to(calibration)}",
+        f"thermal model: {calibration.shape.label}{more}, fitted to {fitted_to(calibration)}",
         f"raw code: {unit.adc.bits} bits for {unit.adc.full_scale_v:g} {reading} full scale",
         "code32 is a raw code left-justified to 32 bits",
         *_reading_note(unit, calibration),
@@ -202,10 +203,14 @@ def _constants_at_t0(calibration: Calibration) -> list[str]:
     t0_degc = calibration.thermal.t0_degc
     K, U0 = unpack_constants(calibration.thermal.constants_at(t0_degc))
     units = f"K x, y, z in {calibration.gain_unit} and U0 in {calibration.reading_unit}"
-    return [f"at {t0_degc:g} degC, {units}:"] + [
-        f"  {axis}  {K[i, 0]:+.9f} {K[i, 1]:+.9f} {K[i, 2]:+.9f}   {U0[i]:+.9f}"
-        for i, axis in enumerate(AXES)
-    ]
+    return (
+        [f"at {t0_degc:g} degC, {units}:"]
+        + [
+            f"  {axis}  {K[i, 0]:+.9f} {K[i, 1]:+.9f} {K[i, 2]:+.9f}   {U0[i]:+.9f}"
+            for i, axis in enumerate(AXES)
+        ]
+        + calibration.terms.lines()
+    )
 
 
 def _tested(verdict: Verdict) -> list[str]:

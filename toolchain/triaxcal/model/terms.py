@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 
 PRODUCT_NAMES: tuple[str, ...] = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -91,6 +92,33 @@ class Terms:
             return linear
         result: FloatArray = linear + products(linear) @ self.quadratic_per_g.T
         return result
+
+    @property
+    def quadratic(self) -> dict[str, float]:
+        """Q by name, g/g^2, without what is zero: "Qx.xx" adds l_x^2 to a_x."""
+        Q = np.zeros((3, 6)) if self.quadratic_per_g is None else self.quadratic_per_g
+        return {
+            f"Q{axis}.{name}": float(Q[i, k])
+            for i, axis in enumerate(AXES)
+            for k, name in enumerate(PRODUCT_NAMES)
+            if Q[i, k]
+        }
+
+    @property
+    def words(self) -> str:
+        """What there is besides the linear constants; "" where nothing is."""
+        own = {f"Q{axis}.{axis}{axis}" for axis in AXES}
+        quadratic = "own-axis squares" if self.quadratic.keys() <= own else "quadratic terms"
+        found = [quadratic] * bool(self.quadratic)
+        return " and ".join(found + ["a term in dT/dt"] * (self.rate is not None))
+
+    def lines(self) -> list[str]:
+        """The equation and Q, three entries a line; nothing without quadratic terms."""
+        each = [f"{name} {value * 1e3:+.5f}" for name, value in self.quadratic.items()]
+        rows = ["  " + "  ".join(each[k : k + 3]) for k in range(0, len(each), 3)]
+        rate = "" if self.rate is None else " + r dT/dt"
+        equation = f"a = l + Q p(l), l = K^-1 (U - U0){rate}, p(l) products of l (xx: l_x^2)"
+        return [f"{equation}; Q in mg/g^2:", *rows] if rows else []
 
 
 NO_TERMS = Terms()

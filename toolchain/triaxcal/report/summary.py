@@ -118,7 +118,7 @@ def _constants(calibration: Calibration) -> str:
     ]
     of_gain = [f"K.{axis} {calibration.gain_unit}" for axis in AXES]
     head = [f"constants at {t0:g} degC", *of_gain, f"U0 {name}"]
-    return "\n".join(table(head, rows))
+    return "\n".join([*table(head, rows), *calibration.terms.lines()])
 
 
 def _shares(calibration: Calibration) -> list[str]:

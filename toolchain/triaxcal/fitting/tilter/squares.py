@@ -202,12 +202,13 @@ def square_notes(squares: OwnSquares) -> tuple[str, ...]:
     if not squares.included and (squares.asked == LINEAR or not squares.significant):
         return ()
     values = ", ".join(
-        f"{axis} {value * 1e3:+.3g}" for axis, value in zip(AXES, -squares.per_g, strict=True)
+        f"Q{axis}.{axis}{axis} {value * 1e3:+.3g}"
+        for axis, value in zip(AXES, squares.per_g, strict=True)
     )
     text = (
-        f"the sensor's own-axis squares {values} mg/g^2 +- {squares.sd_per_g * 1e3:.2g} "
-        f"({100.0 * squares.data_share:.0f} % from the readings, the rest from the prior of "
-        f"{squares.prior_per_g * 1e3:g})"
+        f"the sensor's own-axis squares (a = l + Q l^2) {values} mg/g^2 +- "
+        f"{squares.sd_per_g * 1e3:.2g} ({100.0 * squares.data_share:.0f} % from the readings, the "
+        f"rest from the prior of {squares.prior_per_g * 1e3:g})"
     )
     if squares.included and squares.asked != AUTO:
         return (f"{text}, in the C by [firmware] terms", *_untested_notes(squares))

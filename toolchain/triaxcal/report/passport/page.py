@@ -53,6 +53,7 @@ def passport_html(p: Passport) -> bytes:
         "unchecked": p.unchecked,
         "warnings": (*p.uncertainty.warnings, *_findings(p)),
         "constants": _constants(p),
+        "terms": [signed(line.strip()) for line in p.delivery.calibration.terms.lines()],
         "t0": signed(f"{p.delivery.calibration.thermal.t0_degc:g}"),
         "curved": p.delivery.calibration.shape.parameters > 1,
         "panels": curve_panels(p.delivery.calibration, p.uncertainty),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from triaxcal.fitting.core.calibration import Calibration
@@ -12,9 +13,9 @@ _OWN_SQUARES = ("Qx.xx", "Qy.yy", "Qz.zz")
 
 @dataclass(frozen=True)
 class ShareRow:
-    """One row, in words; `value` is of squares and products alone.
+    """One row, in words; `value` is of squares and products that the C leaves out.
 
-    K and U0 stand above as the C has them, which differ a little from the fit with all terms.
+    K, U0 and the others stand above as the C has them, a little off the fit with all terms.
     """
 
     name: str
@@ -31,7 +32,8 @@ def share_rows(calibration: Calibration) -> tuple[ShareRow, ...]:
     if recording is None or not recording.shares:
         return ()
     products = [s for s in recording.shares if s.name[0] == "Q" and s.name not in _OWN_SQUARES]
-    rows = [_row(s) for s in recording.shares if s not in products]
+    used = calibration.terms.quadratic
+    rows = [_row(s, used) for s in recording.shares if s not in products]
     if products:
         worst, best = (pick(s.data for s in products) for pick in (min, max))
         rows.append(
@@ -47,12 +49,12 @@ def share_rows(calibration: Calibration) -> tuple[ShareRow, ...]:
     return tuple(rows)
 
 
-def _row(share: ConstantShare) -> ShareRow:
+def _row(share: ConstantShare, used: Mapping[str, float]) -> ShareRow:
     scale, unit = (1e3, "mg/g^2") if share.name[0] == "Q" else (1.0, share.unit)
     value, sd, prior_sd = (scale * v for v in (share.value, share.sd, share.prior_sd))
     return ShareRow(
         share.name,
-        f"{value:+.3g} {unit}" if share.name[0] == "Q" else "above",
+        f"{value:+.3g} {unit}" if share.name[0] == "Q" and share.name not in used else "above",
         f"{sd:.2g} {unit}",
         f"{prior_sd:.2g} {unit}",
         _percent(share.data),
