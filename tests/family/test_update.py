@@ -319,7 +319,7 @@ def test_a_stated_drift_is_what_an_update_is_compared_with(
     assert found.length_after_g < 0.2 * found.length_allowed_g
     assert found.length_allowed_g > 5.0 * found.length_before_g
     one = recorded(tmp_path, directions(6)[[0]], bias=U0)
-    with pytest.raises(RefusedError, match=r"1 pose tell too little: \|a\| is uncertain by 0\.4"):
+    with pytest.raises(RefusedError, match=r"1 pose tell too little: .* by \+-0\.[89]"):
         cal.update(one, bias_drift_mg=0.01, scale_drift_ppm=1, axes_drift_micro_rad=1)
 
 

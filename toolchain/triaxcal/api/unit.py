@@ -105,6 +105,6 @@ def read_unit(folder: str | Path) -> Unit:
             f"{path / UNIT_FILE}",
             "a whole IMU, [dynamic]",
             expected="the unit of one accelerometer",
-            remedy=f"use read_imu, or `triaxcal dynamic {path}`",
+            remedy=f"run `triaxcal dynamic {path}`; in Python, triaxcal.read_imu",
         )
     return Unit.of(read_description(path), path)

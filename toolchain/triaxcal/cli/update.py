@@ -14,7 +14,8 @@ from triaxcal.cli.options import command, example, field_command, say
 def _drift(
     flag: str, argument: str, words: str
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    return click.option(flag, argument, type=float, help=f"Drift of {words} (sd).")
+    size = click.FloatRange(min=0.0, min_open=True)
+    return click.option(flag, argument, type=size, metavar="FLOAT", help=f"Drift of {words} (sd).")
 
 
 @command(

@@ -33,6 +33,7 @@ _FAR_BEHIND = 12.0
 UNKNOWN = "unknown"
 """The cause that stands for what is not in the list."""
 _FEW = 3
+_MOST_ODDS = 1e6
 _SHOWN = 6
 """Amplitudes that are shown of a cause; more are those of a curve."""
 
@@ -205,7 +206,7 @@ class Diagnosis:
         )
         # Columns as wide as their heads, which are not broken then.
         cells: list[tuple[str, ...]] = [
-            (f"{odds:.1f}", f"{left.held_out:>8}", f"{left.checks:>9}", name)
+            (_odds_in_words(odds), f"{left.held_out:>8}", f"{left.checks:>9}", name)
             for odds, left, name in rows
         ]
         if all(left.checks == "-" for _, left, _ in rows):
@@ -218,6 +219,13 @@ class Diagnosis:
         return "\n".join([*lines, "", *table(head, cells, left=(len(head) - 1,))])
 
     __repr__ = __str__
+
+
+def _odds_in_words(odds: float) -> str:
+    """Ln odds for a table, as far as they mean anything."""
+    if abs(odds) > _MOST_ODDS:
+        return f"above {_MOST_ODDS:.0e}" if odds > 0.0 else f"below -{_MOST_ODDS:.0e}"
+    return f"{odds:.1f}"
 
 
 def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:

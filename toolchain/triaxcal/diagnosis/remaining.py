@@ -11,6 +11,8 @@ from triaxcal.diagnosis.core.readings import Readings
 from triaxcal.fitting.tilter.heldout import LEAST_TEMPERATURES
 from triaxcal.model.types import FloatArray
 
+_MOST_G = 1000.0
+"""Beyond it constants have no meaning, and the figure has none."""
 _CURVES = {1: "a straight line", 2: "a quadratic", 3: "a cubic"}
 
 
@@ -57,6 +59,8 @@ def in_words(value_g: float) -> str:
         return (
             f"{value_g * 1e6:.2g} micro-g" if value_g < 99.5e-6 else f"{value_g * 1e6:.0f} micro-g"
         )
+    if value_g > _MOST_G:
+        return f"above {_MOST_G:g} g"
     return f"{value_g * 1e3:.3g} mg" if value_g < 0.9995 else f"{value_g:.3g} g"
 
 

@@ -40,8 +40,7 @@ def no_poses(
         expected=f"poses of at least {layout.still_s:g} s, held much more still than the turns "
         "between them",
         remedy=_wrong_clock(samples, layout)
-        or "hold each pose longer, or lower [recording] still_s; "
-        "`triaxcal poses` shows what was found",
+        or "hold each pose longer, or lower [recording] still_s",
     )
 
 

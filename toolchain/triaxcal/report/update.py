@@ -10,9 +10,7 @@ from triaxcal.base.screentext import table
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.framefree import NAMES, UNITS, relative_scales
 from triaxcal.model.types import FloatArray
-from triaxcal.uncertainty.updated import FieldUpdate
-
-_K = 2.0
+from triaxcal.uncertainty.updated import FieldUpdate, K
 
 
 def update_text(serial: str, found: FieldUpdate, before: Calibration) -> str:
@@ -39,14 +37,14 @@ def changed_text(serial: str, found: FieldUpdate, before: Calibration) -> str:
             "",
             _length(found),
             f"chi-square   {found.chi_square:.1f}, {count} expected: the poses against the prior",
-            f"|a| - g      {before_mg} mg rms at these poses before, {now_mg} mg now",
+            f"|a| - g      {before_mg} mg rms here by the constants before, {now_mg} mg now",
         ]
     )
 
 
 def _length(found: FieldUpdate) -> str:
     sds = found.length_before_g, found.length_allowed_g, found.length_after_g
-    before, drifted, now = (f"+-{_K * sd * 1e3:.3g}" for sd in sds)
+    before, drifted, now = (f"+-{K * sd * 1e3:.3g}" for sd in sds)
     values = f"{before} mg before, {drifted} mg drifted, {now} mg now"
     return f"|a|          uncertain by {values} (rms over all orientations)"
 
@@ -62,7 +60,7 @@ def _table(found: FieldUpdate, before: Calibration) -> list[str]:
             [
                 f"  {name}",
                 f"{by:+.4g}",
-                *(f"{_K * sd * abs(scale[k]):.3g}" for sd in sds),
+                *(f"{K * sd * abs(scale[k]):.3g}" for sd in sds),
                 f"{100 * found.share[k]:.0f} %",
                 UNITS[k],
             ]

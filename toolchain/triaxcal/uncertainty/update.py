@@ -28,7 +28,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.expected import Expectation, Expected, chance_of, expectation
 from triaxcal.uncertainty.explain import Parts, why
 from triaxcal.uncertainty.fieldprior import field_prior, noise_of_poses
-from triaxcal.uncertainty.updated import FieldUpdate, Solved, updated_calibration
+from triaxcal.uncertainty.updated import FieldUpdate, K, Solved, updated_calibration
 
 _USEFUL = 0.9
 """Of the uncertainty of |a|: an update must lower it below this share."""
@@ -175,14 +175,15 @@ def _refuse_nothing(made: FieldUpdate, new: Expected, *, drifted: bool) -> None:
     least_g = _USEFUL * (made.length_allowed_g if drifted else made.length_before_g)
     if made.length_after_g <= least_g:
         return
-    count, now = len(made.poses), f"{made.length_after_g * 1e3:.3g} mg after the update"
+    count, now = len(made.poses), f"+-{K * made.length_after_g * 1e3:.3g} mg after the update"
     poses = f"{count} pose" + "s" * (count != 1)
     if drifted:
         noise = float(np.median(new.own_sd_g)) * 1e3
         raise RefusedError(
             made.poses.source,
-            f"{poses} tell too little: |a| is uncertain by {made.length_allowed_g * 1e3:.3g} mg "
-            f"with the drift, and by {now}; the noise of a pose is {noise:.3g} mg",
+            f"{poses} tell too little: |a| is uncertain by "
+            f"+-{K * made.length_allowed_g * 1e3:.3g} mg with the drift, and by {now}; "
+            f"the noise of a pose is {noise:.3g} mg",
             expected="poses that tell more than the calibration and its drift",
             remedy="hold the unit stiller and longer, in more directions; the delivered "
             "calibration is kept",
@@ -190,7 +191,7 @@ def _refuse_nothing(made: FieldUpdate, new: Expected, *, drifted: bool) -> None:
     raise RefusedError(
         made.poses.source,
         f"{poses} in agreement with the delivered calibration, which knows more: |a| is uncertain "
-        f"by {made.length_before_g * 1e3:.3g} mg, and would be by {now}",
+        f"by +-{K * made.length_before_g * 1e3:.3g} mg, and would be by {now}",
         expected="poses that show a drift, or tell more than the calibration",
         remedy="keep the delivered calibration; state the drift if you know that there is one",
     )

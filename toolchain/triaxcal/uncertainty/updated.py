@@ -19,6 +19,8 @@ from triaxcal.model.types import FloatArray
 from triaxcal.uncertainty.expected import Expected
 from triaxcal.uncertainty.fieldprior import FieldPrior
 
+K = 2.0
+"""Standard uncertainties that are stated after +-: 95 %."""
 _UNSEEN = 0.1
 """Share of the data below which a constant counts as not seen by the poses."""
 

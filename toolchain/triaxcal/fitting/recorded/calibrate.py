@@ -239,13 +239,14 @@ def _plain_rows(
 
 def _reason(thermal: Sequence[Judged], best: Judged, turns: Turns, terms: str) -> str:
     """Why this calibration, in words."""
+    count = Turns.values(turns.all)
     label = best.trial.label
     if best.held_out_g is None:
         text = f"{label}: no pose is determined by the others, so none is held out"
     else:
         text = (
             f"{label}: held-out error {best.held_out_g * 1e3:.3g} mg over "
-            f"{Turns.values(turns.all)} values ({turns.words} held out in turn)"
+            f"{count} value{'s' * (count != 1)} ({turns.words} held out in turn)"
         )
     if len(thermal) > 1:
         how = "no other is significantly better" if best.held_out_g else "the most probable"

@@ -39,6 +39,8 @@ from triaxcal.unit.priors import QUADRATIC_TERMS as QUADRATIC_C
 
 ODDS = 10.0
 """What terms in the C need; the usual word for such odds is strong."""
+_ALIKE = 1.05
+"""Odds that are no difference."""
 _DIRECTIONS = 200
 _SCALED = " scaled by the poses"
 
@@ -153,6 +155,8 @@ def choose_terms(unit: UnitDescription, full: Judged, scaled: Sequence[Scaled]) 
 def _odds(log_odds: float) -> str:
     """How much more probable the poses are, in words."""
     odds = math.exp(min(abs(log_odds), math.log(1e6)))
+    if odds < _ALIKE:
+        return "as probable with them as without them"
     than = "more than " * (odds > 999999.0)
     return f"{than}{odds:.3g} times as probable {'with' if log_odds > 0.0 else 'without'} them"
 
