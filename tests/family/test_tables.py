@@ -370,3 +370,50 @@ def test_one_pose_that_all_hangs_on_is_told_by_what_is_left_without_it(tmp_path:
     )
     assert told is not None
     assert float(told[1]) > 1000.0
+
+
+def with_outputs(folder: Path, change: FloatArray, *, unit: str = "m/s^2") -> Path:
+    """P0's grid with the readings (n, 3) of the outputs multiplied by `change`, (3, 3)."""
+    rows = rows_of(table())
+    rows[:, 2:] = rows[:, 2:] @ change.T
+    recording = AIR.replace('acceleration_unit = "m/s^2"', f'acceleration_unit = "{unit}"')
+    return write_unit(folder, rows, recording, header=HEADER)
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
+@pytest.mark.parametrize("output", [0, 1, 2])
+def test_a_dead_output_is_named_first(tmp_path: Path, output: int, noise: float) -> None:
+    rows = rows_of(table())
+    rows[:, 2 + output] = 0.1 + noise * np.random.default_rng(4).standard_normal(len(rows))
+    folder = write_unit(tmp_path / "U", rows, AIR, header=HEADER)
+    with pytest.raises(RefusedError, match=f"output {'xyz'[output]} does not respond") as refusal:
+        calibrated(folder)
+    assert "check the wiring and the columns" in str(refusal.value)
+
+
+def test_a_copied_output_is_named(tmp_path: Path) -> None:
+    copy = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    with pytest.raises(RefusedError, match="outputs y and z respond alike"):
+        calibrated(with_outputs(tmp_path / "U", copy))
+
+
+def test_an_output_of_another_scale_is_named(tmp_path: Path) -> None:
+    twice = np.diag([1.0, 2.0, 1.0])
+    with pytest.raises(RefusedError, match=r"output y is 1\.98 times as sensitive as the other"):
+        calibrated(with_outputs(tmp_path / "A", twice))
+    counts = calibrated(with_outputs(tmp_path / "B", 1000.0 * twice, unit="count")).recording
+    assert counts is not None
+    assert any("output y is 1.98 times as sensitive" in f for f in counts.findings)
+
+
+def test_a_turned_sensor_is_reported(tmp_path: Path) -> None:
+    cosine, sine = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    turned = calibrated(with_outputs(tmp_path / "A", turn)).recording
+    straight = calibrated(with_outputs(tmp_path / "B", np.eye(3))).recording
+    assert turned is not None
+    assert straight is not None
+    # Misalignment of up to 5 mrad is in the angle.
+    told = next(f for f in turned.findings if f.startswith("the sensor is turned by"))
+    assert abs(float(told.split()[5]) - 20.0) < 0.5
+    assert not any("turned by" in f or "sensitive" in f for f in straight.findings)

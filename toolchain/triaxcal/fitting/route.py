@@ -18,6 +18,7 @@ from triaxcal.fitting.recorded.faces import face_measurements
 from triaxcal.fitting.recorded.temperatures import temperature_findings
 from triaxcal.fitting.table.calibrate import calibrate_table
 from triaxcal.fitting.tilter.calibrate import calibrate
+from triaxcal.fitting.tilter.mounting import unequal_output
 from triaxcal.poses.stated import refuse_wrong_unit
 from triaxcal.poses.steps import Steps
 from triaxcal.readings.measurements import MeasurementSet
@@ -53,6 +54,7 @@ def calibrate_recording(
     if layout.faces:
         measurements = face_measurements(unit, layout, samples)
         found = calibrate(unit, measurements, pair)
+        _refuse_unequal(unit, layout, samples.source, found)
         unseen = temperature_findings(unit, samples.extremes(TEMP) if TEMP in samples else None)
         calibration = replace(
             found,
@@ -62,6 +64,7 @@ def calibrate_recording(
         return unit, *as_converted(layout, measurements, calibration)
     if layout.angles is not None:
         measurements, calibration = calibrate_table(unit, layout, layout.angles, samples, known)
+        _refuse_unequal(unit, layout, samples.source, calibration)
     else:
         measurements, calibration = calibrate_poses(unit, layout, samples, known)
     recording = calibration.recording
@@ -70,6 +73,24 @@ def calibrate_recording(
     recording = replace(recording, findings=(*recording.findings, *of_pair))
     calibration = replace(calibration, recording=recording, pair=pair)
     return unit, *as_converted(layout, measurements, calibration)
+
+
+def _refuse_unequal(
+    unit: UnitDescription, layout: RecordingLayout, source: str, calibration: Calibration
+) -> None:
+    """Refuse an output whose readings are not in the unit that is stated for all three."""
+    odd = unequal_output(calibration.thermal.constants_at(unit.t0_degc))
+    if layout.reading_of_1_g is None or odd is None:
+        return
+    axis, ratio = odd
+    raise RefusedError(
+        source,
+        f"output {axis} is {ratio:.3g} times as sensitive as the other outputs: its full scale or "
+        "gain is another one",
+        expected=f"three outputs in {layout.acceleration_unit}",
+        remedy=f"correct the scale of the column of {axis}; if it is the converter's own, "
+        'acceleration_unit = "count"',
+    )
 
 
 def _wide_enough(unit: UnitDescription, layout: RecordingLayout, samples: Samples) -> Adc:

@@ -38,6 +38,7 @@ from triaxcal.fitting.table.checks import (
     refuse_degrees,
     refuse_few_poses,
     refuse_open,
+    refuse_silent,
 )
 from triaxcal.fitting.table.choice import choose_table
 from triaxcal.fitting.table.cubes import table_cubes
@@ -45,6 +46,7 @@ from triaxcal.fitting.table.harmonics import table_findings
 from triaxcal.fitting.table.oriented import TRACELESS, table_error_g
 from triaxcal.fitting.table.trials import trials_of
 from triaxcal.fitting.table.wrongrows import wrong_row_findings, wrong_rows
+from triaxcal.fitting.tilter.mounting import turned_notes, unequal_notes
 from triaxcal.model.orientation import angle_slopes, angles_from_force, gravity_direction
 from triaxcal.model.positions import AXES
 from triaxcal.model.terms import NO_TERMS, PRODUCT_NAMES, Terms, products
@@ -79,6 +81,7 @@ def calibrate_table(
     refuse_few_poses(poses)
     refuse_degrees(poses.source, angles, readings, table, unit.gravity_g)
     refuse_open(poses, gravity_direction(angles.kind, table))
+    refuse_silent(poses, gravity_direction(angles.kind, table))
     temps, temperatures = pose_temperatures(unit, poses)
     force, sign = known_force(unit, poses, layout, table)
     known = TablePoses(readings, force, temps, known_quadratic)
@@ -94,6 +97,7 @@ def calibrate_table(
     best, why = choose_table(able, temperatures)
     wrong = wrong_rows(best.trial, known, best)
     found = sign * (best.own_g + force)
+    constants = best.fit.shape.model(best.fit.constants).constants_at(unit.t0_degc)
     near = min(temperatures, key=lambda group: abs(temps[group].mean() - unit.t0_degc))
     findings = [
         *poses.findings,
@@ -103,6 +107,8 @@ def calibrate_table(
         *_shares(best),
         *temperature_findings(unit, poses.temps_degc),
         *table_findings(angles, table[near], readings[near], found[near], unit.gravity_g),
+        *turned_notes(constants),
+        *unequal_notes(constants),
         _angle_residuals(angles, table, found),
         *_budget(unit, angles, table, best),
     ]

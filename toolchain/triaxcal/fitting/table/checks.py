@@ -17,6 +17,9 @@ from triaxcal.poses.poseset import PoseSet
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.recording import Angles, RecordingLayout
 
+_ANSWERS = 0.05
+"""Share of the liveliest output's sensitivity: less is noise, or what leaks from the others."""
+
 
 def refuse_few_poses(poses: PoseSet) -> None:
     """Refuse poses that are too few to hold one out."""
@@ -39,6 +42,35 @@ def refuse_open(poses: PoseSet, direction: FloatArray) -> None:
             f"number {condition:.3g})",
             expected=f"at most {CONDITION_MAX:g}",
             remedy="add poses over both angles",
+        )
+
+
+def refuse_silent(poses: PoseSet, force: FloatArray) -> None:
+    """Refuse an output that does not follow the known force (n, 3), or that repeats another one."""
+    design = np.concatenate([np.ones((len(force), 1)), force], axis=1)
+    K = np.linalg.lstsq(design, poses.readings, rcond=None)[0][1:].T
+    length = np.linalg.norm(K, axis=1)
+    liveliest = int(length.argmax())
+    expected = "three outputs, each following the force along an axis of its own"
+    remedy = "check the wiring and the columns of [recording] acceleration"
+    for i in np.flatnonzero(length <= _ANSWERS * length[liveliest]).tolist():
+        raise RefusedError(
+            poses.source,
+            f"output {AXES[i]} does not respond to the force: its sensitivity is "
+            f"{length[i] / (length[liveliest] or 1.0):.2g} of that of output {AXES[liveliest]}",
+            expected=expected,
+            remedy=remedy,
+        )
+    rows = K / length[:, None]
+    if np.linalg.cond(rows) > CONDITION_MAX:
+        cosine = np.abs(rows @ rows.T) - np.eye(3)
+        first, second = divmod(int(np.argmax(np.triu(cosine, 1))), 3)
+        raise RefusedError(
+            poses.source,
+            f"outputs {AXES[first]} and {AXES[second]} respond alike: their sensing axes are "
+            f"{math.degrees(math.acos(min(1.0, cosine[first, second]))):.2g} deg apart",
+            expected=expected,
+            remedy=remedy,
         )
 
 

@@ -39,7 +39,7 @@ from triaxcal.fitting.tilter.estimators import (
     refuse_ill_conditioned,
 )
 from triaxcal.fitting.tilter.heldout import check_errors, held_out_test
-from triaxcal.fitting.tilter.mounting import turned_notes
+from triaxcal.fitting.tilter.mounting import turned_notes, unequal_notes
 from triaxcal.fitting.tilter.outputs import refuse_mistaken_units, refuse_silent_outputs
 from triaxcal.fitting.tilter.plausibility import refuse_exchanged_positions
 from triaxcal.fitting.tilter.range import working_range
@@ -131,12 +131,22 @@ def _fit(
             *run_notes(runs),
             *gravity_notes(unit.gravity_difference_m_per_s2),
             *turned_notes(found.thermal.constants_at(unit.t0_degc)),
+            *_unequal(unit, found),
             *code_notes(unit, found, measurements),
             *of_pair,
         ),
         runs=runs,
         held_out=held_out_test(chosen, selection.shape, groups, checks),
     )
+
+
+def _unequal(unit: UnitDescription, found: Calibration) -> tuple[str, ...]:
+    if unit.nominal_v_per_g is not None:
+        return ()
+    notes = unequal_notes(found.thermal.constants_at(unit.t0_degc))
+    if unit.recording is not None:
+        return notes
+    return tuple(f"{n}; if it is meant, state [sensor] nominal_v_per_g" for n in notes)
 
 
 def _select(
