@@ -363,7 +363,7 @@ def test_a_reader_added_at_run_time_reaches_every_page(tmp_path: Path) -> None:
     assert "12 poses" in poses.output
     assert made.exit_code == 0, made.output
     assert [outcome.refusal for outcome in told] == [""]
-    assert json.loads(series_files(series)["series.json"])["passed"] == 1
+    assert json.loads(series_files(series)["series.json"])["made"] == 1
     built = tmp_path / "build" / "TOY-1"
     assert "TOY-1" in (built / "passport.json").read_text(encoding="utf-8")
     for name in ("passport.html", "calibration.json"):

@@ -127,7 +127,7 @@ def test_host_prints_what_python_expects(case: Case, arithmetic: int, tmp_path: 
     [
         ("high_word(sum_z)", "high_word(sum_z + 4294967296)", "generated"),
         ("status = TRIAX_STATUS_RAW_RANGE;", ";", "generated"),
-        ("if (crc32(image", "if (0u && crc32(image", "refused"),
+        ("if (crc32(image, TRIAX_IMAGE_SIZE", "if (0u && crc32(image, TRIAX_IMAGE_SIZE", "refused"),
     ],
 )
 def test_a_fault_in_the_generated_c_is_seen(old: str, new: str, line: str, tmp_path: Path) -> None:
