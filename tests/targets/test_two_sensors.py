@@ -30,7 +30,8 @@ def objects_of(toolset: Toolset, case: Case, folder: Path) -> list[str]:
     for name, text in case.files.items():
         (folder / name).write_text(text)
     (folder / "target_case.h").write_text(case_header(case))
-    sources = [*(folder / n for n in case.sources), FIRMWARE / "target" / "test_main.c"]
+    own = (folder / name for name in (*case.sources, case.selftest))
+    sources = [*own, FIRMWARE / "target" / "test_main.c"]
     renamed = replace(toolset, defines=(f"-Dmain={prefix}_main",))
     include = [folder, *write_shim(folder / "names", prefix), FIRMWARE]
     return compiled(renamed, sources, include, folder / "made")
