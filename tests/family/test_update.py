@@ -337,12 +337,15 @@ def test_a_refused_option_is_named_as_it_was_typed(top: Path, tmp_path: Path) ->
     path = recorded(tmp_path, directions(6))
     given = [str(top / "units" / "U"), "--build", str(top / "build")]
     for command, option, value in (
-        (["update", *given, "--with"], "--bias-drift", "0"),
         (["update", *given, "--with"], "--gravity", "978"),
         (["check", *given, "--on"], "--gravity", "978"),
     ):
         with pytest.raises(RefusedError, match=f"^{option}: found {value}; expected"):
             main.main([*command, str(path), option, value], standalone_mode=False)
+    mistyped = ["update", *given, "--with", str(path), "--bias-drift", "0"]
+    done = CliRunner().invoke(main, mistyped)
+    assert done.exit_code == 2
+    assert "Invalid value for '--bias-drift'" in done.output
 
 
 def test_a_delivered_update_says_each_finding_once(top: Path, tmp_path: Path) -> None:
