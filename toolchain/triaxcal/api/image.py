@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from triaxcal.base.errors import RefusedError, refused_by_system
+from triaxcal.base.errors import refused_by_system
 from triaxcal.base.publish import renew
 from triaxcal.codegen.flashfile import Placed, flash_file
 from triaxcal.codegen.image_parts import ImagePart, image_parts
@@ -84,14 +84,6 @@ def read_image(path: str | Path) -> CalibrationImage:
         content = source.read_bytes()
     except OSError as error:
         raise refused_by_system(source, "read", error, expected="a triax_calib.bin") from error
-    try:
-        parts = image_parts(content)
-    except RefusedError as refusal:
-        raise RefusedError(
-            f"{source}, {refusal.place}",
-            refusal.found,
-            expected=refusal.expected,
-            remedy=refusal.remedy,
-        ) from refusal
+    parts = image_parts(content, str(source))
     text = image_text(source.name, content, parts)
     return CalibrationImage(str(source), content[: parts[-1].at + parts[-1].size], parts, text)

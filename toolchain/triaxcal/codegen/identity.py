@@ -87,12 +87,13 @@ class Identity:
 
 def with_identity(image: bytes, sensor: TemperatureSensor, provenance: Provenance) -> bytes:
     """An image with the identity behind it."""
+    sizes = {field.name: field.size for field in FIELDS}
     values: dict[str, bytes] = {
         "serial": provenance.serial.encode(),
         "date": provenance.date.encode(),
         "inputs": bytes.fromhex(provenance.inputs_sha256),
         "generator": __version__.encode(),
-        "axes": _cut(provenance.axes, 96),
+        "axes": _cut(provenance.axes, sizes["axes"]),
         "degc_per_code": struct.pack("<d", sensor.degc_per_code),
         "degc_at_zero": struct.pack("<d", sensor.degc_at_zero),
     }
@@ -107,8 +108,10 @@ def _cut(text: str, size: int) -> bytes:
     return text.encode()[:size].decode(errors="ignore").encode()
 
 
-def identity_of(content: bytes) -> Identity | None:
+def identity_of(content: bytes, where: str = "image") -> Identity | None:
     """The identity in a file; None where it holds constants only, as of version 0.1.0.
+
+    `where` is the place that messages name.
 
     Raises
     ------
@@ -118,22 +121,22 @@ def identity_of(content: bytes) -> Identity | None:
     size = int.from_bytes(content[8:12], "little") if len(content) >= 12 else 0
     if size < 16 or len(content) not in (size, size + IDENTITY_SIZE):
         raise RefusedError(
-            "image",
+            where,
             f"{len(content)} bytes",
             expected=f"{size or 'the size in its header'} bytes, or {IDENTITY_SIZE} more",
             remedy="read it again, whole",
         )
     image, block = content[:size], content[size:]
     if zlib.crc32(image[:-4]) != int.from_bytes(image[-4:], "little"):
-        raise RefusedError("image", "the CRC of the constants is wrong", remedy="read it again")
+        raise RefusedError(where, "the CRC of the constants is wrong", remedy="read it again")
     if not block:
         return None
     head = struct.unpack_from("<II", block)
     if zlib.crc32(content[:-4]) != int.from_bytes(content[-4:], "little"):
-        raise RefusedError("image", "the CRC of the identity is wrong", remedy="read it again")
+        raise RefusedError(where, "the CRC of the identity is wrong", remedy="read it again")
     if head != (MAGIC, VERSION) or block[8:12] != image[-4:]:
         raise RefusedError(
-            "image",
+            where,
             "the identity is of another version, or of other constants",
             remedy="write the file again",
         )

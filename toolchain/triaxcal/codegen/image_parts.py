@@ -48,8 +48,10 @@ class ImagePart:
     identity: Identity | None
 
 
-def image_parts(content: bytes) -> tuple[ImagePart, ...]:
+def image_parts(content: bytes, where: str) -> tuple[ImagePart, ...]:
     """The images in a file, in their order; erased flash behind them is no part of them.
+
+    `where` names the file in messages.
 
     Raises
     ------
@@ -59,16 +61,16 @@ def image_parts(content: bytes) -> tuple[ImagePart, ...]:
     parts: list[ImagePart] = []
     at = 0
     while not parts or content[at:].strip(ERASED):
-        parts.append(_part(content, at))
+        parts.append(_part(content, at, where))
         at += parts[-1].size
     return tuple(parts)
 
 
-def _part(content: bytes, at: int) -> ImagePart:
+def _part(content: bytes, at: int, where: str) -> ImagePart:
     magic, version, size = _words(content, at, 3)
     if magic not in _TRIADS or version not in _HEADER_WORDS:
         raise RefusedError(
-            f"byte {at}",
+            f"{where}, byte {at}",
             f"found {content[at : at + 8].hex(' ') or 'nothing'}",
             expected="TRXC or TRXG and the version 1 or 2",
             remedy="give the triax_calib.bin of a delivery",
@@ -76,7 +78,7 @@ def _part(content: bytes, at: int) -> ImagePart:
     behind = content[at + size :]
     bare = not behind.strip(ERASED) or int.from_bytes(behind[:4], "little") in _TRIADS
     whole = size if bare else size + IDENTITY_SIZE
-    identity = identity_of(content[at : at + whole])
+    identity = identity_of(content[at : at + whole], f"{where}, image")
     header = _HEADER_WORDS[version]
     low, high = _words(content, at + 4 * header, 2, signed=True)
     shape = f"{zlib.crc32(content[at : at + 4 * header]):08x}"

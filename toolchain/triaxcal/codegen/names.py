@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from triaxcal.codegen.image import header_words
 from triaxcal.fixedpoint.plan import Plan
@@ -32,10 +32,11 @@ class Names:
         """Name of this triad's file, from the default: triax_comp.c, triax_gyro_comp.c."""
         return self.triad + name.removeprefix(DEFAULT_PREFIX)
 
-    def default_file(self, name: str) -> str:
-        """The same without the prefix: a file of ours that calls this triad by default names."""
-        gyro = "_gyro" if self.result == "rate" else ""
-        return DEFAULT_PREFIX + gyro + name.removeprefix(DEFAULT_PREFIX)
+    @property
+    def default(self) -> Names:
+        """The names without a prefix, by which our own C files call this triad."""
+        triad = f"{DEFAULT_PREFIX}_gyro" if self.result == "rate" else DEFAULT_PREFIX
+        return replace(self, triad=triad)
 
     @property
     def linked(self) -> str:

@@ -44,9 +44,9 @@ def causes_of(
     from triaxcal.diagnosis import diagnose  # noqa: PLC0415
     from triaxcal.diagnosis.ranking import TOGETHER  # noqa: PLC0415
 
-    if calibration is None or calibration.terms.quadratic_per_g is None:
-        return diagnose(unit, measurements)
     found = diagnose(unit, measurements)
+    if calibration is None or calibration.terms.quadratic_per_g is None:
+        return found
     # Squares that were fitted can be what a fault looks like: a converter at its end.
     fault = bool(found.answer) and found.answer[0].spoils and found.answer[0].cause != TOGETHER
     return found if fault else diagnose(unit, without_quadratic(measurements, calibration))

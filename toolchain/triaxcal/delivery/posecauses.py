@@ -39,7 +39,8 @@ def with_pose_cause(
 ) -> RefusedError:
     """The refusal, with the cause that explains the poses best.
 
-    It takes the place of general advice where it is told from a sound unit, and is no symptom.
+    It takes the place of general advice where the odds against a sound unit are clear, and it is no
+    symptom.
     """
     found = causes_of_poses(unit, calibration)
     recording = calibration.recording

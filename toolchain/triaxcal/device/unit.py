@@ -68,15 +68,7 @@ def single_part(content: bytes, where: str) -> ImagePart:
     RefusedError
         When it is no image, or that of an IMU.
     """
-    try:
-        parts = image_parts(content)
-    except RefusedError as refusal:
-        raise RefusedError(
-            f"{where}, {refusal.place}",
-            refusal.found,
-            expected=refusal.expected,
-            remedy=refusal.remedy,
-        ) from refusal
+    parts = image_parts(content, where)
     if len(parts) != 1 or parts[0].triad != "accelerometer":
         raise RefusedError(
             where,

@@ -91,12 +91,11 @@ def check_sanitizer(work: Workspace, sanitizer: Sanitizer) -> Outcome:
     """
     vectors = vector_sets(work.plan, RANDOM_VECTORS)
     count = sum(len(v.temp) for v in vectors)
-    names = names_of(work.plan)
-    batch = shipped("firmware_ref") / names.default_file("triax_batch.c")
-    default = {"triad": Path(names.default_file("triax.c")).stem}
+    names = names_of(work.plan).default
+    batch = shipped("firmware_ref") / names.file("triax_batch.c")
     subject = Subject(
         work.folder,
-        work.render(f"verify_{sanitizer.key}.c", "verify/driver.c.j2", default),
+        work.render(f"verify_{sanitizer.key}.c", "verify/driver.c.j2", {"triad": names.triad}),
         (work.named(ROUTINE), work.named(CONSTANTS), str(batch)),
         work.named(IMAGE),
         b"".join(rows_of(work.plan, v) for v in vectors),

@@ -7,14 +7,7 @@ from itertools import permutations
 
 import numpy as np
 
-from triaxcal.diagnosis.core.blocks import (
-    apart,
-    at_temperatures,
-    in_blocks,
-    sets_of,
-    test_blocks,
-    unlike,
-)
+from triaxcal.diagnosis.core.blocks import Blocks, Struck, in_blocks, struck_some
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo
 from triaxcal.diagnosis.core.readings import Readings
 from triaxcal.model.positions import AXES
@@ -31,23 +24,16 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     def reordered(outputs: FloatArray) -> FloatArray:
         return np.stack([(outputs * volts_per_g)[:, list(p)] / volts_per_g for p in _ORDERS])
 
-    count = len(test_blocks(readings))
-    for order, blocks in unlike(readings, _ORDERS, reordered):
-        if len(blocks) == count:
-            continue  # left-handed axes, or a turned sensor
-        where = at_temperatures(readings, blocks)
+    def described(order: Order, blocks: Blocks, where: str) -> Struck:
         names = ", ".join(f"{AXES[i]} as {AXES[order[i]]}" for i in range(3) if order[i] != i)
-        yield Hypothesis(
-            f"{names} {where}",
-            _reordered(order, blocks),
-            rows=readings.rows[in_blocks(readings, blocks)],
-            change=f"with these columns in order {where}",
-            places=len(_ORDERS) * sets_of(count),
-            log_prior=apart(readings, blocks),
-        )
+        change = f"with these columns in order {where}"
+        return _reordered(order, blocks), f"{names} {where}", change
+
+    # At all temperatures it is left-handed axes, or a turned sensor.
+    return struck_some(readings, _ORDERS, reordered, described)
 
 
-def _reordered(order: Order, blocks: tuple[int, ...]) -> Undo:
+def _reordered(order: Order, blocks: Blocks) -> Undo:
     def undo(readings: Readings, _amplitudes: FloatArray) -> Readings:
         own, columns = in_blocks(readings, blocks)[:, None], list(order)
         scale = readings.volts_per_g[columns] / readings.volts_per_g

@@ -7,14 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from triaxcal.diagnosis.core.blocks import (
-    apart,
-    at_temperatures,
-    in_blocks,
-    sets_of,
-    test_blocks,
-    unlike,
-)
+from triaxcal.diagnosis.core.blocks import Blocks, Struck, in_blocks, struck_some
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo
 from triaxcal.diagnosis.core.readings import Readings
 from triaxcal.model.positions import AXES
@@ -28,26 +21,18 @@ def _signs(outputs: tuple[int, ...]) -> FloatArray:
 
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
-    readings = known.readings
     signs = np.array([_signs(s) for s in _SETS])
-    count = len(test_blocks(readings))
-    for outputs, blocks in unlike(readings, _SETS, lambda u: u * signs[:, None]):
-        if len(blocks) == count:
-            continue  # a polarity
-        where = at_temperatures(readings, blocks)
-        names = " and ".join(AXES[i] for i in outputs)
+
+    def described(outputs: tuple[int, ...], blocks: Blocks, where: str) -> Struck:
         plural = "s" if len(outputs) > 1 else ""
-        yield Hypothesis(
-            f"output{plural} {names} {where}",
-            _inverted(outputs, blocks),
-            rows=readings.rows[in_blocks(readings, blocks)],
-            change=f"with output{plural} {names} inverted {where}",
-            places=len(_SETS) * sets_of(count),
-            log_prior=apart(readings, blocks),
-        )
+        named = f"output{plural} {' and '.join(AXES[i] for i in outputs)}"
+        return _inverted(outputs, blocks), f"{named} {where}", f"with {named} inverted {where}"
+
+    # At all temperatures it is a polarity.
+    return struck_some(known.readings, _SETS, lambda u: u * signs[:, None], described)
 
 
-def _inverted(outputs: tuple[int, ...], blocks: tuple[int, ...]) -> Undo:
+def _inverted(outputs: tuple[int, ...], blocks: Blocks) -> Undo:
     signs = _signs(outputs)
 
     def undo(readings: Readings, _amplitudes: FloatArray) -> Readings:

@@ -14,12 +14,16 @@ from typing import TypeVar
 
 import numpy as np
 
+from triaxcal.diagnosis.core.cause import Hypothesis, Undo
 from triaxcal.diagnosis.core.readings import FORCES, POSITIONS, Readings
 from triaxcal.model.types import BoolArray, FloatArray
 
 Changed = Callable[[FloatArray], FloatArray]
 """Outputs of a block by POSITIONS, shape (6, 3) -> after each change of a kind, (n, 6, 3)."""
 Key = TypeVar("Key")
+Blocks = tuple[int, ...]
+Struck = tuple[Undo, str, str]
+"""How a change is undone, its text, and what it would change."""
 _APART = -3.0
 """Log probability that a mistake strikes at blocks that do not follow each other."""
 
@@ -58,6 +62,29 @@ def unlike(
             if (best, *blocks) not in seen:
                 seen.add((best, *blocks))
                 yield changes[best], tuple(blocks)
+
+
+def struck_some(
+    readings: Readings, changes: Sequence[Key], changed: Changed, described: Callable[..., Struck]
+) -> Iterator[Hypothesis]:
+    """Hypotheses that one of some changes struck at some blocks; at all it is another cause.
+
+    `described` gives for a change, its blocks and their place in words: how the change is undone,
+    the text, and what it would change.
+    """
+    count = len(test_blocks(readings))
+    for key, blocks in unlike(readings, changes, changed):
+        if len(blocks) == count:
+            continue
+        undo, text, change = described(key, blocks, at_temperatures(readings, blocks))
+        yield Hypothesis(
+            text,
+            undo,
+            rows=readings.rows[in_blocks(readings, blocks)],
+            change=change,
+            places=len(changes) * sets_of(count),
+            log_prior=apart(readings, blocks),
+        )
 
 
 def in_blocks(readings: Readings, blocks: tuple[int, ...]) -> BoolArray:

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from triaxcal.diagnosis.core.cause import Cause
-from triaxcal.diagnosis.poses.causes.dead import NOT_IN_A_PLANE, PER_G
+from triaxcal.diagnosis.poses.causes.dead import without_output
 from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis
 from triaxcal.model.positions import AXES
 
@@ -24,15 +24,9 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
             if np.abs(difference).max() > _LARGEST_G or np.ptp(readings.outputs[:, i]) < _ANSWER_G:
                 continue
             how = "repeats" if sign > 0.0 else "is the negative of"
-            yield PoseHypothesis(
-                f"output {AXES[j]} {how} output {AXES[i]}",
-                lines=readings.lines,
-                change=f"|a| is unknown without output {AXES[i]} or {AXES[j]}",
-                places=6.0,
-                unused=np.ones(len(readings), dtype=np.bool_),
-                density_per_g=PER_G,
-                log_prior=NOT_IN_A_PLANE,
-            )
+            text = f"output {AXES[j]} {how} output {AXES[i]}"
+            missing = f"output {AXES[i]} or {AXES[j]}"
+            yield without_output(readings, text, missing, places=6.0)
 
 
 ENTRY = Cause(

@@ -8,6 +8,7 @@ import numpy as np
 
 from triaxcal.diagnosis.core.cause import Cause
 from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis
+from triaxcal.diagnosis.poses.core.readings import PoseReadings
 from triaxcal.model.positions import AXES
 
 _ANSWER_G = 0.05
@@ -25,15 +26,22 @@ def _hypotheses(known: KnownPoses) -> Iterator[PoseHypothesis]:
     for i in range(3):
         if span[i] > 2 * _ANSWER_G or np.delete(span, i).min() < _OTHERS_G:
             continue
-        yield PoseHypothesis(
-            f"output {AXES[i]}",
-            lines=readings.lines,
-            change=f"|a| is unknown without output {AXES[i]}",
-            places=3.0,
-            unused=np.ones(len(readings), dtype=np.bool_),
-            density_per_g=PER_G,
-            log_prior=NOT_IN_A_PLANE,
-        )
+        yield without_output(readings, f"output {AXES[i]}", f"output {AXES[i]}", places=3.0)
+
+
+def without_output(
+    readings: PoseReadings, text: str, missing: str, places: float
+) -> PoseHypothesis:
+    """That an output says nothing: no |a| has a meaning without it."""
+    return PoseHypothesis(
+        text,
+        lines=readings.lines,
+        change=f"|a| is unknown without {missing}",
+        places=places,
+        unused=np.ones(len(readings), dtype=np.bool_),
+        density_per_g=PER_G,
+        log_prior=NOT_IN_A_PLANE,
+    )
 
 
 ENTRY = Cause(

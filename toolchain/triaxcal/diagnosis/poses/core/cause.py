@@ -19,7 +19,7 @@ PoseUndo = Callable[[PoseReadings, FloatArray], PoseReadings]
 
 
 def unchanged(readings: PoseReadings, _amplitudes: FloatArray) -> PoseReadings:
-    """Undo nothing: the cause explains some poses, the noise or the constants by itself."""
+    """Undo nothing: the cause explains some poses, the noise or the constants without that."""
     return readings
 
 
