@@ -234,7 +234,7 @@ def _text_address(elf: ELFFile, text: str) -> int | None:
     """Address of a text in what is loaded."""
     for section in elf.iter_sections():
         if section["sh_type"] == "SHT_PROGBITS" and section["sh_flags"] & _LOADED:
-            at = section.data().find(text.encode())
+            at: int = section.data().find(text.encode())
             if at >= 0:
                 return int(section["sh_addr"]) + at
     return None
