@@ -56,6 +56,9 @@ ONLY_IN = {
     "pyxcp": {"device"},
     "construct": {"device"},  # what pyxcp's answers are parsed with
     "cantools": {"rig"},
+    "pyvisa": {"rig"},
+    "pymodbus": {"rig"},
+    "serial": {"rig"},
     "asammdf": {"rig", "readings"},
     "pyarrow": {"rig", "readings"},
     "bincopy": {"codegen"},

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from triaxcal.base.keys import FileKeys
 from triaxcal.design.problem import PROBLEM
 from triaxcal.dynamic.description import imu_file
-from triaxcal.rig.plan import SESSION_PLAN
+from triaxcal.rig.plan import session_plan_file
 from triaxcal.simulation.imu_unit import IMU_TRUTH
 from triaxcal.simulation.published import TABLES
 from triaxcal.simulation.truth import TRUTH
@@ -19,7 +19,7 @@ FILES: Mapping[str, Callable[[], FileKeys]] = MappingProxyType(
         "tilter": tilter_file,
         "recording": recording_file,
         "imu": imu_file,
-        "rig": lambda: SESSION_PLAN,
+        "rig": session_plan_file,
         "design": lambda: PROBLEM,
         "truth": lambda: TRUTH,
         "imu-truth": lambda: IMU_TRUTH,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,9 +12,11 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import DESCRIPTION, FORMAT, FileKeys, TableKeys, Values, setting
 from triaxcal.base.kinds import FLAG, number, rising, three, whole, word
+from triaxcal.base.tomltable import read_toml
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
+from triaxcal.rig.equipment import Equipment, equipment_tables, read_equipment
 from triaxcal.unit.description import UnitDescription
 
 
@@ -122,7 +125,8 @@ class SessionPlan:
     take_out_of_order : bool
         A position found out of order is taken without asking.
     sha256 : str
-        Of the plan's file.
+        Of the plan's file; of what decides in it, where it has tables of the equipment: an address
+        may be corrected between `rig run` and `rig resume`.
     """
 
     source: str
@@ -134,6 +138,7 @@ class SessionPlan:
     steps: tuple[Step, ...]
     stillness: Stillness
     thermal: Thermal
+    equipment: Equipment
 
     def micro_g_per_code(self, unit: UnitDescription) -> FloatArray:
         """Nominal micro-g of one code, signed, shape (3,)."""
@@ -193,17 +198,20 @@ class _Steps:
     take_out_of_order: bool = setting(FLAG, False)
 
 
-SESSION_PLAN = FileKeys(
-    "plan.toml",
-    "The plan of a session at the rig",
-    (
-        TableKeys("", "", (FORMAT, DESCRIPTION)),
-        TableKeys.of(_Rig),
-        TableKeys.of(_Steps),
-        TableKeys.of(Stillness),
-        TableKeys.of(Thermal),
-    ),
-)
+def session_plan_file() -> FileKeys:
+    """Keys of a plan; those of registered drivers are among them."""
+    return FileKeys(
+        "plan.toml",
+        "The plan of a session at the rig",
+        (
+            TableKeys("", "", (FORMAT, DESCRIPTION)),
+            TableKeys.of(_Rig),
+            TableKeys.of(_Steps),
+            TableKeys.of(Stillness),
+            TableKeys.of(Thermal),
+            *equipment_tables(),
+        ),
+    )
 
 
 def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
@@ -215,7 +223,7 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
         When the file breaks a rule of docs/reference/keys.md, or asks for a temperature outside the
         unit's range.
     """
-    tables = SESSION_PLAN.read(path)
+    tables = session_plan_file().read(path)
     rig, steps = tables["rig"].record(_Rig), tables["steps"].record(_Steps)
     stillness = tables["stillness"].record(Stillness)
     if stillness.average_s % stillness.batches:
@@ -224,33 +232,53 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
             f"found {stillness.batches}",
             expected=f"a divisor of average_s, which is {stillness.average_s}",
         )
+    equipment = read_equipment(tables)
     return SessionPlan(
         source=str(path),
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        sha256=_hash_of(path),
         rate_hz=rig.rate_hz,
         layout=rig.layout,
         volts_per_g=rig.volts_per_g,
         take_out_of_order=steps.take_out_of_order,
-        steps=_steps(tables["steps"], steps, unit),
+        steps=_steps(tables["steps"], steps, unit, equipment),
         stillness=stillness,
         thermal=tables["thermal"].record(Thermal),
+        equipment=equipment,
     )
 
 
-def _steps(values: Values, steps: _Steps, unit: UnitDescription) -> tuple[Step, ...]:
+def _hash_of(path: Path) -> str:
+    """SHA-256 of a plan's file, or of the tables that decide where it has others."""
+    document = read_toml(path)
+    equipment = {table.name for table in equipment_tables()} & set(document)
+    if not equipment:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    decides = {name: table for name, table in document.items() if name not in equipment}
+    return hashlib.sha256(json.dumps(decides, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _steps(
+    values: Values, steps: _Steps, unit: UnitDescription, equipment: Equipment
+) -> tuple[Step, ...]:
+    ranges = []
+    if unit.range_degc:
+        ranges.append(("the unit's range", unit.range_degc, f"range_degc in {unit.source}"))
+    if not equipment.chamber_by.by_hand:
+        low_high = equipment.chamber.range_degc
+        ranges.append(("the chamber's range", low_high, "range_degc in [chamber]"))
     at: dict[float, tuple[str, ...]] = {}
     for name, temps, positions in (
         ("temperatures_degc", steps.temperatures_degc, tuple(TEST_POSITIONS)),
         ("check_temperatures_degc", steps.check_temperatures_degc, CHECK_POSITIONS),
     ):
         for temp in temps:
-            if unit.range_degc and not unit.range_degc[0] <= temp <= unit.range_degc[1]:
-                low, high = unit.range_degc
-                raise RefusedError(
-                    values.where(name),
-                    f"found {temp:g} degC",
-                    expected=f"temperatures of the unit's range, {low:g} to {high:g} degC",
-                    remedy=f"correct the plan, or range_degc in {unit.source}",
-                )
+            for whose, (low, high), where in ranges:
+                if not low <= temp <= high:
+                    raise RefusedError(
+                        values.where(name),
+                        f"found {temp:g} degC",
+                        expected=f"temperatures of {whose}, {low:g} to {high:g} degC",
+                        remedy=f"correct the plan, or {where}",
+                    )
             at[temp] = at.get(temp, ()) + positions
     return tuple(Step(temp, at[temp]) for temp in sorted(at, reverse=steps.direction == "down"))

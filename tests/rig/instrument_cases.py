@@ -1,0 +1,71 @@
+"""Instruments of the tests: a plan with their tables, a Modbus server, a chamber on a CAN bus."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import threading
+from pathlib import Path
+
+from rig_cases import BENCH, SHORT_PLAN, bench_unit, dbc
+
+from triaxcal.rig.engine import Setup
+from triaxcal.rig.plan import SessionPlan, read_plan
+
+SIMULATED = f"{Path(__file__).parent / 'instruments.yaml'}@sim"
+
+
+def plan_with(folder: Path, tables: str, temps: str = "[20, 25]") -> SessionPlan:
+    """The short plan with tables of the equipment."""
+    path = folder / "plan.toml"
+    plan = SHORT_PLAN.format(rate=100, layout="classic", temps=temps, take="false")
+    path.write_text(plan + tables, encoding="utf-8")
+    return read_plan(path, bench_unit())
+
+
+def setup_with(folder: Path, tables: str, temps: str = "[20, 25]") -> Setup:
+    """Setup of the short plan with tables of the equipment."""
+    return Setup(BENCH, bench_unit(), plan_with(folder, tables, temps), dbc())
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextlib.contextmanager
+def modbus_server(registers: list[int]):
+    """Port of a Modbus TCP server on loopback whose holding and input registers are these."""
+    from pymodbus.datastore import (
+        ModbusDeviceContext,
+        ModbusSequentialDataBlock,
+        ModbusServerContext,
+    )
+    from pymodbus.server import ModbusTcpServer
+
+    port, up, loop = free_port(), threading.Event(), asyncio.new_event_loop()
+    made = []
+
+    async def serve():
+        block = ModbusSequentialDataBlock(1, registers)
+        context = ModbusServerContext(ModbusDeviceContext(hr=block, ir=block))
+        made.append(ModbusTcpServer(context, address=("127.0.0.1", port)))
+        await made[0].serve_forever(background=True)
+        up.set()
+
+    def run():
+        loop.run_until_complete(serve())
+        loop.run_forever()
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    assert up.wait(20)
+    try:
+        yield port
+    finally:
+        asyncio.run_coroutine_threadsafe(made[0].shutdown(), loop).result(20)
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join(20)
+        loop.close()

@@ -1,0 +1,1 @@
+"""Drivers of chambers and positioners, a file each; `rig.instrument` has what they share."""
