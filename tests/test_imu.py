@@ -162,7 +162,7 @@ def test_forces_hold_none_ends_and_anything() -> None:
 def built_imu(request: pytest.FixtureRequest) -> ImuBuild:
     """Both triads, the accelerometer with quadratic terms."""
     imu = imu_of(request.param, terms=EXAMPLE_TERMS)
-    return build_imu(imu, triads(SENSOR), PROVENANCE, random_vectors=20_000)
+    return build_imu(imu, triads(SENSOR), (PROVENANCE, PROVENANCE), random_vectors=20_000)
 
 
 def test_three_implementations_agree_and_samples_come_near_the_bound(built_imu: ImuBuild) -> None:

@@ -293,7 +293,7 @@ def test_functions_too_far_from_the_model_are_refused(ran: Ran) -> None:
     functions = compensate_imu(steep, "matrix", device.range_degc, (10.5, 8.8), (1e-6, 1e-8))
     errors = imudelivery._model_errors(steep, functions, device, ran.c.build.accel)
     with pytest.raises(RefusedError) as refusal:
-        imudelivery._refuse_model_errors(unit, errors)
+        imudelivery._refuse_model_errors(str(unit.path), errors)
     assert str(refusal.value) == (
         f"{unit.path}, [device] range_degc: N(T) of the accelerometer is {errors[0] * 1e6:.4g} "
         "micro-g off the fitted model; expected at most 1 micro-g; narrow the range, or check the "

@@ -13,7 +13,7 @@ from family_cases import directions, log, write_unit
 
 import triaxcal
 from builds import UNITS
-from triaxcal.delivery.imu import turned_columns
+from triaxcal.delivery.fittedimu import turned_columns
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.fitting.converter import input_words
 from triaxcal.model.types import FloatArray

@@ -102,7 +102,7 @@ def test_a_unit_without_c_is_refused(unit: Path, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def build() -> ImuBuild:
     """An IMU whose constants depend on the temperature."""
-    return build_imu(imu_of(), triads(), PROVENANCE, 1000)
+    return build_imu(imu_of(), triads(), (PROVENANCE, PROVENANCE), 1000)
 
 
 @needs(*TOOLS)
@@ -160,7 +160,7 @@ def test_of_a_gyro_a_cost_that_varies_is_told_and_fails_where_it_is_promised(
 @needs("gappa")
 def test_constant_functions_are_bounded_exactly(tmp_path: Path) -> None:
     """Gappa finds names for one expression, and the exact bound itself: neither is a fault."""
-    flat = build_imu(imu_of(flat=True), triads(), PROVENANCE, 1000)
+    flat = build_imu(imu_of(flat=True), triads(), (PROVENANCE, PROVENANCE), 1000)
     image = flat.files["triax_imu.bin"]
     files = {"triax_calib.bin": image[: image_length(image)]}
     outcome = gappa.check(Workspace.create(tmp_path, files, flat.accel, flat.accel_bound))

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from triaxcal.api.calibration import Calibration, Diagnosis, fit, load
+    from triaxcal.api.delivered import delivered_firmware
     from triaxcal.api.delivery import Delivered, deliver, update
     from triaxcal.api.diagnosis import diagnose
     from triaxcal.api.export import ExportedFiles, export
@@ -31,9 +32,9 @@ if TYPE_CHECKING:
         ImuConstants,
         ImuState,
         fit_imu,
-        load_imu,
         read_imu,
     )
+    from triaxcal.api.imufile import load_imu
     from triaxcal.api.imufirmware import ImuFirmware, firmware_imu
     from triaxcal.api.pair import LivePair, cross_coupling
     from triaxcal.api.series import SeriesResult, calibrate_series, learn_priors
@@ -65,14 +66,15 @@ __all__ = [
     "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck", "LivePair", "MeasurementPlan",
     "RefusedError", "SeriesResult", "Study", "TableGrid", "Unit", "UsageError", "Verdict",
     "Verification", "__version__", "calibrate_series", "compare_history", "cross_coupling",
-    "deliver", "diagnose", "export", "find_poses", "firmware", "firmware_imu", "fit", "fit_imu",
-    "key_schema", "learn_priors", "load", "load_imu", "plan_measurements", "plan_motion",
-    "read_image", "read_imu", "read_unit", "simulate", "simulate_series", "study_angle_errors",
-    "study_drift", "update", "verify_unit", "write_first_file",
+    "deliver", "delivered_firmware", "diagnose", "export", "find_poses", "firmware", "firmware_imu",
+    "fit", "fit_imu", "key_schema", "learn_priors", "load", "load_imu", "plan_measurements",
+    "plan_motion", "read_image", "read_imu", "read_unit", "simulate", "simulate_series",
+    "study_angle_errors", "study_drift", "update", "verify_unit", "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
     "triaxcal.api.calibration": ("Calibration", "Diagnosis", "fit", "load"),
+    "triaxcal.api.delivered": ("delivered_firmware",),
     "triaxcal.api.delivery": ("Delivered", "deliver", "update"),
     "triaxcal.api.diagnosis": ("diagnose",),
     "triaxcal.api.export": ("ExportedFiles", "export"),
@@ -80,8 +82,9 @@ _MODULES = {
     "triaxcal.api.firmware": ("CompiledFirmware", "Firmware", "firmware"),
     "triaxcal.api.image": ("CalibrationImage", "read_image"),
     "triaxcal.api.imu": (
-        "Imu", "ImuCalibration", "ImuConstants", "ImuState", "fit_imu", "load_imu", "read_imu",
+        "Imu", "ImuCalibration", "ImuConstants", "ImuState", "fit_imu", "read_imu",
     ),
+    "triaxcal.api.imufile": ("load_imu",),
     "triaxcal.api.imufirmware": ("ImuFirmware", "firmware_imu"),
     "triaxcal.api.pair": ("LivePair", "cross_coupling"),
     "triaxcal.api.series": ("SeriesResult", "calibrate_series", "learn_priors"),

@@ -6,6 +6,7 @@ import ctypes
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.types import FloatArray
+from triaxcal.unit.prefix import checked_prefix
 
 Answers = tuple[Int32Array, UInt32Array]
 _BLOCK = 1 << 16
@@ -50,9 +52,12 @@ class Firmware:
         Name and content of the generated C and the image.
     """
 
-    def __init__(self, calibration: Calibration) -> None:
+    def __init__(self, calibration: Calibration, prefix: str | None = None) -> None:
         self.calibration = calibration
-        self._made = made = make_firmware(calibration.fitted)
+        fitted = calibration.fitted
+        if prefix is not None:
+            fitted = replace(fitted, unit=replace(fitted.unit, prefix=checked_prefix(prefix)))
+        self._made = made = make_firmware(fitted)
         self.plan: Plan = made.plan
         self.files = made.files
         self.model_error_g = made.model_error_g
@@ -60,6 +65,16 @@ class Firmware:
 
     def __repr__(self) -> str:
         return f"<triaxcal.Firmware {self.calibration.serial}, {self._made.compensation.method}>"
+
+    @property
+    def unit(self) -> str:
+        """Name of the unit."""
+        return self._made.fitted.unit.name
+
+    @property
+    def prefix(self) -> str:
+        """What names in the C begin with."""
+        return self.plan.prefix
 
     @property
     def error_g(self) -> float:
@@ -135,6 +150,21 @@ class Firmware:
             for file, content in self.files.items():
                 (folder / file).write_bytes(content)
             yield CompiledFirmware(self, start_generated(folder, folder, self.plan.prefix).load())
+
+    def check(self) -> int:
+        """Check the C as `deliver` does: vectors on which Python, reference C and C agreed.
+
+        Raises
+        ------
+        RefusedError
+            When they differ, a result is beyond the proven bound or the unit's limits, or there is
+            no C compiler.
+        """
+        from triaxcal.codegen.compiler import reference_under_way  # noqa: PLC0415
+        from triaxcal.delivery.unit import deliver_fitted  # noqa: PLC0415
+
+        with reference_under_way() as reference:
+            return deliver_fitted(self._made.fitted, reference).check.total
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:
         """Write the C and the image, all of them or none, into a folder of their own.
@@ -227,17 +257,24 @@ def _one_or_all(name: str, value: Any, count: int) -> Int32Array:
     return np.ascontiguousarray(np.broadcast_to(codes, (count,)))
 
 
-def firmware(calibration: Calibration) -> Firmware:
+def firmware(calibration: Calibration, prefix: str | None = None) -> Firmware:
     """Integers of a calibration, by the method and formats that its unit states.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    prefix : str or None
+        What names in the C begin with; None is the unit's [firmware] prefix.
 
     Raises
     ------
     RefusedError
-        When the calibration is beyond its unit's limits, or its integers do not fit the format.
+        When the calibration is beyond its unit's limits, its integers do not fit the format, or the
+        prefix is none.
     """
     if not isinstance(calibration, Calibration):
         raise RefusedError(
             "calibration", f"found a {type(calibration).__name__}", expected="a Calibration"
         )
     refuse_beyond_limits(calibration.fitted)
-    return Firmware(calibration)
+    return Firmware(calibration, prefix)

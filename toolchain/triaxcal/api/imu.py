@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,10 +11,11 @@ import numpy as np
 
 from triaxcal.api.arguments import refuse_other_length, temperatures
 from triaxcal.base.arrays import finite
-from triaxcal.base.errors import RefusedError, refused_by_system
+from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
 from triaxcal.base.publish import renew
-from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_described
+from triaxcal.delivery.fittedimu import FittedImu, read_saved_for_c
+from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_described, imu_c
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
@@ -25,10 +25,6 @@ from triaxcal.model.methods.imu import ImuModel
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
-
-FORMAT = 1
-"""Of the calibration.json that `load_imu` reads."""
-_DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
 
 
 @dataclass(frozen=True)
@@ -96,10 +92,15 @@ class ImuCalibration:
         Working range; no other temperature is answered. None where no temperature was recorded.
     document : dict
         calibration.json.
+    source : str
+        Where it was read from, for messages.
     """
 
-    def __init__(self, document: dict[str, Any], delivery: ImuDelivery | None = None) -> None:
+    def __init__(
+        self, document: dict[str, Any], delivery: ImuDelivery | None = None, source: str = ""
+    ) -> None:
         self.document = document
+        self.source = source or f"IMU {document['serial']}"
         self.serial: str = document["serial"]
         self.reference_degc = float(document["reference_degc"])
         limits = document.get("range_degc")  # files of triaxcal 0.1.0 have none
@@ -199,22 +200,36 @@ class ImuCalibration:
             return np.array(self.reference_degc)
         return temperatures(temp_degc, self.range_degc)
 
-    @property
-    def c(self) -> ImuC:
-        """The C of both triads, where the unit has [device].
+    @cached_property
+    def fitted(self) -> FittedImu:
+        """What the C is made of, where the unit has [device].
 
         Raises
         ------
         RefusedError
-            Where it has none, or the calibration was loaded.
+            Where it has none.
         """
-        if self._delivery is None or self._delivery.c is None:
-            raise RefusedError(
-                f"IMU {self.serial}",
-                "has no C: its unit.toml has no [device], or the calibration was loaded",
-                expected="a calibration by fit_imu of a unit with [device]",
-            )
-        return self._delivery.c
+        if self._delivery is not None and self._delivery.c is not None:
+            return self._delivery.c.fitted
+        document = self.document
+        saved = read_saved_for_c(self.source, document)
+        frame = self.reference_degc, float(document["local_gravity_m_per_s2"])
+        model = model_of_states(self.layout, self._p, *frame, saved.device.range_degc)
+        inputs, name = str(document["inputs_sha256"]), str(document["unit"])
+        return FittedImu(name, self.serial, inputs, self.source, self.layout, model, saved)
+
+    @cached_property
+    def c(self) -> ImuC:
+        """The C of both triads, proven and checked, where the unit has [device].
+
+        Raises
+        ------
+        RefusedError
+            Where it has none, or a compiler is missing.
+        """
+        if self._delivery is not None and self._delivery.c is not None:
+            return self._delivery.c
+        return imu_c(self.fitted)
 
 
 def read_imu(folder: str | Path) -> Imu:
@@ -237,68 +252,3 @@ def fit_imu(imu: Imu, progress: Progress | None = None) -> ImuCalibration:
         When the recording cannot be read, or does not determine a calibration.
     """
     return ImuCalibration.of(deliver_described(imu.description, progress))
-
-
-def load_imu(path: str | Path) -> ImuCalibration:
-    """Calibration from the calibration.json of an IMU.
-
-    Raises
-    ------
-    RefusedError
-        When the file cannot be read, or is not that of an IMU.
-    """
-    try:
-        document = json.loads(Path(path).read_bytes())
-        if document["kind"] != "dynamic":
-            raise KeyError("kind")
-        if document["format"] != FORMAT:
-            raise RefusedError(
-                f"{path}, format", f"found {document['format']!r}", expected=f"{FORMAT}"
-            )
-        found = ImuCalibration(document)
-        _refuse_damage(str(path), found)
-    except OSError as error:
-        raise refused_by_system(path, "read", error) from error
-    except _DAMAGE as error:
-        raise RefusedError(
-            str(path),
-            f"no calibration.json of an IMU: {type(error).__name__} {error}",
-            expected="the file that `triaxcal calib` wrote for an IMU",
-            remedy="load a triad's calibration with load(path)",
-        ) from error
-    return found
-
-
-def _refuse_damage(path: str, found: ImuCalibration) -> None:
-    """Refuse states of another layout, and numbers that are none."""
-    document, size = found.document, len(found.states)
-    for name in document["blocks"]:
-        if name not in EXTENSIONS:
-            raise RefusedError(
-                f"{path}, blocks",
-                f"found {name!r}",
-                expected=f"some of {', '.join(EXTENSIONS.names)}",
-            )
-    names = [state.name for state in found.layout.states]
-    if [row["name"] for row in document["states"]] != names:
-        raise RefusedError(
-            f"{path}, states",
-            "not the states of its blocks, in their order",
-            expected=f"{len(names)} states, {names[0]} to {names[-1]}",
-        )
-    numbers: dict[str, Any] = {
-        "states": [(s.value, s.sd) for s in found.states.values()],
-        "covariance": found.covariance,
-        "reference_degc": found.reference_degc,
-        "local_gravity_m_per_s2": float(document["local_gravity_m_per_s2"]),
-        "range_degc": found.range_degc or 0.0,
-    }
-    for key, value in numbers.items():
-        if not np.isfinite(value).all():
-            raise RefusedError(f"{path}, {key}", "a number is not finite", expected="numbers")
-    if found.covariance.shape != (size, size):
-        raise RefusedError(
-            f"{path}, covariance",
-            f"found the shape {found.covariance.shape}",
-            expected=f"({size}, {size})",
-        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,14 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import publish
 from triaxcal.codegen.imu import ImuBuild, imu_answers
 from triaxcal.codegen.routines import Int32Array, UInt32Array
+from triaxcal.delivery.imu import ImuC, imu_c
+from triaxcal.unit.prefix import checked_prefix
 
 
 class ImuFirmware:
     """The fixed-point routines of both triads, in Python's integers: the same bits as the C.
+
+    Made by `firmware_imu`, which has proven and cross-checked the C.
 
     Attributes
     ----------
@@ -26,9 +31,20 @@ class ImuFirmware:
         Name and content of the C and the image.
     """
 
-    def __init__(self, build: ImuBuild) -> None:
-        self.build = build
-        self.files = build.files
+    def __init__(self, c: ImuC) -> None:
+        self.c = c
+        self.build: ImuBuild = c.build
+        self.files = c.build.files
+
+    @property
+    def unit(self) -> str:
+        """Name of the unit."""
+        return self.c.fitted.name
+
+    @property
+    def prefix(self) -> str:
+        """What names in the C begin with."""
+        return self.build.accel.prefix
 
     def apply(
         self, raw_accel: Any, raw_gyro: Any, temp_codes: Any
@@ -62,18 +78,34 @@ class ImuFirmware:
         temp = np.ascontiguousarray(np.broadcast_to(temp, (len(accel),)))
         return imu_answers(self.build.accel, self.build.gyro, temp, accel, gyro)
 
+    def check(self) -> int:
+        """Vectors on which Python, the reference C and the generated C agreed."""
+        build = self.build
+        return build.accel_check.total + build.gyro_check.total + build.vectors
+
     def write(self, folder: str | Path) -> tuple[Path, ...]:
         """Write the C and the image, all of them or none, into a folder of their own."""
         publish(self.files, Path(folder))
         return tuple(Path(folder) / name for name in self.files)
 
 
-def firmware_imu(calibration: ImuCalibration) -> ImuFirmware:
+def firmware_imu(calibration: ImuCalibration, prefix: str | None = None) -> ImuFirmware:
     """Firmware of an IMU whose unit has [device].
+
+    Parameters
+    ----------
+    calibration : ImuCalibration
+        By `fit_imu`, or by `load_imu`: then the C is made, proven and checked once more.
+    prefix : str or None
+        What names in the C begin with; None is that of [device].
 
     Raises
     ------
     RefusedError
-        Where there is none.
+        Where there is no [device], the prefix is none, or a check fails.
     """
-    return ImuFirmware(calibration.c.build)
+    if prefix is None:
+        return ImuFirmware(calibration.c)
+    fitted = calibration.fitted
+    device = replace(fitted.device, prefix=checked_prefix(prefix))
+    return ImuFirmware(imu_c(replace(fitted, saved=replace(fitted.saved, device=device))))

@@ -5,6 +5,7 @@ Python's encoder with `indent` is not its fast one, and puts each number of a ma
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -14,6 +15,11 @@ def json_bytes(document: Mapping[str, Any]) -> bytes:
     """Document as UTF-8; NaN and infinity are refused by a ValueError."""
     lines = [f" {_text(key)}: {_value(value)}" for key, value in document.items()]
     return ("{\n" + ",\n".join(lines) + "\n}\n").encode()
+
+
+def sha256_of_files(files: Mapping[str, bytes]) -> dict[str, str]:
+    """SHA-256 of each file, in hex digits, by its name."""
+    return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
 
 
 def _value(value: Any) -> str:

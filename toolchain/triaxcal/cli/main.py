@@ -18,7 +18,7 @@ SECTIONS = {
     "Calibrate": ("calib", "dynamic", "batch"),
     "In the field": ("check", "update", "device"),
     "Look at readings and results": ("diagnose", "poses", "drift", "crosscoupling", "history"),
-    "Into production": ("image", "a2l", "export"),
+    "Into production": ("firmware", "image", "a2l", "export"),
     "Check the generated C": ("verify", "target"),
     "Plan, measure, simulate": ("init", "design", "rig", "simulate", "schema"),
 }

@@ -103,6 +103,11 @@ DELIVERED = click.option(
 )
 
 
+PREFIX = click.option(
+    "--prefix", help="What names in the C begin with; default: that of unit.toml."
+)
+
+
 _OPTIONS = {
     "gravity_m_per_s2": "--gravity",
     "bias_drift_mg": "--bias-drift",

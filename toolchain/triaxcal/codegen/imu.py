@@ -76,10 +76,10 @@ class ImuBuild:
 def build_imu(
     imu: ImuCompensation,
     triads: tuple[Triad, Triad],
-    provenance: Provenance,
+    provenances: tuple[Provenance, Provenance],
     random_vectors: int = RANDOM_VECTORS,
 ) -> ImuBuild:
-    """Plan, render, prove and check the C of an IMU; `triads` are accelerometer and gyro.
+    """Plan, render, prove and check the C of an IMU; pairs are of accelerometer and gyro.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def build_imu(
     """
     accel = make_plan(imu.accel, triads[0])
     gyro = make_gyro_plan(imu, triads[1], accel.shape.output_q)
-    files = render_imu(accel, gyro, triads, provenance)
+    files = render_imu(accel, gyro, triads, provenances)
     bounds = prove(accel), prove(gyro)
     with tempfile.TemporaryDirectory(prefix="triaxcal-imu-") as name:
         folder = Path(name)
@@ -118,11 +118,15 @@ def build_imu(
 
 
 def render_imu(
-    accel: Plan, gyro: Plan, triads: tuple[Triad, Triad], provenance: Provenance
+    accel: Plan,
+    gyro: Plan,
+    triads: tuple[Triad, Triad],
+    provenances: tuple[Provenance, Provenance],
 ) -> dict[str, bytes]:
     """Every file of an IMU, by name."""
     texts = {**render_routine(accel), **render_routine(gyro)}
-    for plan, triad in zip((accel, gyro), triads, strict=True):
+    each = tuple(zip((accel, gyro), triads, provenances, strict=True))
+    for plan, triad, provenance in each:
         texts |= render_constants(plan, triad.temperature_sensor, provenance)
         texts |= render_selftest(plan, provenance)
     names, context = names_of(accel), imu_context(accel, gyro)
@@ -131,7 +135,7 @@ def render_imu(
     files = {name: text.encode() for name, text in texts.items()}
     files[names.file(IMU_IMAGE_FILE)] = b"".join(
         with_identity(image_bytes(plan), triad.temperature_sensor, provenance)
-        for plan, triad in zip((accel, gyro), triads, strict=True)
+        for plan, triad, provenance in each
     )
     return files
 

@@ -14,15 +14,12 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
 from triaxcal.codegen.compiler import find_compiler
-from triaxcal.codegen.constants import Provenance
 from triaxcal.codegen.imu import ImuBuild, build_imu
+from triaxcal.delivery.fittedimu import FittedImu, fitted_imu
 from triaxcal.delivery.inputs import files_sha256
-from triaxcal.dynamic.consistency import verdict
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.device import Device
-from triaxcal.dynamic.imumodel import imu_model, left_out
 from triaxcal.dynamic.unit import DynamicUnit, calibrate_described
-from triaxcal.fitting.converter import plain_name
 from triaxcal.fixedpoint.gyro import TriadDescription
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.curves import ThermalModel
@@ -44,22 +41,27 @@ class ImuC:
 
     Attributes
     ----------
-    device : Device
-    model : ImuModel
+    fitted : FittedImu
     build : ImuBuild
     accel_model_error_g, gyro_model_error_deg_per_h : float
         Largest error of the functions that the device evaluates against K(T)^-1 (U - U0(T)), at
         any temperature code and any raw code.
-    left_out : tuple of str
-        Titles of effects that were estimated and that the C does not correct.
     """
 
-    device: Device
-    model: ImuModel
+    fitted: FittedImu
     build: ImuBuild
     accel_model_error_g: float
     gyro_model_error_deg_per_h: float
-    left_out: tuple[str, ...]
+
+    @property
+    def device(self) -> Device:
+        """What the codes of the firmware are."""
+        return self.fitted.device
+
+    @property
+    def model(self) -> ImuModel:
+        """The fitted constants over temperature."""
+        return self.fitted.model
 
     @property
     def accel_error_g(self) -> float:
@@ -114,7 +116,7 @@ def deliver_described(unit: DynamicDescription, progress: Progress | None = None
         raise RefusedError(
             str(unit.path.parent), "changed while it was read", remedy="run it again"
         )
-    c = None if unit.device is None else _imu_c(done, unit.device, inputs)
+    c = None if unit.device is None else imu_c(fitted_imu(done, unit.device, inputs))
     return ImuDelivery(done, inputs, c)
 
 
@@ -122,59 +124,29 @@ def _inputs_sha256(unit: DynamicDescription) -> str:
     return files_sha256((unit.path, unit.recording), "put it there, or correct [dynamic] recording")
 
 
-def _imu_c(done: DynamicUnit, device: Device, inputs: str) -> ImuC:
-    model = imu_model(done.result, device.range_degc)
+def imu_c(fitted: FittedImu) -> ImuC:
+    """The C of a calibrated IMU, proven and checked.
+
+    Raises
+    ------
+    RefusedError
+        As `build_imu`, and when the functions miss the fitted model.
+    """
+    device, model = fitted.device, fitted.model
     adcs = device.accel_adc, device.gyro_adc
     limits = ACCEL_MODEL_ERROR_MAX_G, math.radians(GYRO_MODEL_ERROR_MAX_DEG_PER_H / 3600)
     functions = compensate_imu(
         model, METHOD, device.range_degc, (adcs[0].largest_v, adcs[1].largest_v), limits
     )
-    name, sensor = done.unit.name, device.temperature_sensor
+    name, sensor = fitted.name, device.temperature_sensor
     triads = (
         TriadDescription(name, adcs[0], sensor, device.accel_q, device.prefix),
         TriadDescription(name, adcs[1], sensor, device.gyro_rate_q, device.prefix),
     )
-    omitted = left_out(done.result)
-    build = build_imu(functions, triads, _provenance(done, device, inputs, omitted))
+    build = build_imu(functions, triads, fitted.provenances)
     errors = _model_errors(model, functions, device, build.accel)
-    _refuse_model_errors(done.unit, errors)
-    return ImuC(device, model, build, *errors, omitted)
-
-
-def _provenance(
-    done: DynamicUnit, device: Device, inputs: str, omitted: tuple[str, ...]
-) -> Provenance:
-    low, high = device.range_degc
-    accel, gyro = device.accel_adc, device.gyro_adc
-    gyro_deg_per_s = math.degrees(gyro.full_scale_v)
-    return Provenance(
-        done.unit.serial,
-        inputs,
-        (
-            f"both triads from {done.unit.recording.name}, {low:g} to {high:g} degC",
-            f"accelerometer code: {accel.bits} bits for {accel.full_scale_v:.9g} g full scale",
-            f"gyro code: {gyro.bits} bits for {gyro_deg_per_s:.9g} deg/s full scale",
-            *turned_columns(done.unit),
-            "V below stands for g in the accelerometer, for rad/s in the gyro",
-            *(f"not corrected: {title}" for title in omitted),
-            f"verdict of the filter: {verdict(done.result)}",
-            "not tested: nothing was held out, and no limit is stated for an IMU",
-        ),
-    )
-
-
-def turned_columns(unit: DynamicDescription) -> list[str]:
-    """Columns of both triads, where a sign is turned: the constants belong to the turned codes."""
-    lines = []
-    for quantity, name in ((q, q.name) for q in unit.quantities if q.name in ("force", "rate")):
-        turned = (quantity.convert(np.ones((1, 3)))[0] < 0.0).tolist()
-        columns = [
-            f"{'-' * minus}{plain_name(str(column))}"
-            for column, minus in zip(quantity.columns, turned, strict=True)
-        ]
-        if any(turned):
-            lines.append(f"raw x, y, z of the {name}: columns {', '.join(columns)}; - is -code")
-    return lines
+    _refuse_model_errors(fitted.source, errors)
+    return ImuC(fitted, build, *errors)
 
 
 def _model_errors(
@@ -196,7 +168,7 @@ def _triad_error(
     return worst_force_error_g(functions.gain_and_offset(temps), exact, adc.largest_v)
 
 
-def _refuse_model_errors(unit: DynamicDescription, errors: tuple[float, float]) -> None:
+def _refuse_model_errors(source: str, errors: tuple[float, float]) -> None:
     """The order of N(T) is chosen on a grid; what counts is every temperature code."""
     for what, error, limit, name in (
         ("accelerometer", errors[0] * 1e6, ACCEL_MODEL_ERROR_MAX_G * 1e6, "micro-g"),
@@ -204,7 +176,7 @@ def _refuse_model_errors(unit: DynamicDescription, errors: tuple[float, float]) 
     ):
         if error > limit:
             raise RefusedError(
-                f"{unit.path}, [device] range_degc",
+                f"{source}, [device] range_degc",
                 f"N(T) of the {what} is {error:.4g} {name} off the fitted model",
                 expected=f"at most {limit:g} {name}",
                 remedy="narrow the range, or check the temperature coefficients",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ from triaxcal.dynamic.recording import Turntable
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.table import Quantity
 from triaxcal.unit.folder import SERIAL, TOP, UNIT_FILE, find_unit
+from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.recordingfile import ClockLayout, FileLayout, check_units
 from triaxcal.unit.site import TURNING_SITE, TurningSite
 
@@ -50,6 +51,8 @@ class DynamicDescription:
         Full scale of the gyros, rad/s.
     device : Device or None
         What the firmware's codes are; without it there is no C.
+    measured : Measured
+        When and where the recording was made.
     """
 
     name: str
@@ -69,6 +72,7 @@ class DynamicDescription:
     noise: DataSheet
     table: Turntable | None
     device: Device | None = None
+    measured: Measured = field(default_factory=Measured)
 
     def state_blocks(self) -> tuple[StateBlock, ...]:
         """Blocks of the extensions that are switched on."""
@@ -131,6 +135,7 @@ def imu_file() -> FileKeys:
             TableKeys.of(DataSheet),
             TableKeys.of(_TablePapers, optional=True),
             DEVICE,
+            MEASURED,
         ),
         ("time_column",),
     )
@@ -181,6 +186,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         noise=tables["noise"].record(DataSheet),
         table=_table(tables["table"]),
         device=device_of(tables["device"]),
+        measured=tables["measured"].record(Measured),
     )
 
 

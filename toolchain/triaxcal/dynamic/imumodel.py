@@ -29,9 +29,9 @@ IN_MODEL = (
 """Blocks that the device corrects."""
 
 
-def left_out(result: DynamicResult) -> tuple[str, ...]:
+def left_out(layout: Layout) -> tuple[str, ...]:
     """Titles of the blocks that were estimated and that the device does not correct."""
-    return tuple(b.title for b in result.layout.blocks if b.name not in IN_MODEL)
+    return tuple(b.title for b in layout.blocks if b.name not in IN_MODEL)
 
 
 def imu_model(result: DynamicResult, range_degc: tuple[float, float]) -> ImuModel:

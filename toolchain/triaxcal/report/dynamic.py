@@ -11,6 +11,7 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.base.jsontext import json_bytes
+from triaxcal.delivery.fittedimu import firmware_document
 from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.consistency import verdict
@@ -73,7 +74,9 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
             for w in seen.weak
         ],
         "known_only_together": [list(pair) for pair in seen.together],
-    } | ({"findings": list(done.findings)} if done.findings else {})
+        **({"findings": list(done.findings)} if done.findings else {}),
+        **firmware_document(done),
+    }
 
 
 def _states(result: DynamicResult) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.jsontext import json_bytes
+from triaxcal.base.jsontext import json_bytes, sha256_of_files
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import CrossCheck
 from triaxcal.codegen.names import shape_id
@@ -63,7 +63,7 @@ def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:
         "compiler_flags": list(FLAGS),
         "method": METHOD,
         "range_degc": list(c.device.range_degc),
-        "not_corrected": list(c.left_out),
+        "not_corrected": list(c.fitted.left_out),
         "accelerometer": {
             **_triad(build.accel, build.accel_bound, build.accel_check),
             "bound_g": build.accel_bound.lsb * 2.0**-build.accel.shape.output_q,
@@ -79,6 +79,7 @@ def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:
         },
         "both_together_vectors": build.vectors,
         "mismatches": 0,
+        "files_sha256": sha256_of_files(build.files),
     }
     return json_bytes(document)
 
@@ -135,7 +136,10 @@ def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
             "Both together",
             f"{thousands(build.vectors)} vectors, constants and image: Python = generated C",
         ),
-        ("Not corrected", "; ".join(c.left_out) or "nothing: every estimated effect is corrected"),
+        (
+            "Not corrected",
+            "; ".join(c.fitted.left_out) or "nothing: every estimated effect is corrected",
+        ),
     ]
     constant = constant_triads(made)
     if constant:
@@ -182,7 +186,7 @@ def imu_c_lines(made: ImuDelivery) -> list[str]:
         f"                {together[1]} deg/h",
         f"  checked       {agree}",
     ]
-    lines += [f"  not corrected {title}" for title in c.left_out]
+    lines += [f"  not corrected {title}" for title in c.fitted.left_out]
     for what in constant_triads(made):
         lines += [
             f"  constant      {what} over temperature: [dynamic] blocks has no",

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-
-from triaxcal.base.jsontext import json_bytes
+from triaxcal.base.jsontext import json_bytes, sha256_of_files
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.names import shape_id
 from triaxcal.codegen.tryout import BEFORE
@@ -57,8 +55,6 @@ def verification_json(delivery: Delivery) -> bytes:
             "at_t0": delivery.unit.limits.at_t0_g,
             "over_range": delivery.unit.limits.over_range_g,
         },
-        "files_sha256": {
-            name: hashlib.sha256(content).hexdigest() for name, content in delivery.files.items()
-        },
+        "files_sha256": sha256_of_files(delivery.files),
     }
     return json_bytes(document)

@@ -1,6 +1,8 @@
 """What the names in the generated C begin with: [firmware] prefix, [device] prefix."""
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.base.kinds import Kind, pattern
+from triaxcal.base.tomltable import shown
 
 DEFAULT_PREFIX = "triax"
 
@@ -11,3 +13,17 @@ PREFIX: Kind[str] = pattern(
     '"left_accel"',
 )
 """Names of the library that C99 7.26 reserves are refused: strength_apply would be one."""
+
+
+def checked_prefix(prefix: str) -> str:
+    """The prefix, where it is one.
+
+    Raises
+    ------
+    RefusedError
+        When it is no name of C, or one that C reserves: as the key in unit.toml.
+    """
+    try:
+        return PREFIX.parse(prefix)
+    except ValueError:
+        raise RefusedError("prefix", f"found {shown(prefix)}", expected=PREFIX.expected) from None

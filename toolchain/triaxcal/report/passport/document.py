@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from typing import Any
 
 import numpy as np
 
 from triaxcal import __version__
-from triaxcal.base.jsontext import json_bytes
+from triaxcal.base.jsontext import json_bytes, sha256_of_files
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Passport
 from triaxcal.uncertainty.budget import Budget
@@ -32,7 +31,7 @@ def passport_json(p: Passport) -> bytes:
         **_judged(p),
         **_known(p),
         "warnings": [*p.uncertainty.warnings, *filter(None, [p.cause])],
-        "files_sha256": {n: hashlib.sha256(c).hexdigest() for n, c in d.files.items()},
+        "files_sha256": sha256_of_files(d.files),
         "tools": dict(p.tools),
     }
     return json_bytes(document)
