@@ -230,8 +230,10 @@ def test_a_stopped_session_is_resumed_and_replayed_alike(tmp_path, stop_s):
     for _ in range(stop_s):
         acknowledged += [e for e in taken.feed(rig.advance()) if e.kind == "accepted"]
         robot.act(taken.engine.session)
-    # As a crash leaves it: nothing closed, half a line at the end of either file.
+    # As a crash leaves it: nothing closed, half a line at the end of either file. The lock ends
+    # with its process.
     taken.log.flush()
+    taken.lock.close()
     for name in (LOG_FILE, JOURNAL_FILE):
         with (folder / name).open("ab") as file:
             file.write(b"(1700000000.1234")
@@ -288,6 +290,9 @@ def test_a_full_disk_ends_the_session_with_an_intact_prefix(tmp_path, limit):
     assert done.returncode == 1, done.stderr
     assert "cannot be written: file too large" in done.stdout
     assert len(done.stdout.splitlines()) == 1
+    if limit == 0:  # not even the lock
+        assert list((tmp_path / "001").iterdir()) == []
+        return
     log = (tmp_path / "001" / LOG_FILE).read_bytes()
     assert not log or log.endswith(b"\n")
     found = read_journal(tmp_path / "001" / JOURNAL_FILE)

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import errno
-import os
+import glob
 import shutil
 import tempfile
 from collections.abc import Collection, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from triaxcal.base.durable import exchange, replace_file, sync_folder, umask, write_durably
 from triaxcal.base.errors import RefusedError, refused_by_system
+
+_OLD = ".old"
 
 
 def publish(files: Mapping[str, bytes], target: Path, sometimes: Collection[str] = ()) -> None:
     """Make the folder `target` hold exactly these files.
 
-    They are written to a folder beside it, which takes its place when it is complete. `sometimes`
-    names files that an earlier delivery may have had besides; * stands for any text.
+    They are written to a folder beside it, which takes its place when it is complete and on the
+    disk. `sometimes` names files that an earlier delivery may have had besides; * stands for any
+    text.
 
     Raises
     ------
@@ -25,6 +29,7 @@ def publish(files: Mapping[str, bytes], target: Path, sometimes: Collection[str]
         When the disk refuses, or `target` holds anything but an earlier delivery; `target` is then
         as it was.
     """
+    _take_back(target)
     _refuse_foreign(target, {*files, *sometimes})
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -33,9 +38,11 @@ def publish(files: Mapping[str, bytes], target: Path, sometimes: Collection[str]
         raise _refusal(target.parent, error) from error
     try:
         for name, content in files.items():
-            (staging / name).write_bytes(content)
-        staging.chmod(0o777 & ~_umask())
+            write_durably(staging / name, content)
+        staging.chmod(0o777 & ~umask())
+        sync_folder(staging)
         _replace(staging, target)
+        sync_folder(target.parent)
     except OSError as error:
         raise _refusal(target, error) from error
     finally:
@@ -52,6 +59,7 @@ def publish_beside(
     RefusedError
         As `publish`; neither folder has changed then.
     """
+    _take_back(target)
     if kept is None or not target.is_dir() or kept.exists():
         publish(files, target, sometimes)
         return
@@ -87,14 +95,7 @@ def renew(files: Mapping[str, bytes], target: Path) -> None:
                 remedy="name another file",
             )
         try:
-            handle, staging = tempfile.mkstemp(prefix=f".{name}.", dir=target)
-            try:
-                with os.fdopen(handle, "wb") as file:
-                    file.write(content)
-                Path(staging).chmod(0o666 & ~_umask())
-                Path(staging).replace(target / name)
-            finally:
-                Path(staging).unlink(missing_ok=True)
+            replace_file(path, content)
         except OSError as error:
             raise _refusal(target / name, error) from error
 
@@ -129,10 +130,17 @@ def _refuse_foreign(target: Path, files: Collection[str]) -> None:
 
 
 def _replace(staging: Path, target: Path) -> None:
+    """Put a finished folder in the place of an earlier one, which is then removed.
+
+    Where names can change places this is one step. Elsewhere it is two, and a crash between them
+    leaves the earlier folder under another name, from which `_take_back` fetches it.
+    """
     if not target.exists():
         staging.rename(target)
         return
-    old = staging.with_name(f"{staging.name}.old")
+    if exchange(staging, target):
+        return
+    old = staging.with_name(f"{staging.name}{_OLD}")
     try:
         target.rename(old)
         staging.rename(target)
@@ -143,10 +151,13 @@ def _replace(staging: Path, target: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def _umask() -> int:
-    current = os.umask(0o022)
-    os.umask(current)
-    return current
+def _take_back(target: Path) -> None:
+    """Give a folder its name again that a crash between two renames took."""
+    if target.exists() or not target.parent.is_dir():
+        return
+    left = sorted(target.parent.glob(f".{glob.escape(target.name)}.*{_OLD}"))
+    if left:
+        left[-1].rename(target)
 
 
 def _refusal(where: Path, error: OSError) -> RefusedError:

@@ -62,12 +62,34 @@ def run(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool) -> Non
 @bus_options
 @SESSIONS
 @PLAIN
-def resume(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool) -> None:
+@click.option(
+    "--mend", is_flag=True, help="Go on from what is whole of a damaged journal, without asking."
+)
+def resume(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool, mend: bool) -> None:
     """Go on with the last session, whatever ended it."""
     from triaxcal.cli.rig_live import guide  # noqa: PLC0415
 
     folder = _last_session(sessions or setup.folder / "sessions")
+    _mend(setup, folder, mend)
     guide(setup, open_source(setup, bus), folder, plain)
+
+
+def _mend(setup: Setup, folder: Path, agreed: bool) -> None:
+    """Mend a damaged journal when the operator agrees."""
+    from triaxcal.rig import mend  # noqa: PLC0415
+
+    found = mend.damage(folder)
+    if found is None:
+        return
+    text = mend.described(folder, found)
+    if not agreed and sys.stdin.isatty():
+        click.echo(text)
+        agreed = click.confirm("Go on from what is whole? The damaged journal is kept")
+    if not agreed:
+        raise RefusedError(text, "not gone on with", remedy="agree to it with --mend")
+    done = mend.mend(setup, folder)
+    rebuilt = "; the log gave again what was lost" if done.complete else ""
+    click.echo(f"mended: {done.dwells} accepted dwells{rebuilt}; damaged one: {done.kept_as}")
 
 
 def _last_session(root: Path) -> Path:
@@ -94,6 +116,7 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
 
     LOG has the frames of the session; the journal is beside it.
     """
+    from triaxcal.cli.rig_live import show_written  # noqa: PLC0415
     from triaxcal.rig import recording, replay, store  # noqa: PLC0415
 
     journal = log.with_name(recording.JOURNAL_FILE)
@@ -111,10 +134,11 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
             expected="a whole session",
             remedy="go on with `triaxcal rig resume`",
         )
-    files = store.write_records(
-        into or log.parent, played.engine.session, setup.dbc.sha256, played.log
+    for note in played.notes:
+        click.echo(note, err=True)
+    show_written(
+        store.write_records(into or log.parent, played.engine.session, setup.dbc.sha256, played.log)
     )
-    click.echo("written: " + ", ".join(map(str, files)))
 
 
 @rig.command(epilog=example("triaxcal rig status --unit AT-7"))

@@ -83,10 +83,22 @@ class _Keys:
 def guide(setup: Setup, source: Source, folder: Path, plain: bool) -> None:
     """Guide a session to its end and write the records."""
     start = time.monotonic()
-    robot = None
-    if isinstance(source, SimulatedSource):
-        robot = runner.Robot(source.rig)
-    taken = recording.Recording(setup, folder, source.name)
+    with contextlib.closing(source):
+        taken = recording.Recording(setup, folder, source.name)
+        try:
+            log = _guided(taken, source, plain, start)
+        except (_Stop, KeyboardInterrupt):
+            click.echo(f"stopped; go on with: triaxcal rig resume --unit {setup.folder}", err=True)
+            sys.exit(1)
+        finally:
+            taken.close()
+    _write(setup, taken, log)
+
+
+def _guided(taken: recording.Recording, source: Source, plain: bool, start: float) -> LogState:
+    """Guide a session to its end; the state of its log."""
+    if taken.lock.left_by is not None:
+        click.echo(f"taken over from {taken.lock.left_by.described}, which has ended")
     if taken.resumed:
         session = taken.engine.session
         session.last_event = (
@@ -94,23 +106,16 @@ def guide(setup: Setup, source: Source, folder: Path, plain: bool) -> None:
             "dwells kept"
         )
         click.echo(session.last_event)
+    robot = runner.Robot(source.rig) if isinstance(source, SimulatedSource) else None
     keys = _Keys(plain)
-    try:
-        with keys.listening():
-            ticks = runner.live(taken, source, keys.words, robot)
-            if plain:
-                _plainly(ticks, taken)
-            else:
-                _on_screen(ticks, taken, source)
-        taken.log.flush(sync=True)
-        log = taken.log.state  # reads the log: while it is open
-    except (_Stop, KeyboardInterrupt):
-        click.echo(f"stopped; go on with: triaxcal rig resume --unit {setup.folder}", err=True)
-        sys.exit(1)
-    finally:
-        source.close()
-        taken.close()
-    _write(setup, taken, log)
+    with keys.listening():
+        ticks = runner.live(taken, source, keys.words, robot)
+        if plain:
+            _plainly(ticks, taken)
+        else:
+            _on_screen(ticks, taken, source)
+    taken.log.flush(sync=True)
+    return taken.log.state  # reads the log: while it is open
 
 
 def _write(setup: Setup, taken: recording.Recording, log: LogState) -> None:
@@ -124,9 +129,15 @@ def _write(setup: Setup, taken: recording.Recording, log: LogState) -> None:
                 str(path), "gives other dwells than the journal", remedy="report this session"
             )
         session, log = played.engine.session, played.log
-    files = store.write_records(setup.folder, session, setup.dbc.sha256, log)
-    click.echo("written: " + ", ".join(map(str, files)))
+    show_written(store.write_records(setup.folder, session, setup.dbc.sha256, log))
     click.echo(f"next: make calib-header UNIT={setup.unit.name}")
+
+
+def show_written(done: store.Written) -> None:
+    """Say what was written, and what was kept of earlier records."""
+    if done.kept:
+        click.echo("earlier records kept: " + ", ".join(map(str, done.kept)))
+    click.echo("written: " + ", ".join(map(str, done.files)))
 
 
 def _plainly(ticks: Iterator[runner.Tick], taken: recording.Recording) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from triaxcal.base.durable import replace_file
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.readings.numbertext import is_number, number_remedy
@@ -268,29 +268,34 @@ def _check_together(where: str, columns: tuple[str, ...], readings: str, deviati
         )
 
 
+def measurements_text(
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str | int | float]],
+    comments: Sequence[str] = (),
+) -> str:
+    """Text of a measurements.csv.
+
+    Floats are written with the fewest digits that read back to the same float.
+    """
+    lines = [f"# {comment}" for comment in comments] + [",".join(columns)]
+    return "\n".join([*lines, *(",".join(map(_cell, row)) for row in rows)]) + "\n"
+
+
 def write_measurements(
     path: Path,
     columns: Sequence[str],
     rows: Iterable[Sequence[str | int | float]],
     comments: Sequence[str] = (),
 ) -> None:
-    """Write a measurements.csv: written aside, then renamed, so never half a file.
-
-    Floats are written with the fewest digits that read back to the same float.
+    """Write a measurements.csv, as `measurements_text`, in one step.
 
     Raises
     ------
     RefusedError
         When the folder cannot be written.
     """
-    lines = [f"# {comment}" for comment in comments] + [",".join(columns)]
-    lines += [",".join(map(_cell, row)) for row in rows]
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
+    text = measurements_text(columns, rows, comments)
     try:
-        try:
-            aside.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
-            aside.replace(path)
-        finally:
-            aside.unlink(missing_ok=True)
+        replace_file(path, text.encode())
     except OSError as error:
-        raise RefusedError(str(path), f"cannot be written: {error.strerror}") from error
+        raise refused_by_system(path, "written", error) from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,8 +54,12 @@ class Engine:
 
     def resume(self, durable: int) -> None:
         """Go on as a new process would that has only the journal's durable events."""
+        self.restore(self.session.durable[:durable])
+
+    def restore(self, durable: Sequence[Event]) -> None:
+        """Go on from these durable events."""
         self._start()
-        self.session.resume(durable)
+        self.session.restore(durable)
 
     def feed(self, frames: Frames) -> list[Event]:
         """Decisions that these frames bring about.

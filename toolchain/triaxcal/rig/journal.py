@@ -2,7 +2,7 @@
 
 One record a line: eight hex digits of CRC-32, a space, JSON. The CRC runs over the one before and
 the JSON, so a record that was changed, moved or taken out breaks the chain. What stands behind
-the first broken record is not used.
+the first broken record is not used, until `mend` has joined what is whole with it.
 """
 
 from __future__ import annotations
@@ -10,11 +10,14 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from triaxcal.base.durable import BINARY, sync_folder, write_all
 from triaxcal.base.errors import RefusedError, refused_by_system
 
 Record = Mapping[str, Any]
@@ -33,7 +36,11 @@ class ReadJournal:
     torn : bool
         A record at the end is incomplete: it was never acknowledged.
     damaged : bool
-        More than one record's worth follows the break: not a crash, but damage.
+        A whole line follows the break: not a crash, but damage.
+    later : tuple of Record
+        Records behind the break that are whole, each checked against the link of the one before.
+    lost : int
+        Lines behind the break that are not.
     """
 
     records: tuple[Record, ...]
@@ -41,6 +48,8 @@ class ReadJournal:
     crc: str
     torn: bool
     damaged: bool
+    later: tuple[Record, ...] = ()
+    lost: int = 0
 
 
 def read_journal(path: Path) -> ReadJournal:
@@ -60,12 +69,24 @@ def read_journal(path: Path) -> ReadJournal:
     while True:
         end = text.find(b"\n", at)
         line = text[at:end] if end >= 0 else b""
-        if end < 0 or line[:9] != _link(crc, line[9:]) + b" ":
+        if end < 0 or not _whole(crc, line):
             break
         records.append(json.loads(line[9:]))
         crc, at = line[:8], end + 1
-    rest = text[at:]
-    return ReadJournal(tuple(records), at, crc.decode(), bool(rest), b"\n" in rest.rstrip(b"\0\n"))
+    # A disk that lost its power may have left zeros.
+    rest = text[at:].rstrip(b"\0")
+    later, lost = _behind(crc, rest)
+    damaged = bool(later) or b"\n" in rest
+    return ReadJournal(tuple(records), at, crc.decode(), bool(text[at:]), damaged, later, lost)
+
+
+def _behind(crc: bytes, rest: bytes) -> tuple[tuple[Record, ...], int]:
+    """Whole records of a text that begins with a broken one, and the number of broken ones."""
+    if _whole(crc, rest[:-1]):  # the last record, and the end of its line was changed
+        return (json.loads(rest[9:-1]),), 0
+    lines = rest.removesuffix(b"\n").split(b"\n")
+    whole = [b for a, b in pairwise(lines) if _whole(a[:8], b)]
+    return tuple(json.loads(line[9:]) for line in whole), len(lines) - len(whole)
 
 
 class Journal:
@@ -88,13 +109,12 @@ class Journal:
                 raise RefusedError(
                     str(path),
                     f"damaged behind its {len(found.records)} good records",
-                    remedy="keep it, and rebuild the records with `triaxcal rig replay`",
+                    remedy="`triaxcal rig resume` shows what is whole and goes on from there",
                 )
             self._crc, self._size = found.crc.encode(), found.good_bytes
         try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT, 0o644)
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | BINARY, 0o644)
             os.ftruncate(self._file, self._size)
-            os.lseek(self._file, 0, os.SEEK_END)
             os.fsync(self._file)
             sync_folder(path.parent)
         except OSError as error:
@@ -108,16 +128,15 @@ class Journal:
         RefusedError
             When the disk refuses; the journal is then as it was.
         """
-        text = json.dumps(record, separators=(",", ":"), sort_keys=True).encode()
-        link = _link(self._crc, text)
-        line = link + b" " + text + b"\n"
+        line = framed(self._crc, record)
         try:
             write_all(self._file, line)
             os.fsync(self._file)
         except OSError as error:
-            os.ftruncate(self._file, self._size)
+            with suppress(OSError):
+                os.ftruncate(self._file, self._size)
             raise disk_refusal(self.path, error) from error
-        self._crc = link
+        self._crc = line[:8]
         self._size += len(line)
 
     def close(self) -> None:
@@ -128,24 +147,26 @@ class Journal:
 _START = b"00000000"
 
 
+def framed(before: bytes, record: Record) -> bytes:
+    """Line of a record behind one of this link."""
+    text = json.dumps(record, separators=(",", ":"), sort_keys=True).encode()
+    return _link(before, text) + b" " + text + b"\n"
+
+
+def written(records: Iterable[Record]) -> bytes:
+    """A whole journal of these records."""
+    lines: list[bytes] = []
+    for record in records:
+        lines.append(framed(lines[-1][:8] if lines else _START, record))
+    return b"".join(lines)
+
+
 def _link(before: bytes, text: bytes) -> bytes:
     return b"%08x" % zlib.crc32(before + text)
 
 
-def write_all(file: int, content: bytes) -> None:
-    """Write all of it: the system may take a part only."""
-    view = memoryview(content)
-    while view:
-        view = view[os.write(file, view) :]
-
-
-def sync_folder(folder: Path) -> None:
-    """Make the names in a folder survive a power cut."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+def _whole(before: bytes, line: bytes) -> bool:
+    return len(line) > 9 and line[:9] == _link(before, line[9:]) + b" "
 
 
 def disk_refusal(path: Path, error: OSError) -> RefusedError:

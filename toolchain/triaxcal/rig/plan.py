@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from triaxcal.base.keys import DESCRIPTION, FORMAT, FileKeys, TableKeys, Values,
 from triaxcal.base.kinds import FLAG, number, rising, three, whole, word
 from triaxcal.base.tomltable import read_toml
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
-from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
+from triaxcal.model.thermal.shape import GROUP_GAP_DEGC, PLAUSIBLE_DEGC
 from triaxcal.model.types import FloatArray
 from triaxcal.rig.equipment import Equipment, equipment_tables, read_equipment
 from triaxcal.unit.description import UnitDescription
@@ -233,6 +234,8 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
             expected=f"a divisor of average_s, which is {stillness.average_s}",
         )
     equipment = read_equipment(tables)
+    thermal = tables["thermal"].record(Thermal)
+    _refuse_merged(tables["steps"], steps.temperatures_degc, thermal)
     return SessionPlan(
         source=str(path),
         sha256=_hash_of(path),
@@ -242,9 +245,24 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
         take_out_of_order=steps.take_out_of_order,
         steps=_steps(tables["steps"], steps, unit, equipment),
         stillness=stillness,
-        thermal=tables["thermal"].record(Thermal),
+        thermal=thermal,
         equipment=equipment,
     )
+
+
+def _refuse_merged(values: Values, temps_degc: tuple[float, ...], thermal: Thermal) -> None:
+    """Refuse temperatures that the fit may take for one: each may be missed by `tolerance_k`."""
+    least = GROUP_GAP_DEGC + 2.0 * thermal.tolerance_k
+    for low, high in pairwise(temps_degc):
+        if high - low <= least:
+            raise RefusedError(
+                values.where("temperatures_degc"),
+                f"found {low:g} and {high:g} degC",
+                expected=f"more than {least:g} K between them: the fit takes readings within "
+                f"{GROUP_GAP_DEGC:g} K for one temperature, and tolerance_k permits "
+                f"{thermal.tolerance_k:g} K on either side",
+                remedy="leave one out, or state a smaller [thermal] tolerance_k",
+            )
 
 
 def _hash_of(path: Path) -> str:

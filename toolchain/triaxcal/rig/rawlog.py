@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import os
+from contextlib import suppress
 from pathlib import Path
 
+from triaxcal.base.durable import BINARY, sync_data, sync_folder, write_all
 from triaxcal.base.errors import RefusedError
 from triaxcal.rig.candump import format_frames
 from triaxcal.rig.frames import Frames
-from triaxcal.rig.journal import disk_refusal, sync_folder, write_all
+from triaxcal.rig.journal import disk_refusal
 
 LogState = dict[str, int | str]
 """Lines, bytes and SHA-256 of a log."""
@@ -52,7 +54,7 @@ class RawLog:
         self._waiting_bytes = 0
         self._size = int(known["bytes"]) if known else 0
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | BINARY, 0o644)
             self._take_up()
             sync_folder(path.parent)
         except OSError as error:
@@ -63,7 +65,7 @@ class RawLog:
         if found < self._size:
             raise changed_log(self.path, f"it has {found} bytes", f"{self._size} or more")
         at, rest = self._size, b""
-        while chunk := os.pread(self._file, 1 << 20, at):
+        while chunk := self._read(1 << 20, at):
             at += len(chunk)
             cut = chunk.rfind(b"\n") + 1
             if not cut:
@@ -73,7 +75,11 @@ class RawLog:
             self.lines += chunk.count(b"\n")
             rest = chunk[cut:]
         os.ftruncate(self._file, self._size)
-        os.lseek(self._file, self._size, os.SEEK_SET)
+
+    def _read(self, count: int, at: int) -> bytes:
+        """Bytes of the file; writing is always at its end."""
+        os.lseek(self._file, at, os.SEEK_SET)
+        return os.read(self._file, count)
 
     def append(self, frames: Frames) -> None:
         """Add frames; they reach the file with the next `flush`, or when many wait.
@@ -107,13 +113,12 @@ class RawLog:
                 self._size += len(text)
                 self._waiting, self._waiting_bytes = [], 0
             if sync:
-                os.fdatasync(self._file)
+                sync_data(self._file)
         except OSError as error:
-            os.ftruncate(self._file, self._size)
-            os.lseek(self._file, self._size, os.SEEK_SET)
+            with suppress(OSError):
+                os.ftruncate(self._file, self._size)
             self._waiting, self._waiting_bytes = [], 0
             raise disk_refusal(self.path, error) from error
-
         self._hash_on(_HASH_BYTES)
 
     def _hash_on(self, most: int) -> None:
@@ -121,7 +126,7 @@ class RawLog:
         while self._hashed < self._size and most > 0:
             seam = int(self._known["bytes"]) if self._known else self._size
             end = seam if self._hashed < seam else self._size
-            chunk = os.pread(self._file, min(1 << 20, end - self._hashed), self._hashed)
+            chunk = self._read(min(1 << 20, end - self._hashed), self._hashed)
             if not chunk:
                 raise changed_log(self.path, f"it ends at byte {self._hashed}", f"{end} bytes")
             self._hash.update(chunk)

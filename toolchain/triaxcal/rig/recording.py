@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.events import DURABLE, AcceptedDwell, Command, Event
 from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.journal import Journal, Record, disk_refusal, read_journal
+from triaxcal.rig.lock import Lock
 from triaxcal.rig.rawlog import LogState, RawLog
 from triaxcal.rig.reasons import Reason
 from triaxcal.rig.stillness import Reference
@@ -21,6 +23,7 @@ from triaxcal.rig.stillness import Reference
 FORMAT = 1
 LOG_FILE = "frames.log"
 JOURNAL_FILE = "session.journal"
+LOCK_FILE = "session.lock"
 _DECIDE_NS = 80_000_000
 """Frames wait so long for the decoder, which costs the same for ten as for a hundred; they are in
 the log meanwhile. Decisions do not depend on how frames are cut."""
@@ -39,13 +42,21 @@ class Recording:
         Raises
         ------
         RefusedError
-            When the disk refuses, the journal is damaged, or it is about another unit, plan or
-            DBC.
+            When another process has the session, the disk refuses, the journal is damaged, or it
+            is about another unit, plan or DBC.
         """
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise disk_refusal(folder, error) from error
+        self.lock = Lock(folder / LOCK_FILE, "a session")
+        try:
+            self._open(setup, folder, channel)
+        except BaseException:
+            self.lock.close()
+            raise
+
+    def _open(self, setup: Setup, folder: Path, channel: str) -> None:
         journal = folder / JOURNAL_FILE
         records = read_journal(journal).records if journal.exists() else ()
         self.folder = folder
@@ -96,7 +107,7 @@ class Recording:
         return [*events, *self._acknowledge(self.engine.command(command, t_ns))]
 
     def close(self) -> None:
-        """Close log and journal.
+        """Close log and journal, and let go of the folder.
 
         Raises
         ------
@@ -107,6 +118,7 @@ class Recording:
             self.log.close()
         finally:
             self.journal.close()
+            self.lock.close()
 
     def _decide(self) -> list[Event]:
         frames = concatenate(self._waiting)
@@ -122,7 +134,7 @@ class Recording:
                 continue  # the same trouble every second would bury the rest
             # A journal that knows more of the log than the disk has would be no witness.
             self.log.flush(sync=True)
-            self.journal.append({"kind": "event", "event": _record(event), **self._place()})
+            self.journal.append({"kind": "event", "event": event_record(event), **self._place()})
         return events
 
     def _place(self) -> dict[str, Any]:
@@ -175,13 +187,18 @@ def refuse_other_session(path: Path, record: Record, setup: Setup) -> None:
             )
 
 
-def durable_events(records: tuple[Record, ...]) -> tuple[Event, ...]:
-    """Events that a resumed session starts from."""
-    events = (r["event"] for r in records if r["kind"] == "event")
-    return tuple(_event(e) for e in events if e["kind"] in DURABLE)
+def durable_events(records: Iterable[Record]) -> tuple[Event, ...]:
+    """Events that a resumed session starts from; what was mended counts as it says."""
+    raw: list[dict[str, Any]] = []
+    for record in records:
+        if record["kind"] == "event":
+            raw.append(record["event"])
+        elif record["kind"] == "mended":
+            raw = list(record["events"])
+    return tuple(_event(e) for e in raw if e["kind"] in DURABLE)
 
 
-def _record(event: Event) -> Record:
+def event_record(event: Event) -> Record:
     """What the journal keeps of an event; of its reasons, the text."""
     return {name: value for name, value in asdict(event).items() if name != "reasons"}
 
@@ -201,7 +218,7 @@ def _tuples(raw: dict[str, Any]) -> dict[str, Any]:
     return {k: tuple(v) if isinstance(v, list) else v for k, v in raw.items()}
 
 
-def known_log(records: tuple[Record, ...]) -> LogState | None:
+def known_log(records: Sequence[Record]) -> LogState | None:
     """What the log began with when the journal last hashed it."""
     states = (r["log"] for r in reversed(records) if "sha256" in r.get("log", {}))
     return next(states, None)

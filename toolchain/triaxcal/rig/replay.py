@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.rig.candump import read_log
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.events import Agree, Event, Redo
 from triaxcal.rig.frames import Frames
-from triaxcal.rig.journal import Record, read_journal
+from triaxcal.rig.journal import ReadJournal, Record, read_journal
 from triaxcal.rig.rawlog import LogState, changed_log
-from triaxcal.rig.recording import known_log, refuse_other_session
+from triaxcal.rig.recording import durable_events, known_log, refuse_other_session
+
+_PIECE = 1 << 20
+"""Bytes hashed at once."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +29,15 @@ class Replayed:
     ----------
     log : dict
         Lines, bytes and SHA-256 of the log; lines that were no frame.
+    notes : tuple of str
+        What of the journal could not be used.
     """
 
     engine: Engine
     events: tuple[Event, ...]
     log: LogState
     bad_lines: int
+    notes: tuple[str, ...] = ()
 
 
 def replay(setup: Setup, log: Path, journal: Path | None = None) -> Replayed:
@@ -45,12 +49,43 @@ def replay(setup: Setup, log: Path, journal: Path | None = None) -> Replayed:
         When a file cannot be read, the log is not the one that the journal was written beside,
         or it is another unit's.
     """
-    records = read_journal(journal).records if journal is not None else ()
-    if records and journal is not None:
+    if journal is None:
+        return replay_records(setup, log, ())
+    found = read_journal(journal)
+    records = (*found.records, *found.later)
+    if records:
         refuse_other_session(journal, records[0], setup)
-        _refuse_changed_log(log, records)
+    played = replay_records(setup, log, records)
+    return replace(played, notes=_notes(journal, found, played))
+
+
+def _notes(journal: Path, found: ReadJournal, played: Replayed) -> tuple[str, ...]:
+    if not found.damaged:
+        return ()
+    known = durable_events((*found.records, *found.later))
+    again = "the log gives all other decisions again"
+    if not contains(played.engine.session.durable, known):
+        again = "the log does not give the same decisions again: a lost record changed them"
+    return (f"{journal}: damaged, {found.lost} records lost; {again}",)
+
+
+def contains(events: Sequence[Event], some: Iterable[Event]) -> bool:
+    """Whether some events are among others, in the same order."""
+    others = iter(events)
+    return all(event in others for event in some)
+
+
+def replay_records(setup: Setup, log: Path, records: Sequence[Record]) -> Replayed:
+    """Play a log again with the records of its journal.
+
+    Raises
+    ------
+    RefusedError
+        As `replay`.
+    """
+    state = log_state(log, known_log(records))
     engine = Engine(setup, str(log))
-    words = [r for r in records if r["kind"] in {"command", "resume"}]
+    words = [r for r in records if r["kind"] in {"command", "resume", "mended"}]
     events: list[Event] = []
     lines = bad = 0
     for parsed, frame_lines in _chunks(log, [int(r["log"]["lines"]) for r in words]):
@@ -61,13 +96,16 @@ def replay(setup: Setup, log: Path, journal: Path | None = None) -> Replayed:
         bad += frame_lines[1]
     for word in words:
         events += _say(engine, word)
-    return Replayed(engine, tuple(events), log_state(log), bad)
+    return Replayed(engine, tuple(events), state, bad)
 
 
 def _say(engine: Engine, record: Record) -> list[Event]:
     if record["kind"] == "resume":
         # A decision that the crash kept from the journal was not taken.
         engine.resume(int(record["durable"]))
+        return []
+    if record["kind"] == "mended":
+        engine.restore(durable_events((record,)))
         return []
     said = dict(record["command"])
     name, t_ns = said.pop("name"), said.pop("t_ns")
@@ -88,31 +126,42 @@ def _chunks(log: Path, cuts: list[int]) -> Iterator[tuple[Frames, tuple[int, int
         done += parsed.lines
 
 
-def _refuse_changed_log(log: Path, records: tuple[Record, ...]) -> None:
-    """Refuse a log whose beginning is not what the journal saw."""
-    known = known_log(records)
-    if known is None:
-        return
+def log_state(log: Path, known: LogState | None = None) -> LogState:
+    """Whole lines of a log, their bytes and SHA-256.
+
+    Raises
+    ------
+    RefusedError
+        When the log cannot be read, or its beginning is not what is known of it.
+    """
+    seam = int(known["bytes"]) if known else 0
+    running = hashlib.sha256()
+    whole_lines = running.copy()
+    at = size = lines = 0
     try:
         with log.open("rb") as file:
-            found = hashlib.sha256(file.read(int(known["bytes"]))).hexdigest()
+            while chunk := file.read(min(_PIECE, seam - at) if at < seam else _PIECE):
+                cut = chunk.rfind(b"\n") + 1
+                running.update(chunk[:cut])
+                if cut:
+                    size, whole_lines = at + cut, running.copy()
+                running.update(chunk[cut:])
+                lines += chunk.count(b"\n")
+                at += len(chunk)
+                if at == seam:
+                    _refuse_changed_log(log, running.hexdigest(), known)
     except OSError as error:
-        raise RefusedError(str(log), f"cannot be read: {error.strerror}") from error
-    if found != known["sha256"]:
+        raise refused_by_system(log, "read", error) from error
+    if at < seam:
+        _refuse_changed_log(log, running.hexdigest(), known)
+    return {"lines": lines, "bytes": size, "sha256": whole_lines.hexdigest()}
+
+
+def _refuse_changed_log(log: Path, found: str, known: LogState | None) -> None:
+    """Refuse a log whose beginning is not what the journal saw."""
+    if known is not None and found != known["sha256"]:
         raise changed_log(
             log,
             f"its first {known['bytes']} bytes have SHA-256 {found[:16]}...",
             f"{str(known['sha256'])[:16]}..., as the journal recorded",
         )
-
-
-def log_state(log: Path) -> LogState:
-    """Whole lines of a log, their bytes and SHA-256."""
-    content = np.memmap(log, np.uint8, "r") if log.stat().st_size else np.zeros(0, np.uint8)
-    ends = np.flatnonzero(content == ord("\n"))
-    size = int(ends[-1]) + 1 if len(ends) else 0
-    return {
-        "lines": len(ends),
-        "bytes": size,
-        "sha256": hashlib.sha256(content[:size].tobytes()).hexdigest(),
-    }

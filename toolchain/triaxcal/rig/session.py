@@ -5,6 +5,8 @@ The same blocks and commands give the same decisions, live or replayed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.rig.blocks import Block
 from triaxcal.rig.events import Agree, Command, Event
@@ -30,9 +32,9 @@ class Session(State):
             known = [e for e in self.durable if e.kind == "equilibrium" and e.step == self.step]
             self.phase = Warming(known[-1].temp_degc if known else None)
 
-    def resume(self, durable: int) -> None:
-        """Go on after a crash: as a session made from the first `durable` events would."""
-        del self.durable[durable:]
+    def restore(self, durable: Sequence[Event]) -> None:
+        """Go on after a crash: as a session made from these durable events would."""
+        self.durable = list(durable)
         self.restart()
 
     @property

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from triaxcal.readings.measurements import MEASUREMENTS_FILE, write_measurements
-from triaxcal.readings.measurements_csv import DEVIATIONS, READINGS
+from triaxcal.base.durable import replace_file
+from triaxcal.readings.measurements import MEASUREMENTS_FILE
+from triaxcal.readings.measurements_csv import DEVIATIONS, READINGS, measurements_text
 from triaxcal.rig.events import AcceptedDwell
 from triaxcal.rig.journal import disk_refusal
 from triaxcal.rig.session import Session
@@ -18,13 +20,24 @@ SIDECAR_FILE = "measurements.json"
 FORMAT = 1
 
 
+@dataclass(frozen=True)
+class Written:
+    """Files of a session's records, and those of earlier records that were kept beside them."""
+
+    files: tuple[Path, ...]
+    kept: tuple[Path, ...]
+
+
 def write_records(
     folder: Path, session: Session, dbc_sha256: str, log: dict[str, int | str]
-) -> tuple[Path, Path]:
-    """Write measurements.csv and measurements.json into a folder; returns their paths.
+) -> Written:
+    """Write measurements.csv and measurements.json into a folder.
 
     A row's `count` is the number of batch means and its deviation that of one batch mean, so that
     sd^2 / count is u(A)^2, which is what the fit makes of them.
+
+    Records that are there already are kept beside the new ones, with the time of their last change
+    in the name; those with the same content stay as they are.
 
     Raises
     ------
@@ -32,28 +45,49 @@ def write_records(
         When the folder cannot be written.
     """
     dwells = in_plan_order(session)
-    table = folder / MEASUREMENTS_FILE
-    write_measurements(
-        table,
-        ("position", "temp_code", *READINGS["code"], "count", *DEVIATIONS["code"]),
-        [(d.position, d.temp_code, *d.mean_code, d.batches, *d.batch_sd_code) for d in dwells],
-        (
-            f"Session on the tilter rig, log SHA-256 {log['sha256']}",
-            f"count: batch means of a dwell; sd: of one batch mean; see {SIDECAR_FILE}",
+    table, sidecar = folder / MEASUREMENTS_FILE, folder / SIDECAR_FILE
+    rows = [(d.position, d.temp_code, *d.mean_code, d.batches, *d.batch_sd_code) for d in dwells]
+    contents = {
+        table: measurements_text(
+            ("position", "temp_code", *READINGS["code"], "count", *DEVIATIONS["code"]),
+            rows,
+            (
+                f"Session on the tilter rig, log SHA-256 {log['sha256']}",
+                f"count: batch means of a dwell; sd: of one batch mean; see {SIDECAR_FILE}",
+            ),
         ),
-    )
-    sidecar = folder / SIDECAR_FILE
-    text = json.dumps(_sidecar(session, dwells, dbc_sha256, log), indent=2, sort_keys=True) + "\n"
-    aside = sidecar.with_name(f".{sidecar.name}.{os.getpid()}")
+        sidecar: json.dumps(_sidecar(session, dwells, dbc_sha256, log), indent=2, sort_keys=True)
+        + "\n",
+    }
+    files = {path: text.encode() for path, text in contents.items()}
     try:
-        try:
-            aside.write_text(text, encoding="utf-8", newline="\n")
-            aside.replace(sidecar)
-        finally:
-            aside.unlink(missing_ok=True)
+        kept = _kept(files)
+        for path, content in files.items():
+            replace_file(path, content)
     except OSError as error:
-        raise disk_refusal(sidecar, error) from error
-    return table, sidecar
+        raise disk_refusal(table, error) from error
+    return Written(tuple(files), kept)
+
+
+def _kept(files: Mapping[Path, bytes]) -> tuple[Path, ...]:
+    """Copies of the files that are there, when one of them has another content."""
+    there = {path: path.read_bytes() for path in files if path.exists()}
+    if all(files[path] == content for path, content in there.items()):
+        return ()
+    changed = max(path.stat().st_mtime for path in there)
+    stamp = datetime.fromtimestamp(changed, UTC).strftime("%Y%m%dT%H%M%SZ")
+    kept = []
+    for path, content in there.items():
+        names = (f"{path.stem}.{stamp}{f'-{n}' if n else ''}{path.suffix}" for n in range(1000))
+        free = (p for p in map(path.with_name, names) if _is_free(p, content))
+        kept.append(next(free))
+        replace_file(kept[-1], content)
+    return tuple(kept)
+
+
+def _is_free(path: Path, content: bytes) -> bool:
+    """Whether no other content has this name."""
+    return not path.exists() or path.read_bytes() == content
 
 
 def in_plan_order(session: Session) -> list[AcceptedDwell]:
