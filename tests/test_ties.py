@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import numpy as np
 import pytest
 
 from builds import Built, write_generated
-from plans import GOLDEN
+from plans import GOLDEN, integer_plan, integer_shape
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.codegen.image import image_bytes
@@ -22,6 +24,7 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.unit.description import unit_of_text
 
 STRICT = ("gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
+BAD_IMAGE = 16
 UNIT = Path(__file__).parent.parent / "units" / "AT-SIM" / "unit.toml"
 
 USER = """
@@ -51,15 +54,30 @@ def gcc(*arguments: str | Path) -> str:
     return done.stderr if done.returncode else ""
 
 
+SHAPES = GOLDEN | {
+    "direct-other-shift": integer_plan(
+        integer_shape(order=2, output_shift=36),
+        GOLDEN["direct-checked"].segments[0].coefficients[None].tolist(),
+    )
+}
+"""The last is laid out as the first, word for word; only a shift of its routine differs."""
+PAIRS = list(itertools.permutations(SHAPES, 2))
+
+
 @pytest.fixture(scope="module")
 def deliveries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folders = {name: tmp_path_factory.mktemp(name) for name in GOLDEN}
+    """What is delivered for each shape, and its objects: routine, constants and a caller."""
+    folders = {name: tmp_path_factory.mktemp(name) for name in SHAPES}
     for name, folder in folders.items():
-        write_generated(GOLDEN[name], folder)
+        write_generated(SHAPES[name], folder)
+        for source in (folder / "triax_comp.c", folder / "triax_calib.c", user(folder)):
+            assert gcc("-fPIC", "-c", source, "-o", source.with_suffix(".o")) == ""
     return folders
 
 
-PAIRS = list(itertools.permutations(GOLDEN, 2))
+def test_they_are_20_pairs() -> None:
+    assert len(PAIRS) == len({(names_of(SHAPES[a]).shape, names_of(SHAPES[b]).shape)
+                              for a, b in PAIRS}) == 20  # fmt: skip
 
 
 @pytest.mark.parametrize(("routine", "header"), PAIRS)
@@ -67,25 +85,18 @@ def test_what_was_compiled_for_one_shape_links_to_no_other(
     deliveries: dict[str, Path], tmp_path: Path, routine: str, header: str
 ) -> None:
     """Two static libraries: in either order, the caller gets its own routine or none."""
-    mine, other = deliveries[header], deliveries[routine]
-    caller = user(tmp_path)
-    for name in ("triax_comp", "triax_calib"):
-        for folder, mark in ((mine, "mine"), (other, "other")):
-            source = folder / f"{name}.c"
-            assert gcc("-c", source, "-o", tmp_path / f"{mark}_{name}.o") == ""
-    assert gcc("-c", f"-I{mine}", caller, "-o", tmp_path / "caller.o") == ""
     objects = {
-        mark: [tmp_path / f"{mark}_{n}.o" for n in ("triax_comp", "triax_calib")]
-        for mark in ("mine", "other")
+        name: [deliveries[name] / f"triax_{n}.o" for n in ("comp", "calib")]
+        for name in (routine, header)
     }
+    caller = deliveries[header] / "triax_user.o"
     program = tmp_path / "program"
-    found = gcc(tmp_path / "caller.o", *objects["other"], "-o", program)
-    assert "undefined reference" in found
-    for order in (("mine", "other"), ("other", "mine")):
-        both = [file for mark in order for file in objects[mark]]
-        assert gcc(tmp_path / "caller.o", *both, "-o", program) == ""
+    assert "undefined reference" in gcc(caller, *objects[routine], "-o", program)
+    for order in ((header, routine), (routine, header)):
+        both = [file for name in order for file in objects[name]]
+        assert gcc(caller, *both, "-o", program) == ""
     symbols = subprocess.run(["nm", program], capture_output=True, text=True, check=True).stdout
-    assert names_of(GOLDEN[header]).linked in symbols
+    assert names_of(SHAPES[header]).linked in symbols
 
 
 @pytest.mark.parametrize(("routine", "header"), PAIRS)
@@ -102,6 +113,43 @@ def test_headers_of_two_shapes_do_not_compile(
         f'#include "{deliveries[header]}/triax_comp.h"\nint unused;\n'
     )
     assert "two triax_comp.h of different shapes" in gcc("-c", both, "-o", "/dev/null")
+
+
+@pytest.fixture(scope="module")
+def loaders(deliveries: dict[str, Path]) -> dict[str, Callable[[bytes], tuple[int, bytes]]]:
+    """For each shape: the status of its loader for an image, and what it left in a buffer."""
+
+    def loader(name: str) -> Callable[[bytes], tuple[int, bytes]]:
+        folder, names = deliveries[name], names_of(SHAPES[name])
+        library = folder / "loader.so"
+        made = gcc("-shared", folder / "triax_comp.o", folder / "triax_calib.o", "-o", library)
+        assert made == ""
+        function = getattr(ctypes.CDLL(str(library)), f"{names.linked}_calib_load")
+        function.restype = ctypes.c_uint32
+
+        def load(image: bytes) -> tuple[int, bytes]:
+            buffer = ctypes.create_string_buffer(UNTOUCHED, len(UNTOUCHED))
+            return function(buffer, image, ctypes.c_size_t(len(image))), buffer.raw
+
+        return load
+
+    return {name: loader(name) for name in SHAPES}
+
+
+UNTOUCHED = b"\x55" * 4096
+"""As large as any constants of `SHAPES`, or larger."""
+
+
+@pytest.mark.parametrize(("routine", "image"), PAIRS)
+def test_an_image_of_another_shape_and_prefix_is_refused(
+    loaders: dict[str, Callable[[bytes], tuple[int, bytes]]], routine: str, image: str
+) -> None:
+    """And leaves the constants as they were; the routine takes its own, whatever its prefix."""
+    other, own = (image_bytes(prefixed(SHAPES[name], "right")) for name in (image, routine))
+    assert loaders[routine](other) == (BAD_IMAGE, UNTOUCHED)
+    status, left = loaders[routine](own)
+    assert status == 0
+    assert left != UNTOUCHED
 
 
 def test_constants_of_two_units_in_one_file_do_not_compile(tmp_path: Path) -> None:
