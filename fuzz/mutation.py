@@ -1,6 +1,9 @@
 """Mutation testing of the generated C, the constants and the image, on a few shapes.
 
-python fuzz/mutation.py [--every 1] [--shape NAME] [--units units]
+python fuzz/mutation.py [--every 1] [--shape NAME] [--units units] [--selftest]
+
+With --selftest: how many mutants of triax_comp.c the self-test of the unit finds alone, and which
+it does not. No survivor is a failure then.
 
 Exit code 1 when a mutant survives that is not on file as equivalent, or when an entry of that file
 covers none (told only when every mutant of every shape was made).
@@ -15,16 +18,22 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from triaxcal.codegen.names import Names
 from triaxcal.verify.mutation import (
     CAMPAIGNS,
+    ELSEWHERE,
     EQUIVALENT,
     EQUIVALENTS,
     FATES,
+    KILLED,
+    STILLBORN,
     SURVIVED,
     Bench,
     Verdict,
+    c_campaign,
     read_equivalents,
 )
+from triaxcal.verify.mutation_selftest import SelftestBench
 from triaxcal.verify.shapes import ALL_SHAPES, subject
 from triaxcal.verify.workspace import Workspace
 
@@ -37,7 +46,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--every", type=int, default=1, help="only each n-th mutant")
     parser.add_argument("--shape", choices=list(ALL_SHAPES), action="append")
     parser.add_argument("--units", type=Path, default=HERE.parent / "units")
+    parser.add_argument("--selftest", action="store_true", help="by the self-test alone")
     given = parser.parse_args(arguments)
+    if given.selftest:
+        for shape in given.shape or ALL_SHAPES:
+            _selftest(shape, given.units, given.every)
+        return 0
     by_shape = {s: _shape(s, given.units, given.every) for s in given.shape or ALL_SHAPES}
     verdicts = [v for found in by_shape.values() for v in found]
     survivors = [v.mutant for v in verdicts if v.fate == SURVIVED]
@@ -65,16 +79,29 @@ def _shape(shape: str, units: Path, every: int) -> list[Verdict]:
     return verdicts
 
 
+def _selftest(shape: str, units: Path, every: int) -> None:
+    made = subject(shape, units)
+    with tempfile.TemporaryDirectory(prefix="triaxcal-mutants-") as folder:
+        work = Workspace.create(Path(folder), made.files, made.plan, made.bound)
+        found = c_campaign(SelftestBench(work, shape), every)
+    counts = Counter(v.fate for v in found)
+    judged = len(found) - sum(counts[fate] for fate in (EQUIVALENT, ELSEWHERE, STILLBORN))
+    told = ", ".join(f"{counts[fate]} {fate}" for fate in FATES if counts[fate])
+    print(f"{shape}, self-test: {told}: {counts[KILLED] / judged:.1%} of {judged}", flush=True)
+    for verdict in found:
+        if verdict.fate not in (KILLED, EQUIVALENT, ELSEWHERE, STILLBORN):
+            print(f"  {verdict.fate}: {verdict.mutant}", flush=True)
+
+
 def _stale(by_shape: Mapping[str, Sequence[Verdict]]) -> list[str]:
-    return [
-        f"{e.function}: {e.before}"
-        for e in read_equivalents()
-        if not any(
-            v.fate == EQUIVALENT and e.covers(v.mutant, shape)
-            for shape, verdicts in by_shape.items()
-            for v in verdicts
-        )
-    ]
+    """Entries that cover no mutant of any shape; each shape has names of its own in its C."""
+    used: set[int] = set()
+    for shape, verdicts in by_shape.items():
+        found = [v.mutant for v in verdicts if v.fate == EQUIVALENT]
+        entries = read_equivalents(Names("triax_gyro" if shape == "gyro" else "triax", "accel", ""))
+        used |= {i for i, e in enumerate(entries) if any(e.covers(m, shape) for m in found)}
+    entries = read_equivalents(Names("triax", "accel", ""))
+    return [f"{e.function}: {e.before}" for i, e in enumerate(entries) if i not in used]
 
 
 if __name__ == "__main__":

@@ -10,7 +10,15 @@ from triaxcal.codegen.names import Names
 from triaxcal.verify import mutation
 from triaxcal.verify.c_mutants import mutants_of
 from triaxcal.verify.c_tokens import tokens_of
-from triaxcal.verify.mutation import KILLED, STILLBORN, SURVIVED, Bench, Equivalent
+from triaxcal.verify.mutation import (
+    BY_SANITIZER,
+    KILLED,
+    STILLBORN,
+    SURVIVED,
+    Bench,
+    Equivalent,
+)
+from triaxcal.verify.mutation_selftest import SelftestBench
 from triaxcal.verify.shapes import ALL_SHAPES, SHAPES, Subject, subject
 from triaxcal.verify.workspace import ROUTINE, Workspace
 from verify.conftest import UNITS
@@ -108,6 +116,15 @@ def bench(subjects: dict[str, Subject], tmp_path_factory: pytest.TempPathFactory
     return Bench(Workspace.create(folder, made.files, made.plan, made.bound), "inverse")
 
 
+@pytest.fixture(scope="module")
+def selftest_bench(
+    subjects: dict[str, Subject], tmp_path_factory: pytest.TempPathFactory
+) -> SelftestBench:
+    made = subjects["inverse"]
+    folder = tmp_path_factory.mktemp("selftest_mutants")
+    return SelftestBench(Workspace.create(folder, made.files, made.plan, made.bound), "inverse")
+
+
 def fate(bench: Bench, folder: Path, old: str, new: str) -> str:
     source = (bench.work.folder / ROUTINE).read_text()
     assert old in source
@@ -133,6 +150,22 @@ def fate(bench: Bench, folder: Path, old: str, new: str) -> str:
 )
 def test_fates(bench: Bench, tmp_path: Path, old: str, new: str, expected: str) -> None:
     assert fate(bench, tmp_path, old, new) == expected
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("ux *= 256;", "ux *= 257;", KILLED),
+        ("for (i = 0u; i < size; i++) {", "for (i = 0u; i < size; i) {", KILLED),  # no end
+        ("uint32_t fits = 0u;", "uint32_t fits = 0u", STILLBORN),
+        ("uint32_t fits = 0u;", "uint32_t fits = 0u + 0u;", SURVIVED),
+        ("for (j = 0u; j < 4u; j++) {", "for (j = 0u; j < 5u; j++) {", BY_SANITIZER),
+    ],
+)
+def test_fates_by_the_self_test_alone(
+    selftest_bench: SelftestBench, tmp_path: Path, old: str, new: str, expected: str
+) -> None:
+    assert fate(selftest_bench, tmp_path, old, new) == expected
 
 
 @pytest.mark.parametrize(
