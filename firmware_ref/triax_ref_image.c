@@ -23,6 +23,13 @@ static int32_t next_int(reader_t *reader)
     return (int32_t)((word >= INT64_C(2147483648)) ? word - INT64_C(4294967296) : word);
 }
 
+/* A number of the shape. None that is legal is large; what an int of 16 bits cannot hold becomes illegal. */
+static int next_small(reader_t *reader)
+{
+    const int32_t word = next_int(reader);
+    return (word >= -32767 && word <= 32767) ? (int)word : -32767;
+}
+
 /* CRC-32 of IEEE 802.3 by polynomial division, most significant bit of each reflected byte first. */
 static uint32_t crc32(const uint8_t *bytes, size_t size)
 {
@@ -37,7 +44,7 @@ static uint32_t crc32(const uint8_t *bytes, size_t size)
     for (i = 0, bit = 31; i < 16; i++, bit--) {
         const uint32_t low = (remainder >> i) & 1u;
         const uint32_t high = (remainder >> bit) & 1u;
-        remainder &= ~((1u << i) | (1u << bit));
+        remainder &= ~(((uint32_t)1 << i) | ((uint32_t)1 << bit));
         remainder |= (high << i) | (low << bit);
     }
     return ~remainder;
@@ -95,33 +102,35 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *file, size_t file_size)
     size_t words;
     uint32_t magic;
     uint32_t version;
+    uint32_t stated;
 
     if (size < 4 * (TRIAX_REF_HEADER_WORDS + 3) || size % 4 != 0) {
         return TRIAX_REF_BAD_IMAGE;
     }
     magic = next_word(&reader);
     version = next_word(&reader);
-    size = next_word(&reader);
-    if ((version != 1u && version != 2u) || size % 4 != 0 || size < 4 * (TRIAX_REF_HEADER_WORDS + 3) ||
+    stated = next_word(&reader);
+    size = (size_t)stated;
+    if ((version != 1u && version != 2u) || size != stated || size % 4 != 0 || size < 4 * (TRIAX_REF_HEADER_WORDS + 3) ||
         (file_size != size && file_size != size + TRIAX_REF_IDENTITY_SIZE)) {
         return TRIAX_REF_BAD_IMAGE;
     }
     if (file_size != size && !identity_is_legal(file, size, file_size)) {
         return TRIAX_REF_BAD_IMAGE;
     }
-    ref->inverse_form = next_int(&reader);
-    ref->segments = next_int(&reader);
-    ref->order = next_int(&reader);
-    ref->output_q = next_int(&reader);
-    ref->output_shift = next_int(&reader);
+    ref->inverse_form = next_small(&reader);
+    ref->segments = next_small(&reader);
+    ref->order = next_small(&reader);
+    ref->output_q = next_small(&reader);
+    ref->output_shift = next_small(&reader);
     ref->raw_min = next_int(&reader);
     ref->raw_max = next_int(&reader);
-    ref->raw_shift = next_int(&reader);
-    ref->adjugate_shift = next_int(&reader);
-    ref->determinant_shift = next_int(&reader);
-    ref->reciprocal_log2 = next_int(&reader);
-    ref->gain_shift = next_int(&reader);
-    ref->terms = (version == 2u) ? next_int(&reader) : 0;
+    ref->raw_shift = next_small(&reader);
+    ref->adjugate_shift = next_small(&reader);
+    ref->determinant_shift = next_small(&reader);
+    ref->reciprocal_log2 = next_small(&reader);
+    ref->gain_shift = next_small(&reader);
+    ref->terms = (version == 2u) ? next_small(&reader) : 0;
     if (!shape_is_legal(ref) || !terms_are_legal(magic, version, ref->terms)) {
         return TRIAX_REF_BAD_IMAGE;
     }

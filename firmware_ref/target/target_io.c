@@ -14,6 +14,48 @@ void target_exit(int code)
     exit(code);
 }
 
+#elif defined(__AVR__)
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+
+/* simavr prints what the serial port sends, and ends when the core sleeps without interrupts. */
+static void send(char c)
+{
+    while ((UCSR0A & (1u << UDRE0)) == 0u) {
+    }
+    UCSR0A = (uint8_t)(1u << TXC0); /* cleared by writing 1 */
+    UDR0 = (uint8_t)c;
+}
+
+void target_print(const char *text)
+{
+    const char *c;
+    UCSR0B = (uint8_t)(1u << TXEN0);
+    for (c = text; *c != '\0'; c++) {
+        send(*c);
+    }
+}
+
+void target_exit(int code)
+{
+    (void)code; /* simavr has no use for it: the lines that were printed are what counts */
+    while ((UCSR0A & (1u << TXC0)) == 0u) {
+    }
+    cli();
+    for (;;) {
+        sleep_mode();
+    }
+}
+
+/* In place of the library's: the start-up code calls it with the result of main. */
+void exit(int code);
+
+void exit(int code)
+{
+    target_exit(code);
+}
+
 #else
 #include <stddef.h>
 

@@ -2,7 +2,7 @@
  * test_main.c - the generated routine and the reference on the target, over vectors made here.
  *
  * target_case.h (written by triaxcal/targets/vectors.py) has the ranges, the boundary tables and
- * the image. Printed: the answer of the self-test, digests that Python computes from its own integer model, and how many
+ * the image; the compile command has CASE_VECTORS, how many vectors. Printed: the answer of the self-test, digests that Python computes from its own integer model, and how many
  * damaged and truncated images each loader refused.
  */
 #include <stddef.h>
@@ -242,8 +242,8 @@ static void try_damage(void)
         damaged[i] = CASE_IMAGE[i];
     }
     for (i = 0u; i < TRIAX_IMAGE_SIZE; i++) {
-        refused += (triax_calib_load(&loaded, damaged, i) == TRIAX_STATUS_BAD_IMAGE);
-        refused_by_reference += (triax_ref_open(&ref, damaged, i) == TRIAX_REF_BAD_IMAGE);
+        refused += (triax_calib_load(&loaded, damaged, (size_t)i) == TRIAX_STATUS_BAD_IMAGE);
+        refused_by_reference += (triax_ref_open(&ref, damaged, (size_t)i) == TRIAX_REF_BAD_IMAGE);
     }
     print_line("refused", refused);
     print_line("refused_by_reference", refused_by_reference);

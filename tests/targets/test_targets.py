@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import shutil
+import struct
 import subprocess
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -30,6 +32,7 @@ from triaxcal.targets import bench_table, counting, matrix
 from triaxcal.targets.bench import Subject, _write_subject, cost_of
 from triaxcal.targets.build import TargetError, Toolset, build, compiled, emulate
 from triaxcal.targets.cores import registry as cores
+from triaxcal.targets.cores.core import COMPILERS, VECTORS
 from triaxcal.targets.counting import build_plugin, measure
 from triaxcal.targets.matrix import (
     FAILED,
@@ -51,12 +54,13 @@ from triaxcal.targets.shapes import (
     unit_case,
 )
 from triaxcal.targets.table import counts, matrix_table
-from triaxcal.targets.vectors import VECTORS, draw, expected_lines, raw_boundaries, vectors
+from triaxcal.targets.vectors import draw, expected_lines, raw_boundaries, vectors
 
 ROOT = Path(__file__).parents[2]
 FIRMWARE = shipped("firmware_ref")
 CASES = shipped_cases(ROOT / "units")
 M3 = next(core for core in cores.CORES if core.name == "Cortex-M3")
+AVR = next(core for core in cores.CORES if core.name == "AVR")
 
 
 def case_named(name: str) -> Case:
@@ -71,9 +75,7 @@ def need(*tools: str) -> None:
 
 def run_on_host(case: Case, folder: Path, arithmetic: int = 0) -> str:
     """test_main.c as a program of this machine."""
-    _, expected = matrix._write_cases([Build(case, Toolset(M3, "gcc", "-O1"))], folder)[case.name]
-    assert expected == expected_lines(case)
-    source = folder / "case-0"
+    source = matrix._write_cases([Build(case, Toolset(M3, "gcc", "-O1"))], folder)[case.name]
     target = FIRMWARE / "target"
     program = folder / "program"
     files = [
@@ -81,7 +83,8 @@ def run_on_host(case: Case, folder: Path, arithmetic: int = 0) -> str:
         FIRMWARE / "triax_ref.c",
         FIRMWARE / "triax_ref_image.c",
     ]
-    command = ["gcc", "-std=c99", "-O1", "-DTARGET_HOSTED", f"-DTRIAX_ARITHMETIC={arithmetic}"]
+    command = ["gcc", "-std=c99", "-O1", "-DTARGET_HOSTED", f"-DCASE_VECTORS={VECTORS}u"]
+    command += [f"-DTRIAX_ARITHMETIC={arithmetic}"]
     command += [f"-I{d}" for d in (source, FIRMWARE, target)]
     command += map(str, [*files, target / "test_main.c", target / "target_io.c"])
     subprocess.run([*command, "-o", str(program)], check=True)
@@ -175,14 +178,14 @@ def test_missing_tool_is_named_and_not_done(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_every_tool_has_a_package() -> None:
     for core in cores.CORES:
-        for compiler in matrix.COMPILERS:
+        for compiler in COMPILERS:
             assert set(core.tools(compiler)) <= set(cores.PACKAGES)
 
 
 def test_matrix_is_as_large_as_promised() -> None:
     builds = matrix.shipped_builds(CASES)
     cubic = [b for b in builds if b.case.name == CUBIC and b.toolset.arithmetic == 0]
-    assert len(cubic) == 8 * 2 * 5
+    assert len(cubic) == 8 * 2 * 5 + 5  # AVR: gcc only
     assert {b.toolset.core.name for b in builds} == {core.name for core in cores.CORES}
     assert VECTORS >= 20000
 
@@ -198,6 +201,55 @@ def test_a_core_under_qemu() -> None:
     assert [o.detail for o in run_builds([Build(case, way) for way in ways])] == ["", "", ""]
 
 
+def test_a_core_with_an_int_of_16_bits() -> None:
+    """What is right only where int has 32 bits is seen: 1u shifted by 31, for one."""
+    need(*AVR.tools("gcc"))
+    case = case_named("AT-CHERNIAK")
+    text = case.files["triax_comp.c"]
+    old = "((uint32_t)p[1] << 8) | ((uint32_t)p[2] << 16) | ((uint32_t)p[3] << 24)"
+    assert old in text
+    wrong = text.replace(old, old.replace("(uint32_t)", "(unsigned)"))
+    broken = replace(case, name="broken", files={**case.files, "triax_comp.c": wrong})
+    way = replace(Toolset(AVR, "gcc", "-O2"), defines=("-Wno-shift-count-overflow",))
+    right, seen = run_builds([Build(c, way) for c in (case, broken)])
+    assert right.detail == ""
+    assert "expected 'selftest 00000000'" in seen.detail
+
+
+OPEN = """
+#include "target_io.h"
+#include "triax_ref.h"
+static triax_ref_t ref;
+static const uint8_t IMAGE[] = {%s};
+int main(void)
+{
+    target_print("open ");
+    target_print_hex(triax_ref_open(&ref, IMAGE, sizeof IMAGE));
+    target_print("\\n");
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize(("added", "status"), [(0, 0), (65536, 16)])
+def test_the_reference_cuts_no_word_of_the_shape_to_16_bits(
+    added: int, status: int, tmp_path: Path
+) -> None:
+    """An image of 65537 segments is none of one segment."""
+    need(*AVR.tools("gcc"))
+    words = list(struct.unpack(f"<{len(case_named(CUBIC).image) // 4}I", case_named(CUBIC).image))
+    assert words[4] == 1
+    words[4] += added
+    image = struct.pack(f"<{len(words) - 1}I", *words[:-1])
+    image += struct.pack("<I", zlib.crc32(image))
+    main = tmp_path / "open.c"
+    main.write_text(OPEN % ", ".join(map(str, image)))
+    program = tmp_path / "program.elf"
+    sources = [main, *(FIRMWARE / name for name in ("triax_ref.c", "triax_ref_image.c"))]
+    build(Toolset(AVR, "gcc", "-Os"), sources, [FIRMWARE], program)
+    assert emulate(AVR, program) == f"open {status:08x}\n"
+
+
 def test_program_that_does_not_build_is_a_failure() -> None:
     need(*M3.tools("gcc"))
     case = case_named(CUBIC)
@@ -208,7 +260,7 @@ def test_program_that_does_not_build_is_a_failure() -> None:
 
 
 def test_thumb2_on_a_core_without_it_is_refused_by_name() -> None:
-    m0 = next(core for core in cores.CORES if core.no_long_multiply)
+    m0 = next(core for core in cores.CORES if core.thumb1_multiply)
     need(*m0.tools("gcc"))
     outcome = run_builds([Build(case_named(CUBIC), Toolset(m0, "gcc", "-O2", THUMB2))])[0]
     assert outcome.status == FAILED

@@ -15,7 +15,7 @@ from triaxcal.verify.tools import BrokenToolError
 from triaxcal.verify.workspace import ROUTINE, Workspace
 from verify.conftest import Planter, needs
 
-BARE = [core for core in CORES if not core.hosted]
+BARE = [core for core in CORES if core.counted]
 CROSS = ("arm-none-eabi-gcc", "riscv64-unknown-elf-gcc", "qemu-system-arm", "qemu-system-riscv32")
 
 

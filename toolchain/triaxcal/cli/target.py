@@ -14,7 +14,7 @@ from triaxcal.cli.options import HELP, UnitFolder, build_option, example, say
 def target() -> None:
     """Test and measure the generated C on other processors.
 
-    Cortex-M, RISC-V and a big-endian core are emulated by QEMU.
+    Cortex-M, RISC-V and two big-endian cores are emulated by QEMU, an AVR by simavr.
     """
 
 

@@ -100,7 +100,7 @@ def run_bench(
         (subject, core)
         for subject in subjects(wanted)
         for core in CORES
-        if not core.hosted and _meant_for(subject.arithmetic, core)
+        if core.counted and _meant_for(subject.arithmetic, core)
     ]
     with tempfile.TemporaryDirectory(prefix="triaxcal-bench-") as name:
         work = Path(name)
@@ -127,7 +127,7 @@ def best_form(core: Core) -> int:
 
 def compiler_versions() -> list[str]:
     """First line of --version of every cross compiler that is installed."""
-    compilers = dict.fromkeys(core.gcc for core in CORES if not core.hosted)
+    compilers = dict.fromkeys(core.gcc for core in CORES if core.counted)
     installed = [c for c in compilers if not missing_tools([c])]
     return [run([c, "--version"]).splitlines()[0] for c in installed]
 

@@ -56,7 +56,7 @@ class Toolset:
             *driver, *core.flags, *WARNINGS, *hosted, self.optimisation,
             "-ffunction-sections", "-fdata-sections",
             f"-DTRIAX_ARITHMETIC={self.arithmetic}", "-DTRIAX_REF_MAX_SEGMENTS=8",
-            *self.defines,
+            f"-DCASE_VECTORS={core.vectors}u", *self.defines,
         ]  # fmt: skip
 
 
@@ -96,7 +96,7 @@ def compiled(
 
 def _support(core: Core) -> list[Path]:
     target = shipped("firmware_ref") / "target"
-    if core.hosted:
+    if not core.memory:
         return [target / "target_io.c"]
     start = "riscv_start.S" if "riscv" in core.gcc else "cortexm_start.c"
     return [target / start, target / "target_io.c"]
@@ -104,8 +104,8 @@ def _support(core: Core) -> list[Path]:
 
 def link_command(core: Core) -> list[str]:
     """Link command without inputs and outputs."""
-    if core.hosted:
-        return [core.gcc, "-static"]
+    if not core.memory:
+        return [core.gcc, *core.flags, "-static"]
     script = "riscv.ld" if "riscv" in core.gcc else "cortexm.ld"
     return [
         core.gcc, *core.flags, "-nostdlib", "-nostartfiles", "-Wl,--gc-sections",
@@ -132,7 +132,8 @@ def emulate(core: Core, program: Path, extra: Sequence[str] = ()) -> str:
         When it ends with an error or does not end.
     """
     emulator, *options = core.emulator
-    return run([emulator, *extra, *options, str(program)])
+    done = _finished([emulator, *extra, *options, str(program)])
+    return core.printed(done.stdout, done.stderr)
 
 
 def run(command: Sequence[str]) -> str:
@@ -143,6 +144,10 @@ def run(command: Sequence[str]) -> str:
     TargetError
         With its first complaint.
     """
+    return _finished(command).stdout
+
+
+def _finished(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=RUN_SECONDS,
@@ -155,4 +160,4 @@ def run(command: Sequence[str]) -> str:
         errors = [line for line in lines if "error" in line.lower()] or lines
         complaint = errors[0] if errors else f"exit code {done.returncode}"
         raise TargetError(f"{Path(command[0]).name}: {complaint}")
-    return done.stdout
+    return done

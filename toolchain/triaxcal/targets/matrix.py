@@ -12,6 +12,7 @@ from pathlib import Path
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.shim import write_shim
 from triaxcal.targets.build import TargetError, Toolset, build, emulate, in_parallel
+from triaxcal.targets.cores.core import COMPILERS
 from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
 from triaxcal.targets.shapes import CUBIC, Case
 from triaxcal.targets.vectors import case_header, expected_lines
@@ -20,7 +21,6 @@ PORTABLE, LIMBS, THUMB2, THUMB1 = 0, 1, 2, 3
 ARITHMETIC_NAMES = ("portable", "limbs", "thumb2", "thumb1")
 """Values of TRIAX_ARITHMETIC."""
 
-COMPILERS = ("gcc", "clang")
 OPTIMISATIONS = ("-O0", "-O1", "-O2", "-O3", "-Os")
 EVERY_WAY = tuple((c, o) for c in COMPILERS for o in OPTIMISATIONS)
 PASSED, FAILED, NOT_DONE = "passed", "failed", "not done"
@@ -74,13 +74,14 @@ def _builds(case: Case, ways: Sequence[tuple[str, str]]) -> Iterator[Build]:
     The limb form is tried in one more way on every core, because it is portable too.
     """
     for core in CORES:
-        for compiler, optimisation in ways:
+        own = [way for way in ways if way[0] in core.compilers]
+        for compiler, optimisation in own:
             yield Build(case, Toolset(core, compiler, optimisation, PORTABLE))
-        for compiler, optimisation in ways if core.no_long_multiply else ways[2:3]:
+        for compiler, optimisation in own if core.no_long_multiply else own[2:3]:
             yield Build(case, Toolset(core, compiler, optimisation, LIMBS))
-        for compiler, optimisation in ways if core.thumb2_multiply else ():
+        for compiler, optimisation in own if core.thumb2_multiply else ():
             yield Build(case, Toolset(core, compiler, optimisation, THUMB2))
-        for compiler, optimisation in ways if core.no_long_multiply else ():
+        for compiler, optimisation in own if core.thumb1_multiply else ():
             yield Build(case, Toolset(core, compiler, optimisation, THUMB1))
 
 
@@ -92,24 +93,37 @@ def run_builds(
     with tempfile.TemporaryDirectory(prefix="triaxcal-targets-") as name:
         work = Path(name)
         sources = _write_cases(builds, work)
+        expected = _expected(builds)
         jobs = [
-            partial(_outcome, b, *sources[b.case.name], work / f"build-{i}")
+            partial(
+                _outcome,
+                b,
+                sources[b.case.name],
+                expected[b.case.name, b.toolset.core.vectors],
+                work / f"build-{i}",
+            )
             for i, b in enumerate(builds)
         ]
         return in_parallel(jobs, lambda outcome: progress(outcome, next(done)))
 
 
-def _write_cases(builds: Sequence[Build], work: Path) -> dict[str, tuple[Path, dict[str, int]]]:
-    """Folder and expected output of each shape."""
-    written: dict[str, tuple[Path, dict[str, int]]] = {}
+def _write_cases(builds: Sequence[Build], work: Path) -> dict[str, Path]:
+    """Folder of each shape."""
+    written: dict[str, Path] = {}
     for case in {b.case.name: b.case for b in builds}.values():
         folder = work / f"case-{len(written)}"
         folder.mkdir()
         for name, text in case.files.items():
             (folder / name).write_text(text)
         (folder / "target_case.h").write_text(case_header(case))
-        written[case.name] = folder, expected_lines(case)
+        written[case.name] = folder
     return written
+
+
+def _expected(builds: Sequence[Build]) -> dict[tuple[str, int], dict[str, int]]:
+    """Expected output for each shape and number of vectors."""
+    wanted = {(b.case.name, b.toolset.core.vectors): b.case for b in builds}
+    return {key: expected_lines(case, key[1]) for key, case in wanted.items()}
 
 
 def _outcome(planned: Build, folder: Path, expected: dict[str, int], place: Path) -> Outcome:

@@ -7,18 +7,17 @@ from collections.abc import Sequence
 
 from triaxcal import __version__
 from triaxcal.base.screentext import table
+from triaxcal.targets.cores.core import COMPILERS, VECTORS
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.matrix import (
     ARITHMETIC_NAMES,
-    COMPILERS,
     FAILED,
     NOT_DONE,
     PASSED,
     Outcome,
 )
-from triaxcal.targets.vectors import VECTORS
 
-FORMAT = 1
+FORMAT = 2
 
 
 def counts(outcomes: Sequence[Outcome]) -> dict[str, int]:
@@ -52,9 +51,11 @@ def _cell(outcomes: Sequence[Outcome]) -> str:
 
 def _summary(outcomes: Sequence[Outcome]) -> list[str]:
     found = counts(outcomes)
+    fewer = [f" ({c.vectors} on {c.name})" for c in CORES if c.vectors != VECTORS]
     passed = (
         f"{found[PASSED]} of {len(outcomes)} builds passed ({', '.join(COMPILERS)}), each with "
-        f"{VECTORS} vectors through the generated routine, the loaded image and the reference"
+        f"{VECTORS} vectors{''.join(fewer)} through the generated routine, the loaded image and "
+        f"the reference"
     )
     lines = [passed]
     lines += [f"FAILED {o.build.label}: {o.detail}" for o in outcomes if o.status == FAILED]
@@ -70,7 +71,6 @@ def matrix_json(outcomes: Sequence[Outcome]) -> str:
     document = {
         "format": FORMAT,
         "triaxcal": __version__,
-        "vectors_per_build": VECTORS,
         "counts": counts(outcomes),
         "builds": [
             {
@@ -79,6 +79,7 @@ def matrix_json(outcomes: Sequence[Outcome]) -> str:
                 "compiler": o.build.toolset.compiler,
                 "optimisation": o.build.toolset.optimisation,
                 "arithmetic": ARITHMETIC_NAMES[o.build.toolset.arithmetic],
+                "vectors": o.build.toolset.core.vectors,
                 "status": o.status,
                 "detail": o.detail,
             }

@@ -28,7 +28,7 @@ def check(work: Workspace) -> Outcome:
     BrokenToolError
         When something does not build or run.
     """
-    cores = [core for core in CORES if not core.hosted]
+    cores = [core for core in CORES if core.counted]
     missing = missing_tools(["gcc", *(tool for core in cores for tool in core.tools("gcc"))])
     if missing:
         finding = f"{', '.join(missing)} not found; {install_advice(missing)}"

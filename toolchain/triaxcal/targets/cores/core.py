@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 SEMIHOSTING = (
     "-nographic", "-monitor", "none", "-serial", "none", "-chardev", "stdio,id=out",
     "-semihosting-config", "enable=on,target=native,chardev=out",
 )  # fmt: skip
+
+COMPILERS = ("gcc", "clang")
+VECTORS = 24576
+
+
+def _output(output: str, _errors: str) -> str:
+    return output
 
 
 @dataclass(frozen=True)
@@ -27,11 +35,22 @@ class Core:
     emulator : tuple of str
         Command that takes the program's path as its last argument.
     memory : dict
-        Origins and lengths for the linker script; empty for a hosted program.
+        Origins and lengths for the linker script; empty where the toolchain brings start-up code
+        and script of its own.
     thumb2_multiply : bool
         Whether it has Thumb-2 with 32x32->64 multiplications, which TRIAX_THUMB2 needs.
     no_long_multiply : bool
         Whether it has no 32x32->64 multiplication, so that TRIAX_LIMBS is meant for it.
+    thumb1_multiply : bool
+        Whether TRIAX_THUMB1 is meant for it.
+    hosted : bool
+        Whether it runs a Linux program under qemu-user.
+    compilers : tuple of str
+        Those that can build for it.
+    vectors : int
+        How many vectors it runs through each routine.
+    printed : callable
+        What the program printed, from standard output and standard error of its emulator.
     rank : int
         Place among the cores.
     """
@@ -46,12 +65,17 @@ class Core:
     memory: dict[str, int]
     thumb2_multiply: bool = False
     no_long_multiply: bool = False
+    thumb1_multiply: bool = False
+    hosted: bool = False
+    compilers: tuple[str, ...] = COMPILERS
+    vectors: int = VECTORS
+    printed: Callable[[str, str], str] = _output
     rank: int = 100
 
     @property
-    def hosted(self) -> bool:
-        """Whether it runs a Linux program under qemu-user."""
-        return not self.memory
+    def counted(self) -> bool:
+        """Whether the plugin of QEMU counts its instructions: what runs bare metal under QEMU."""
+        return bool(self.memory)
 
     def tools(self, compiler: str) -> tuple[str, ...]:
         """Programs needed to build with "gcc" or "clang" and to run."""
@@ -79,5 +103,6 @@ def cortex(rank: int, name: str, machine: str, *fpu: str, flash: int = 0, ram: i
         memory,
         thumb2_multiply=thumb2,
         no_long_multiply=not thumb2,
+        thumb1_multiply=not thumb2,
         rank=rank,
     )

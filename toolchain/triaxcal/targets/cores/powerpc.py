@@ -11,5 +11,6 @@ ENTRY = Core(
     (),
     ("qemu-ppc",),
     {},
+    hosted=True,
     rank=7,
 )

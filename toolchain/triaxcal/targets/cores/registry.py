@@ -13,6 +13,7 @@ PACKAGES = {
     "arm-none-eabi-gcc": "gcc-arm-none-eabi",
     "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf",
     "powerpc-linux-gnu-gcc": "gcc-powerpc-linux-gnu libc6-dev-powerpc-cross",
+    "avr-gcc": "gcc-avr avr-libc",
     "s390x-linux-gnu-gcc": "gcc-s390x-linux-gnu libc6-dev-s390x-cross",
     "clang": "clang",
     "gcc": "gcc libc6-dev",
@@ -20,6 +21,7 @@ PACKAGES = {
     "qemu-system-riscv32": "qemu-system-misc",
     "qemu-ppc": "qemu-user",
     "qemu-s390x": "qemu-user",
+    "simavr": "simavr",
 }
 """Debian package of each tool."""
 

@@ -11,5 +11,6 @@ ENTRY = Core(
     (),
     ("qemu-s390x",),
     {},
+    hosted=True,
     rank=8,
 )
