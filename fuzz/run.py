@@ -124,13 +124,19 @@ def _xcp(units: Path, work: Path) -> Target:
 
 
 def _sessions(image: bytes) -> tuple[bytes, ...]:
-    """Packets, each after its size: a whole download that is stored, and one of every command."""
+    """Packets, each after its size: a download that is stored, every command, a change."""
     start = [b"\xff\0", b"\xeb\x02\0\x01", b"\xf6" + bytes(7)]
     parts = [image[at : at + 6] for at in range(0, len(image), 6)]
     down = [bytes([0xF0, len(part)]) + part for part in parts]
     codes = (0xFD, 0xFC, 0xFA, 0xF5, 0xF4, 0xF3, 0xEA, 0xE4, 0xFE)
     each = [bytes([code, 1, 0, 0, 1, 0, 0, 0]) for code in codes]
-    sessions = ([*start, *down, b"\xf9\x01", b"\xeb\x03\0\x01"], [b"\xff\0", *each])
+    in_ram = [b"\xff\0", b"\xe4\0\0\0\x01", b"\xeb\x03\0\x01", b"\xfa\x05"]
+    change = [b"\xf6\0\0\x03" + bytes([80, 0, 0, 0]), b"\xf0\x04" + image[80:84], b"\xfa\x05"]
+    sessions = (
+        [*start, *down, b"\xf9\x01", b"\xeb\x03\0\x01"],
+        [b"\xff\0", *each],
+        [*in_ram, *change, b"\xf9\x01"],
+    )
     return tuple(b"".join(bytes([len(p)]) + p for p in packets) for packets in sessions)
 
 

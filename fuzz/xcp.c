@@ -66,7 +66,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     triax_xcp_t xcp;
     /* Blocks of their own, for the address sanitizer. */
     uint8_t *ram = malloc(FILE_SIZE);
-    const triax_xcp_config_t config = {&store, TRIAX_SHAPE, ram, "serial", "epk", sample, use, NULL};
+    const triax_xcp_config_t config = {&store, TRIAX_SHAPE, ram, "serial", "version", "epk", sample, use, NULL};
     size_t at = 0;
     int i;
 

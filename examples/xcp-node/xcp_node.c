@@ -142,7 +142,7 @@ int main(int argc, char **argv)
     static node_t node;
     static triax_store_t store;
     static const triax_xcp_config_t config = {
-        &store, TRIAX_SHAPE, ram, NODE_SERIAL, "xcp-node 1", sample, use, &node,
+        &store, TRIAX_SHAPE, ram, NODE_SERIAL, "xcp-node 1", TRIAX_CALIB_EPK, sample, use, &node,
     };
     triax_xcp_t xcp;
     const uint8_t *memory;

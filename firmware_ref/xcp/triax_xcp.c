@@ -1,28 +1,11 @@
-/* triax_xcp.c - see triax_xcp.h. Codes: ASAM MCD-1 XCP, part 2, protocol layer. */
-#include "triax_xcp.h"
+/* triax_xcp.c - the commands; see triax_xcp.h. Codes: ASAM MCD-1 XCP, part 2, protocol layer. */
+#include "triax_memory.h"
 
 #define COMMAND_CONNECT 0xFFu
 #define COMMANDS 14u
 
 #define POSITIVE 0xFFu
 #define NEGATIVE 0xFEu
-
-#define ERR_CMD_SYNCH 0x00u
-#define ERR_CMD_BUSY 0x10u
-#define ERR_CMD_UNKNOWN 0x20u
-#define ERR_CMD_SYNTAX 0x21u
-#define ERR_OUT_OF_RANGE 0x22u
-#define ERR_WRITE_PROTECTED 0x23u
-#define ERR_ACCESS_DENIED 0x24u
-#define ERR_PAGE_NOT_VALID 0x26u
-#define ERR_MODE_NOT_VALID 0x27u
-#define ERR_SEGMENT_NOT_VALID 0x28u
-#define NO_ERROR 0x100u
-
-#define EXTENSION_FILE 0u
-#define EXTENSION_INFO 1u
-#define EXTENSION_SAMPLE 2u
-#define EXTENSION_TEXT 0xFFu /* of GET_ID; a master cannot set it */
 
 #define RESOURCE_CAL_PAG 0x01u
 #define STORE_CAL_REQ 0x01u
@@ -42,123 +25,6 @@ typedef struct {
     uint8_t size; /* bytes at least */
     handler_t handle;
 } command_t;
-
-/* The bits of a signed word: two's complement, as int32_t guarantees. */
-static void put_signed(uint8_t *bytes, int32_t value)
-{
-    triax_store_put_word(bytes, (uint32_t)value);
-}
-
-static void copy(uint8_t *to, const uint8_t *from, uint32_t size)
-{
-    uint32_t i;
-
-    for (i = 0u; i < size; i++) {
-        to[i] = from[i];
-    }
-}
-
-static uint32_t file_size(const triax_xcp_t *xcp)
-{
-    return xcp->store->config->file_size;
-}
-
-static uint32_t is_storing(const triax_xcp_t *xcp)
-{
-    return (xcp->store->status == TRIAX_STORE_BUSY) ? 1u : 0u;
-}
-
-static void write_info(triax_xcp_t *xcp)
-{
-    const triax_store_t *store = xcp->store;
-
-    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_VERSION], 1u);
-    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SHAPE], xcp->config->shape);
-    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SIZE_AT], file_size(xcp));
-    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SLOT], store->active);
-    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SEQUENCE], store->sequence);
-    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_STORE], store->status);
-    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SLOT_SIZE], store->config->slot_size);
-    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_USED], xcp->page_used);
-}
-
-static void take_sample(triax_xcp_t *xcp)
-{
-    triax_xcp_sample_t sample = {0u, 0, 0, {0, 0, 0}, {0, 0, 0}, 0u};
-    uint32_t axis;
-
-    xcp->config->sample(xcp->config->context, &sample);
-    triax_store_put_word(&xcp->sample[0], sample.count);
-    put_signed(&xcp->sample[4], sample.temp_code);
-    put_signed(&xcp->sample[8], sample.rate_code);
-    for (axis = 0u; axis < 3u; axis++) {
-        put_signed(&xcp->sample[12u + (4u * axis)], sample.raw[axis]);
-        put_signed(&xcp->sample[24u + (4u * axis)], sample.accel[axis]);
-    }
-    triax_store_put_word(&xcp->sample[36], sample.status);
-}
-
-/* What a master reads: the block of an extension, and how long it is; NULL where there is none. */
-static const uint8_t *block_of(triax_xcp_t *xcp, uint32_t extension, uint32_t *size)
-{
-    const uint8_t *block = NULL;
-
-    *size = 0u;
-    switch (extension) {
-    case EXTENSION_FILE:
-        block = (xcp->page == TRIAX_XCP_RAM_PAGE) ? xcp->ram : triax_store_file(xcp->store);
-        *size = file_size(xcp);
-        break;
-    case EXTENSION_INFO:
-        write_info(xcp);
-        block = xcp->info;
-        *size = TRIAX_XCP_INFO_SIZE;
-        break;
-    case EXTENSION_SAMPLE:
-        block = xcp->sample;
-        *size = TRIAX_XCP_SAMPLE_SIZE;
-        break;
-    case EXTENSION_TEXT:
-        block = xcp->text;
-        *size = xcp->text_size;
-        break;
-    default:
-        /* Nothing is there. */
-        break;
-    }
-    return block;
-}
-
-/* `size` bytes from the memory transfer address, which goes on by them; NULL with xcp->error set. */
-static const uint8_t *readable(triax_xcp_t *xcp, uint32_t size)
-{
-    uint32_t limit;
-    const uint8_t *block = block_of(xcp, xcp->extension, &limit);
-    const uint8_t *found = NULL;
-
-    if ((size > limit) || (xcp->address > (limit - size))) {
-        xcp->error = ERR_OUT_OF_RANGE;
-    } else if (block == NULL) {
-        xcp->error = ERR_ACCESS_DENIED;
-    } else {
-        found = &block[xcp->address];
-        xcp->address += size;
-    }
-    return found;
-}
-
-static void set_address(triax_xcp_t *xcp, uint32_t extension, uint32_t address)
-{
-    if (extension == EXTENSION_TEXT) {
-        xcp->error = ERR_OUT_OF_RANGE;
-    } else {
-        xcp->extension = extension;
-        xcp->address = address;
-        if ((extension == EXTENSION_SAMPLE) && (address == 0u)) {
-            take_sample(xcp);
-        }
-    }
-}
 
 static uint32_t on_connect(triax_xcp_t *xcp, const uint8_t *command, size_t size, uint8_t *response)
 {
@@ -194,7 +60,7 @@ static uint32_t on_get_status(triax_xcp_t *xcp, const uint8_t *command, size_t s
 {
     (void)command;
     (void)size;
-    response[1] = (is_storing(xcp) != 0u) ? (uint8_t)STORE_CAL_REQ : (uint8_t)0u;
+    response[1] = (triax_memory_is_storing(xcp) != 0u) ? (uint8_t)STORE_CAL_REQ : (uint8_t)0u;
     response[2] = 0u; /* nothing is protected by a key */
     response[3] = 0u;
     response[4] = 0u;
@@ -219,8 +85,14 @@ static uint32_t on_get_id(triax_xcp_t *xcp, const uint8_t *command, size_t size,
     (void)size;
     if (command[1] == ID_ASCII) {
         text = xcp->config->name;
+    } else if (command[1] == TRIAX_XCP_ID_VERSION) {
+        text = xcp->config->version;
     } else if (command[1] == ID_EPK) {
-        text = xcp->config->epk;
+        xcp->text = xcp->epk;
+        length = triax_memory_epk(xcp);
+        if (length == 0u) {
+            text = xcp->config->epk;
+        }
     } else {
         /* Of no other kind: a length of 0. */
     }
@@ -229,6 +101,8 @@ static uint32_t on_get_id(triax_xcp_t *xcp, const uint8_t *command, size_t size,
             length++;
         }
         xcp->text = (const uint8_t *)text;
+    }
+    if (length != 0u) {
         xcp->text_size = length;
         xcp->extension = EXTENSION_TEXT;
         xcp->address = 0u;
@@ -258,21 +132,16 @@ static uint32_t on_set_mta(triax_xcp_t *xcp, const uint8_t *command, size_t size
 {
     (void)size;
     (void)response;
-    set_address(xcp, command[3], triax_store_get_word(&command[4]));
+    triax_memory_set_address(xcp, command[3], triax_store_get_word(&command[4]));
     return 1u;
 }
 
 static uint32_t upload(triax_xcp_t *xcp, uint32_t count, uint8_t *response)
 {
-    const uint8_t *found = NULL;
-
     if ((count == 0u) || (count >= TRIAX_XCP_PACKET)) {
         xcp->error = ERR_OUT_OF_RANGE;
     } else {
-        found = readable(xcp, count);
-    }
-    if (found != NULL) {
-        copy(&response[1], found, count);
+        triax_memory_read(xcp, &response[1], count);
     }
     return 1u + count;
 }
@@ -288,7 +157,7 @@ static uint32_t on_short_upload(triax_xcp_t *xcp, const uint8_t *command, size_t
     uint32_t length = 1u;
 
     (void)size;
-    set_address(xcp, command[3], triax_store_get_word(&command[4]));
+    triax_memory_set_address(xcp, command[3], triax_store_get_word(&command[4]));
     if (xcp->error == NO_ERROR) {
         length = upload(xcp, command[1], response);
     }
@@ -298,21 +167,14 @@ static uint32_t on_short_upload(triax_xcp_t *xcp, const uint8_t *command, size_t
 static uint32_t on_download(triax_xcp_t *xcp, const uint8_t *command, size_t size, uint8_t *response)
 {
     const uint32_t count = command[1];
-    const uint32_t limit = file_size(xcp);
 
     (void)response;
     if (size < (count + 2u)) {
         xcp->error = ERR_CMD_SYNTAX;
-    } else if ((count == 0u) || (xcp->extension != EXTENSION_FILE) || (count > limit) ||
-               (xcp->address > (limit - count))) {
+    } else if (count == 0u) {
         xcp->error = ERR_OUT_OF_RANGE;
-    } else if (xcp->page != TRIAX_XCP_RAM_PAGE) {
-        xcp->error = ERR_WRITE_PROTECTED;
-    } else if (is_storing(xcp) != 0u) {
-        xcp->error = ERR_CMD_BUSY;
     } else {
-        copy(&xcp->ram[xcp->address], &command[2], count);
-        xcp->address += count;
+        triax_memory_write(xcp, &command[2], count);
     }
     return 1u;
 }
@@ -326,7 +188,7 @@ static uint32_t on_build_checksum(triax_xcp_t *xcp, const uint8_t *command, size
     if (count == 0u) {
         xcp->error = ERR_OUT_OF_RANGE;
     } else {
-        found = readable(xcp, count);
+        found = triax_memory_readable(xcp, count);
     }
     if (found != NULL) {
         response[1] = XCP_CRC_32;
@@ -335,28 +197,6 @@ static uint32_t on_build_checksum(triax_xcp_t *xcp, const uint8_t *command, size
         triax_store_put_word(&response[4], triax_store_crc32(found, count));
     }
     return 8u;
-}
-
-/* Whether the application can use a page. */
-static uint32_t is_usable(const triax_xcp_t *xcp, uint32_t page)
-{
-    const uint8_t *file = triax_store_file(xcp->store);
-
-    if (page == TRIAX_XCP_RAM_PAGE) {
-        file = xcp->ram;
-        if (xcp->store->config->check(file, (size_t)file_size(xcp)) != 0u) {
-            file = NULL;
-        }
-    }
-    return (file != NULL) ? 1u : 0u;
-}
-
-static void use_page(triax_xcp_t *xcp, uint32_t page)
-{
-    xcp->page_used = page;
-    xcp->config->use(xcp->config->context, (page == TRIAX_XCP_RAM_PAGE)
-                                               ? xcp->ram
-                                               : triax_store_file(xcp->store));
 }
 
 static uint32_t on_set_cal_page(triax_xcp_t *xcp, const uint8_t *command, size_t size, uint8_t *response)
@@ -372,14 +212,14 @@ static uint32_t on_set_cal_page(triax_xcp_t *xcp, const uint8_t *command, size_t
     } else if ((command[2] != 0u) && ((mode & PAGE_OF_ALL_SEGMENTS) == 0u)) {
         xcp->error = ERR_SEGMENT_NOT_VALID;
     } else if ((page > TRIAX_XCP_RAM_PAGE) ||
-               (((mode & PAGE_OF_APPLICATION) != 0u) && (is_usable(xcp, page) == 0u))) {
+               (((mode & PAGE_OF_APPLICATION) != 0u) && (triax_memory_is_usable(xcp, page) == 0u))) {
         xcp->error = ERR_PAGE_NOT_VALID;
     } else {
         if ((mode & PAGE_OF_XCP) != 0u) {
             xcp->page = page;
         }
         if ((mode & PAGE_OF_APPLICATION) != 0u) {
-            use_page(xcp, page);
+            triax_memory_use_page(xcp, page);
         }
     }
     return 1u;
@@ -407,20 +247,16 @@ static uint32_t on_get_cal_page(triax_xcp_t *xcp, const uint8_t *command, size_t
 /* From flash to RAM only: the other way is SET_REQUEST. */
 static uint32_t on_copy_cal_page(triax_xcp_t *xcp, const uint8_t *command, size_t size, uint8_t *response)
 {
-    const uint8_t *file = triax_store_file(xcp->store);
-
     (void)size;
     (void)response;
     if ((command[1] != 0u) || (command[3] != 0u)) {
         xcp->error = ERR_SEGMENT_NOT_VALID;
-    } else if ((command[2] != TRIAX_XCP_FLASH_PAGE) || (command[4] > SECOND_PAGE) || (file == NULL)) {
+    } else if ((command[2] != TRIAX_XCP_FLASH_PAGE) || (command[4] > SECOND_PAGE)) {
         xcp->error = ERR_PAGE_NOT_VALID;
     } else if (command[4] != TRIAX_XCP_RAM_PAGE) {
         xcp->error = ERR_WRITE_PROTECTED;
-    } else if (is_storing(xcp) != 0u) {
-        xcp->error = ERR_CMD_BUSY;
     } else {
-        copy(xcp->ram, file, file_size(xcp));
+        triax_memory_copy_page(xcp);
     }
     return 1u;
 }
@@ -448,9 +284,6 @@ static const command_t *command_of(uint8_t code)
 
 void triax_xcp_open(triax_xcp_t *xcp, const triax_xcp_config_t *config)
 {
-    const uint8_t *file = triax_store_file(config->store);
-    uint32_t i;
-
     xcp->config = config;
     xcp->ram = config->ram;
     xcp->store = config->store;
@@ -462,13 +295,7 @@ void triax_xcp_open(triax_xcp_t *xcp, const triax_xcp_config_t *config)
     xcp->page = TRIAX_XCP_FLASH_PAGE;
     xcp->page_used = TRIAX_XCP_FLASH_PAGE;
     xcp->error = NO_ERROR;
-    for (i = 0u; i < TRIAX_XCP_SAMPLE_SIZE; i++) {
-        xcp->sample[i] = 0u;
-    }
-    for (i = 0u; i < file_size(xcp); i++) {
-        xcp->ram[i] = (file != NULL) ? file[i] : (uint8_t)0xFFu;
-    }
-    write_info(xcp);
+    triax_memory_open(xcp);
 }
 
 uint32_t triax_xcp_receive(triax_xcp_t *xcp, const uint8_t *command, size_t size,
@@ -500,7 +327,7 @@ uint32_t triax_xcp_receive(triax_xcp_t *xcp, const uint8_t *command, size_t size
 
 uint32_t triax_xcp_background(triax_xcp_t *xcp)
 {
-    uint32_t more = is_storing(xcp);
+    uint32_t more = triax_memory_is_storing(xcp);
 
     if (more != 0u) {
         const uint32_t status = triax_store_step(xcp->store);
@@ -508,7 +335,7 @@ uint32_t triax_xcp_background(triax_xcp_t *xcp)
             more = 0u;
         }
         if (status == TRIAX_STORE_DONE) {
-            use_page(xcp, TRIAX_XCP_FLASH_PAGE);
+            triax_memory_use_page(xcp, TRIAX_XCP_FLASH_PAGE);
         }
     }
     return more;

@@ -10,7 +10,15 @@
  * |-------------------|-----------------------------------------------------------------|
  * | 0                 | triax_calib.bin, from address 0; page 0 is flash, page 1 RAM    |
  * | 1                 | TRIAX_XCP_INFO_SIZE bytes about the slave, TRIAX_XCP_INFO_...   |
- * | 2                 | one sample; a new one is taken when address 0 is set or read    |
+ * | 2                 | one sample                                                      |
+ * | 3                 | as 0; a download is a change by a calibration tool              |
+ *
+ * A new sample is taken when address 0 is set, or a byte is read that was read since the last one was
+ * taken: signals that are read in turn are of one sample.
+ *
+ * A download to extension 3 changes constants of the RAM page: triax_file_change. The page must hold a
+ * whole calibration before (COPY_CAL_PAGE). Values whose arithmetic could overflow are answered with
+ * ERR_OUT_OF_RANGE. If the application uses the RAM page, it gets the change at once.
  *
  * The application uses flash or RAM, and XCP reads and writes flash or RAM, each as SET_CAL_PAGE says.
  * Flash is written by SET_REQUEST alone, from the RAM page, by triax_store.
@@ -20,6 +28,7 @@
 #ifndef TRIAX_XCP_H
 #define TRIAX_XCP_H
 
+#include "triax_file.h"
 #include "triax_store.h"
 
 #ifdef __cplusplus
@@ -29,6 +38,8 @@ extern "C" {
 #define TRIAX_XCP_PACKET 8u /* the most bytes of a command or a response */
 #define TRIAX_XCP_INFO_SIZE 32u
 #define TRIAX_XCP_SAMPLE_SIZE 40u
+
+#define TRIAX_XCP_ID_VERSION 128u /* GET_ID: 0 is the name, 5 the EPK of the calibration in use */
 
 #define TRIAX_XCP_FLASH_PAGE 0u
 #define TRIAX_XCP_RAM_PAGE 1u
@@ -48,7 +59,8 @@ typedef struct {
     uint32_t shape;        /* TRIAX_SHAPE */
     uint8_t *ram;          /* the RAM page: file_size bytes */
     const char *name;      /* serial number of the hardware, ended by 0; "" where it knows none */
-    const char *epk;       /* the firmware's version, ended by 0 */
+    const char *version;   /* of the firmware, ended by 0: GET_ID TRIAX_XCP_ID_VERSION */
+    const char *epk;       /* TRIAX_CALIB_EPK, where neither flash nor RAM have a calibration in use */
     void (*sample)(void *context, triax_xcp_sample_t *sample); /* the newest one */
     void (*use)(void *context, const uint8_t *file);           /* these constants from now on */
     void *context;                                             /* for sample and use */
@@ -66,6 +78,8 @@ typedef struct {
     uint32_t page;      /* that XCP reads and writes */
     uint32_t page_used; /* that the application uses */
     uint32_t error;     /* of the command in work */
+    uint32_t seen[2];   /* a bit for each byte of the sample that was read */
+    uint8_t epk[TRIAX_FILE_EPK_SIZE];
     uint8_t info[TRIAX_XCP_INFO_SIZE];
     uint8_t sample[TRIAX_XCP_SAMPLE_SIZE];
 } triax_xcp_t;

@@ -26,7 +26,7 @@ def file_of(b: Built, serial: str) -> bytes:
 
 
 def compile_with(b: Built, out: Path, *more: str | Path) -> Path:
-    sources = [XCP / "triax_store.c", XCP / "triax_xcp.c", b.folder / "triax_comp.c"]
+    sources = [*sorted(XCP.glob("*.c")), b.folder / "triax_comp.c"]
     command = ["gcc", *FLAGS, f"-I{b.folder}", f"-I{XCP}", *sources, *more, "-o", out]
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -86,7 +86,7 @@ static void use(void *context, const uint8_t *file)
     memcpy(used, file, sizeof used);
 }
 
-static const triax_xcp_config_t config = {&store, TRIAX_SHAPE, ram, "SN 17", "fw 1.2", sample, use, NULL};
+static const triax_xcp_config_t config = {&store, TRIAX_SHAPE, ram, "SN 17", "fw 1.2", "EPK 17", sample, use, NULL};
 static triax_xcp_t xcp;
 
 void harness_reset(uint32_t unit)

@@ -8,6 +8,7 @@ import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -19,7 +20,7 @@ pytest.importorskip("can")
 
 import can
 
-from builds import Builds, Built
+from builds import PROVENANCE, Builds, Built
 from device.bridge import CHANNELS, bridged, linked
 from device.conftest import file_of
 from device.node import POWER_FAILED, REQUEST, RESPONSE, Node, build_node, write_samples
@@ -63,11 +64,13 @@ def test_from_an_empty_flash_to_a_verified_device(node: Node, unit: Built) -> No
         assert (found.hardware, found.firmware, found.part, found.serial) == (
             "", "xcp-node 1", None, "",
         )  # fmt: skip
+        assert found.epk == PROVENANCE.epk
         info = flash(link, file, "a file")
         assert (info.slot, info.sequence) == (0, 1)
         found = require_in_use(link, file, "UNIT-1")
         assert found.content == file
         assert found.serial == "UNIT-1"
+        assert found.epk == replace(PROVENANCE, serial="UNIT-1").epk
         samples = take_samples(link, 50)
         assert len(samples) == 50
         agreement = compare(samples, python_routine(unit.plan), unit.plan.shape.output_q)

@@ -94,6 +94,7 @@ def _about(name: str, node: Node) -> str:
     rows = [
         ("hardware", node.hardware or "no serial number of its own"),
         ("firmware", node.firmware or "no version"),
+        ("EPK", node.epk or "none"),
         ("takes", f"shape {info.shape:08x}, {info.file_size} bytes"),
         ("uses", "the calibration in RAM" if info.page_used else "the calibration in flash"),
     ]

@@ -1,12 +1,10 @@
-"""One node on a bus: reading, writing and storing, whatever frames are lost or come twice.
+"""One node on a bus: reading, writing and storing.
 
-A command that gets no answer, or another one than it can have, is repeated after a SYNCH. What was
-read or written counts only when the node's CRC over it is the same.
+What was read or written counts only when the node's CRC over it is the same.
 """
 
 from __future__ import annotations
 
-import logging
 import struct
 import time
 import zlib
@@ -19,14 +17,8 @@ from typing import TypeVar
 import can
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.device.master import (
-    Command,
-    ConstructError,
-    Master,
-    XcpResponseError,
-    XcpTimeoutError,
-    create_application_from_config,
-)
+from triaxcal.device.master import Command
+from triaxcal.device.orders import ATTEMPTS, AnsweredError, Orders, SilentError
 
 T = TypeVar("T")
 
@@ -43,34 +35,16 @@ ANSWER_S = 0.5
 """Longest time for an answer. Nodes answer in milliseconds."""
 STORE_S = 30.0
 """Longest time for a store. Erasing a large sector takes seconds, in which a node may be silent."""
-QUIET_S = 0.02
-"""After a disturbance: what is on its way has come by then."""
-ATTEMPTS = 5
 _UPLOAD, _DOWNLOAD = 7, 6
 _FOR_XCP, _FOR_APPLICATION = 0x02, 0x01
 _STORE_CAL_REQ = 1
-_ASCII, _EPK = 0, 5
+_ASCII, _EPK, _VERSION = 0, 5, 128
 
-_MEANINGS = {
-    0x20: "it does not know the command",
-    0x22: "the address is outside of what the node has",
-    0x23: "the page is write-protected",
-    0x24: "it has no calibration in flash",
-    0x26: "the page holds no calibration that its loader accepts",
-}
 _STORE_MEANINGS = {
     3: "its loader refuses the calibration",
     4: "the flash cannot be erased",
     5: "the flash cannot be written",
 }
-
-
-class SilentError(RefusedError):
-    """The node gives no answer, or none that the command can have."""
-
-
-class AnsweredError(RefusedError):
-    """The node answers with an error of XCP."""
 
 
 @dataclass(frozen=True)
@@ -118,16 +92,8 @@ class Link:
         store_s: float = STORE_S,
     ) -> None:
         self.name = f"{name}, node {request_id:#x}"
-        self._bus = bus
-        self._answer_s, self._store_s = answer_s, store_s
-        settings = {
-            "Transport": {"CAN": {"can_id_master": request_id, "can_id_slave": response_id}},
-            "General": {"disable_error_handling": True, "diagnostics_on_failure": False},
-        }
-        application = create_application_from_config(settings, log_level=logging.CRITICAL)
-        application.transport.timeout = answer_s
-        self._master = Master("can", config=application, transport_layer_interface=bus)
-        self._master.transport.connect()
+        self._store_s = store_s
+        self._orders = Orders(bus, self.name, request_id, response_id, answer_s)
         try:
             self.connect()
         except BaseException:
@@ -136,7 +102,7 @@ class Link:
 
     def connect(self) -> Info:
         """CONNECT, as after a power cycle too."""
-        self._repeat("CONNECT", self._master.connect)
+        self._orders.connect()
         try:
             info = self.info()
         except AnsweredError as error:
@@ -155,22 +121,24 @@ class Link:
 
     def close(self) -> None:
         """Disconnect, and close the bus."""
-        with suppress(XcpTimeoutError, XcpResponseError, ConstructError, can.CanError, OSError):
-            self._master.disconnect()
-        self._master.close()
-        self._bus.shutdown()
+        self._orders.close()
 
     def info(self) -> Info:
         """What the node says of itself now."""
         return Info(*struct.unpack("<8I", self.read(INFO, 0, INFO_SIZE)))
 
-    def texts(self) -> tuple[str, str]:
-        """Serial number of the hardware, and version of its firmware; "" where it has none."""
-        return self._text(_ASCII), self._text(_EPK)
+    def texts(self) -> tuple[str, str, str]:
+        """Serial number of the hardware, version of its firmware, EPK of the calibration in use.
+
+        Each is "" where the node has none.
+        """
+        return self._text(_ASCII), self._text(_VERSION), self._text(_EPK)
 
     def _text(self, kind: int) -> str:
         def ask() -> bytes:
-            (length,) = struct.unpack("<3xI", self._request(Command.GET_ID, bytes([kind]), 7))
+            (length,) = struct.unpack(
+                "<3xI", self._orders.request(Command.GET_ID, bytes([kind]), 7)
+            )
             if length > 256:
                 raise ValueError(length)
             data = b""
@@ -178,7 +146,7 @@ class Link:
                 data += self._upload(min(_UPLOAD, length - len(data)))
             return data
 
-        return self._repeat("GET_ID", ask).decode(errors="replace")
+        return self._orders.repeat("GET_ID", ask).decode(errors="replace")
 
     def use(self, page: int) -> None:
         """Let the application take its constants from a page."""
@@ -190,7 +158,9 @@ class Link:
 
     def _set_page(self, mode: int, page: int) -> None:
         data = bytes([mode, 0, page])
-        self._repeat("SET_CAL_PAGE", lambda: self._request(Command.SET_CAL_PAGE, data))
+        self._orders.repeat(
+            "SET_CAL_PAGE", lambda: self._orders.request(Command.SET_CAL_PAGE, data)
+        )
 
     def read(self, extension: int, address: int, size: int) -> bytes:
         """Bytes from an address on.
@@ -208,7 +178,7 @@ class Link:
                 data[skipped:]
             ):
                 return data
-            self._synchronise()
+            self._orders.synchronise()
         raise self._disturbed("read")
 
     def write(self, data: bytes) -> None:
@@ -217,7 +187,7 @@ class Link:
             self._write_once(data)
             if self._crc(FILE, 0, len(data)) == zlib.crc32(data):
                 return
-            self._synchronise()
+            self._orders.synchronise()
         raise self._disturbed("written")
 
     def _disturbed(self, what: str) -> RefusedError:
@@ -238,7 +208,9 @@ class Link:
         end = time.monotonic() + self._store_s
         with suppress(SilentError):
             request = bytes([_STORE_CAL_REQ, 0, 0])
-            self._repeat("SET_REQUEST", lambda: self._request(Command.SET_REQUEST, request))
+            self._orders.repeat(
+                "SET_REQUEST", lambda: self._orders.request(Command.SET_REQUEST, request)
+            )
         info = None
         while info is None or info.store == BUSY:
             if time.monotonic() > end:
@@ -258,86 +230,30 @@ class Link:
         while len(data) < size:
             at, count = address + len(data), min(_UPLOAD, size - len(data))
             step = self._placed(extension, at, partial(self._upload, count))
-            data += self._repeat("UPLOAD", step)
+            data += self._orders.repeat("UPLOAD", step)
         return data
 
     def _write_once(self, data: bytes) -> None:
         for at in range(0, len(data), _DOWNLOAD):
             part = data[at : at + _DOWNLOAD]
             order = bytes([len(part)]) + part
-            step = self._placed(FILE, at, partial(self._request, Command.DOWNLOAD, order))
-            self._repeat("DOWNLOAD", step)
+            step = self._placed(FILE, at, partial(self._orders.request, Command.DOWNLOAD, order))
+            self._orders.repeat("DOWNLOAD", step)
 
     def _placed(self, extension: int, address: int, then: Callable[[], T]) -> Callable[[], T]:
         """An order whose address is set before it, so that it can be repeated."""
 
         def run() -> T:
             place = struct.pack("<2xBI", extension, address)
-            self._request(Command.SET_MTA, place)
+            self._orders.request(Command.SET_MTA, place)
             return then()
 
         return run
 
     def _upload(self, count: int) -> bytes:
-        return self._request(Command.UPLOAD, bytes([count]), count)
+        return self._orders.request(Command.UPLOAD, bytes([count]), count)
 
     def _crc(self, extension: int, address: int, size: int) -> int:
-        order = partial(self._request, Command.BUILD_CHECKSUM, struct.pack("<3xI", size), 7)
-        answer = self._repeat("BUILD_CHECKSUM", self._placed(extension, address, order))
+        order = partial(self._orders.request, Command.BUILD_CHECKSUM, struct.pack("<3xI", size), 7)
+        answer = self._orders.repeat("BUILD_CHECKSUM", self._placed(extension, address, order))
         return int.from_bytes(answer[3:7], "little")
-
-    def _request(self, command: Command, data: bytes, size: int = 0) -> bytes:
-        """The `size` bytes of an answer behind its first.
-
-        pyxcp's own methods for reading wait for ever when an answer is too short, as that to
-        another command is.
-        """
-        self._clear()
-        answer = bytes(self._master.transport.request(command, *data))
-        if len(answer) != size:
-            raise ValueError(answer)
-        return answer
-
-    def _repeat(self, command: str, ask: Callable[[], T]) -> T:
-        """The answer to a command that may be repeated."""
-        refused: RefusedError | None = None
-        for _ in range(ATTEMPTS):
-            try:
-                return ask()
-            except XcpTimeoutError:
-                refused = self._silent(command, f"no answer within {self._answer_s:g} s")
-            except XcpResponseError as error:
-                refused = self._answered(command, error)
-            except (ConstructError, struct.error, ValueError, IndexError, TypeError):
-                refused = self._silent(command, "an answer that belongs to another command")
-            except (can.CanError, OSError) as error:
-                raise RefusedError(self.name, f"the bus cannot be written: {error}") from error
-            if command != "CONNECT":  # before which SYNCH has no answer
-                self._synchronise()
-        assert refused is not None
-        raise refused
-
-    def _answered(self, command: str, error: XcpResponseError) -> AnsweredError:
-        code = error.get_error_code()
-        meaning = _MEANINGS.get(int(code), "see the XCP standard")
-        return AnsweredError(f"{self.name}, {command}", f"the node answers {code}: {meaning}")
-
-    def _silent(self, command: str, found: str) -> SilentError:
-        return SilentError(
-            f"{self.name}, {command}",
-            f"{found}, {ATTEMPTS} times",
-            remedy="check the node's power, its bit rate, --request-id and --response-id",
-        )
-
-    def _clear(self) -> None:
-        """Forget answers that nobody waits for."""
-        self._master.transport.resQueue.clear()
-
-    def _synchronise(self) -> None:
-        """Have the node answer a SYNCH, whose answer is that of no other command."""
-        for _ in range(2):
-            time.sleep(QUIET_S)
-            self._clear()
-            with suppress(XcpTimeoutError, XcpResponseError, ConstructError):
-                if bytes(self._master.transport.request(Command.SYNCH)) == b"\0":
-                    break

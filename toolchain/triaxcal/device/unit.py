@@ -21,7 +21,9 @@ class Node:
     hardware : str
         Serial number that its firmware knows; "" where it knows none.
     firmware : str
-        Version of its firmware (EPK).
+        Version of its firmware.
+    epk : str
+        EPK of the calibration in use, as its A2L states it.
     info : Info
         What it says of itself.
     part : ImagePart or None
@@ -32,6 +34,7 @@ class Node:
 
     hardware: str
     firmware: str
+    epk: str
     info: Info
     part: ImagePart | None
     content: bytes
@@ -52,12 +55,12 @@ def identify(link: Link) -> Node:
         When it does not answer, or what it has in flash is no calibration.
     """
     info = link.info()
-    hardware, firmware = link.texts()
+    texts = link.texts()
     if info.slot == NO_SLOT:
-        return Node(hardware, firmware, info, None, b"")
+        return Node(*texts, info, None, b"")
     link.choose(FLASH_PAGE)
     content = link.read(FILE, 0, info.file_size)
-    return Node(hardware, firmware, info, single_part(content, link.name), content)
+    return Node(*texts, info, single_part(content, link.name), content)
 
 
 def single_part(content: bytes, where: str) -> ImagePart:
