@@ -43,7 +43,7 @@ MAY_IMPORT = {
     "batch": {"base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery"},
     "report": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
-        "fixedpoint", "codegen", "uncertainty", "delivery", "batch",
+        "fixedpoint", "codegen", "uncertainty", "delivery", "batch", "device",
     },
 }  # fmt: skip
 """What each room may import: what lies below it. None but the API imports report, which reads all,

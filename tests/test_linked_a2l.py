@@ -23,7 +23,8 @@ from triaxcal.codegen.names import names_of
 from triaxcal.delivery.firmware import Firmware, make_firmware
 from triaxcal.delivery.saved import calibration_json
 from triaxcal.delivery.unit import Delivery
-from triaxcal.report.a2l import XcpOnCan, calib_a2l, calib_words
+from triaxcal.report.a2l import XcpOnCan, calib_a2l
+from triaxcal.report.a2l_words import calib_words
 
 pytest.importorskip("elftools")
 

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import importlib.util
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from builds import UNITS, Built
-from device.node import Node, build_node, write_samples
+from builds import UNITS
+from device.atsim import Bench, bench_of_at_sim
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
-from triaxcal.codegen.crosscheck import python_routine
-from triaxcal.delivery.unit import deliver
 
 
 def run(*arguments: str | Path, answer: str = "") -> str:
@@ -40,34 +36,10 @@ def test_missing_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "triaxcal[device]" in text
 
 
-@dataclass
-class Bench:
-    node: Node
-    file: Path
-
-
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """The node of AT-SIM, at rest with z up, and the file of its calibration."""
     pytest.importorskip("pyxcp")
-    folder = tmp_path_factory.mktemp("AT-SIM")
-    delivery = deliver(UNITS / "AT-SIM")
-    for name, content in delivery.files.items():
-        (folder / name).write_bytes(content)
-    plan = delivery.plan
-    middle = (plan.temp_min_code + plan.temp_max_code) // 2
-    # The codes of 1 g along z: the routine is affine in them.
-    codes = np.vstack([np.zeros(3), np.eye(3) * 2**20]).astype(np.int32)
-    accel, _ = python_routine(plan)(np.full(4, middle, np.int32), codes)
-    slopes = (accel[1:] - accel[0].astype(np.int64)).T / 2**20
-    up = np.linalg.solve(slopes, np.array([0, 0, 1 << plan.shape.output_q]) - accel[0])
-    raw = np.rint(up) + np.random.default_rng(4).integers(-40, 41, (64, 3))
-    write_samples(folder / "samples.bin", np.full(64, middle), raw)
-    built = Built(plan, folder, None)  # type: ignore[arg-type]
-    program = build_node(built, folder / "xcp_node")
-    return Bench(
-        Node(program, folder / "flash.bin", folder / "samples.bin"), folder / "triax_calib.bin"
-    )
+    return bench_of_at_sim(tmp_path_factory.mktemp("AT-SIM"))
 
 
 def test_the_whole_way(bench: Bench, tmp_path: Path) -> None:

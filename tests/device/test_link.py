@@ -28,7 +28,8 @@ from plans import vectors
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.device.compare import compare, take_samples
-from triaxcal.device.link import FILE, RAM_PAGE, Link
+from triaxcal.device.layout import FILE, RAM_PAGE
+from triaxcal.device.link import Link
 from triaxcal.device.unit import flash, identify, require_in_use
 from triaxcal.rig.openbus import open_bus
 

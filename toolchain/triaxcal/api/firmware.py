@@ -223,6 +223,31 @@ class Firmware:
         renew({target.name: calib_a2l(self._made, linked, xcp)}, target.parent)
         return target
 
+    def write_node_a2l(
+        self, path: str | Path, can_ids: tuple[int, int], *, bitrate: int | None = None
+    ) -> Path:
+        """Write the A2L of a node with `firmware_ref/xcp`: constants and signals, no program.
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        can_ids : tuple of two int
+            As `write_a2l` has them.
+        bitrate : int or None
+            Of the bus, in bit/s.
+
+        Raises
+        ------
+        RefusedError
+            When an identifier is none.
+        """
+        from triaxcal.report.a2l import XcpOnCan, node_a2l  # noqa: PLC0415
+
+        target = Path(path)
+        renew({target.name: node_a2l(self._made, XcpOnCan(*can_ids, bitrate))}, target.parent)
+        return target
+
     def codes(
         self, raw_codes: Any, temp_codes: Any, rate_codes: Any
     ) -> tuple[Int32Array, Int32Array, Int32Array]:

@@ -13,7 +13,7 @@ import click
 
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.extras import install_command
-from triaxcal.cli.options import HELP, HexNumber, UnitFolder, example, say
+from triaxcal.cli.options import DELIVERED, HELP, HexNumber, UnitFolder, example, say
 
 if TYPE_CHECKING:
     from triaxcal.device.link import Link
@@ -34,6 +34,24 @@ def device() -> None:
     """
 
 
+_BUS = click.option(
+    "--bus", required=True, help="A CAN device, or interface:channel of python-can."
+)
+
+
+def _ids(command: Callable[..., None]) -> Callable[..., None]:
+    """CAN ids of a node."""
+    request = click.option(
+        "--request-id", type=HexNumber(), default="0x650", show_default=True,
+        help="CAN id of what the node takes; bit 31 for 29-bit ids.",
+    )  # fmt: skip
+    response = click.option(
+        "--response-id", type=HexNumber(), default="0x651", show_default=True,
+        help="CAN id of what it sends.",
+    )  # fmt: skip
+    return request(response(command))
+
+
 def _node_options(command: Callable[..., None]) -> Callable[..., None]:
     """Options that say which node; `command` gets `opener`, which connects to it."""
 
@@ -41,23 +59,7 @@ def _node_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_opener(bus: str, request_id: int, response_id: int, **others: Any) -> None:
         command(opener=lambda: _connected(bus, request_id, response_id), **others)
 
-    options = (
-        click.option(
-            "--bus", required=True, help="A CAN device, or interface:channel of python-can."
-        ),
-        click.option(
-            "--request-id", type=HexNumber(), default="0x650", show_default=True,
-            help="CAN id of what the node takes; bit 31 for 29-bit ids.",
-        ),
-        click.option(
-            "--response-id", type=HexNumber(), default="0x651", show_default=True,
-            help="CAN id of what it sends.",
-        ),
-    )  # fmt: skip
-    optioned = with_opener
-    for option in reversed(options):
-        optioned = option(optioned)
-    return optioned
+    return _BUS(_ids(with_opener))
 
 
 @contextlib.contextmanager
@@ -211,3 +213,29 @@ def verify(opener: Opener, unit: Path, samples: int) -> None:
         f"  |a| - g         {found.norm_error_mg:+.3f} mg of the mean, standard error "
         f"{found.norm_error_sd_mg:.3f} mg; for a unit at rest only"
     )
+
+
+@device.command(
+    epilog=example(
+        "triaxcal device a2l AT-7 at-7.a2l",
+        "triaxcal device a2l AT-7 at-7.a2l --request-id 0x555 --response-id 0x666",
+    )
+)
+@click.argument("unit", type=UnitFolder(files=True))
+@click.argument("file", type=click.Path(path_type=Path))
+@DELIVERED
+@_ids
+@click.option("--bitrate", type=int, help="Bit rate of the bus, bit/s.")
+def a2l(  # noqa: PLR0917
+    unit: Path, file: Path, build: Path, request_id: int, response_id: int, bitrate: int | None
+) -> None:
+    """Write the A2L of a node with this calibration.
+
+    UNIT is a unit, whose calibration is in build/UNIT, or a delivered folder. Constants can be read
+    and changed, raw and compensated signals measured, with any tool for XCP on CAN.
+    """
+    import triaxcal  # noqa: PLC0415
+    from triaxcal.api.delivery import delivered_file  # noqa: PLC0415
+
+    made = triaxcal.firmware(triaxcal.load(delivered_file(unit, build)))
+    say(f"{made.write_node_a2l(file, (request_id, response_id), bitrate=bitrate)} written")

@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.device.link import SAMPLE, SAMPLE_SIZE, Link
+from triaxcal.device.layout import SAMPLE, SAMPLE_FORMAT, SAMPLE_SIZE
+from triaxcal.device.link import Link
 
 Int32Array = npt.NDArray[np.int32]
 Routine = Callable[[Int32Array, Int32Array], tuple[Int32Array, npt.NDArray[np.uint32]]]
 """Temperature codes (n,) and raw codes (n, 3) to accelerations (n, 3) and status (n,)."""
 
-_SAMPLE = struct.Struct("<Iii3i3iI")
+_SAMPLE = struct.Struct(SAMPLE_FORMAT)
 
 
 @dataclass(frozen=True)

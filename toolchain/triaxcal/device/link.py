@@ -17,18 +17,20 @@ from typing import TypeVar
 import can
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.device.layout import (
+    FILE,
+    INFO,
+    INFO_SIZE,
+    INFO_VERSION,
+    REQUEST_ID,
+    RESPONSE_ID,
+    SAMPLE,
+)
 from triaxcal.device.master import Command
 from triaxcal.device.orders import ATTEMPTS, AnsweredError, Orders, SilentError
 
 T = TypeVar("T")
 
-REQUEST_ID, RESPONSE_ID = 0x650, 0x651
-"""CAN ids of the example node."""
-FILE, INFO, SAMPLE = 0, 1, 2
-"""Address extensions, as triax_xcp.h has them."""
-FLASH_PAGE, RAM_PAGE = 0, 1
-INFO_SIZE, SAMPLE_SIZE = 32, 40
-INFO_VERSION = 1
 BUSY, DONE = 1, 2
 """Status of a store, as triax_store.h has it."""
 ANSWER_S = 0.5

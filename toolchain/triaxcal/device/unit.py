@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.image_parts import ImagePart, image_parts
-from triaxcal.device.link import FILE, FLASH_PAGE, RAM_PAGE, Info, Link
+from triaxcal.device.layout import FILE, FLASH_PAGE, RAM_PAGE
+from triaxcal.device.link import Info, Link
 
 NO_SLOT = 2
 

@@ -3,63 +3,32 @@
 A CHARACTERISTIC for each word of `triax_calib_t`: the temperature range, where each segment starts
 and has its origin, and each coefficient. They stand at SYMBOL_LINK of the constants with their byte
 offset. In a delivery the addresses are 0, and the tool that includes the fragment fills them in;
-with the linked program (`codegen.elf`) they are final. The COMPU_METHODs are linear and give the
-value that the coefficient of x^k stands for: 1/2 for the floor after it and the preloaded half LSB
-of the output are taken off (fixed-point.md).
+with the linked program (`codegen.elf`) they are final, and so they are for a node with
+`firmware_ref/xcp`, which has MEASUREMENTs too.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
-from triaxcal.codegen.constants import function_format
 from triaxcal.codegen.elf import Linked
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.templates import environment
 from triaxcal.delivery.firmware import Firmware
-from triaxcal.fixedpoint.formats import FUNCTION_NAMES
-from triaxcal.fixedpoint.plan import Plan
-from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
-from triaxcal.fixedpoint.rate import RATE_Q
-from triaxcal.model.methods.method import INVERSE
-from triaxcal.model.positions import AXES
-from triaxcal.unit.thermometer import TemperatureSensor
+from triaxcal.device.layout import CHANGE, SAMPLE
+from triaxcal.report.a2l_node import NODE_COMMANDS, measurements, place_of
+from triaxcal.report.a2l_words import Method, Word, calib_words
 
-_WORD = 4
-_HEAD_WORDS, _SEGMENT_HEAD_WORDS = 2, 3
 _LAST_STANDARD = 0x7FF
 """Last CAN identifier of 11 bits."""
+_MARK = 2**31
+"""Set in an identifier of 29 bits."""
 _COMMANDS = {"GET_ID": 250, "SET_MTA": 246, "UPLOAD": 245, "SHORT_UPLOAD": 244, "DOWNLOAD": 240}
 """Commands of XCP that reading and changing the constants takes, by their codes."""
-
-
-@dataclass(frozen=True)
-class Method:
-    """A linear conversion: physical = slope * integer + intercept."""
-
-    name: str
-    text: str
-    unit: str
-    slope: float
-    intercept: float
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """Physical values of the ends of int32, rising."""
-        ends = [self.slope * v + self.intercept for v in (-(2.0**31), 2.0**31 - 1.0)]
-        return min(ends), max(ends)
-
-
-@dataclass(frozen=True)
-class Word:
-    """One int32 of `triax_calib_t`."""
-
-    name: str
-    text: str
-    offset: int
-    method: Method
+_ADJUST = "byte order and alignment of the target: adjust to it"
 
 
 @dataclass(frozen=True)
@@ -69,7 +38,8 @@ class XcpOnCan:
     Attributes
     ----------
     master, slave : int
-        CAN identifiers of commands and of answers; above 0x7FF they are extended ones.
+        CAN identifiers of commands and of answers; above 0x7FF, or with bit 31, they are
+        extended ones.
     bitrate : int or None
         Of the bus, in bit/s; None is not stated.
     """
@@ -88,7 +58,7 @@ class XcpOnCan:
             For what is no identifier, the same one twice, or no bit rate.
         """
         ids = self.master, self.slave
-        for wrong in (i for i in ids if not 0 <= i < 2**29):
+        for wrong in (i for i in ids if i & ~_MARK not in range(2**29)):
             raise RefusedError("CAN identifier", f"found {wrong}", expected="0 to 0x1FFFFFFF")
         if self.master == self.slave:
             raise RefusedError(
@@ -98,7 +68,7 @@ class XcpOnCan:
             raise RefusedError(
                 "bitrate", f"found {self.bitrate} bit/s", expected="1000 to 1000000, as CAN has"
             )
-        master, slave = (i if i <= _LAST_STANDARD else i | 2**31 for i in ids)
+        master, slave = (i if i <= _LAST_STANDARD else i | _MARK for i in ids)
         return {"master": master, "slave": slave, "bitrate": self.bitrate}
 
 
@@ -109,107 +79,56 @@ def calib_a2l(
 
     `linked` are the constants in a program; without it the addresses are 0.
     """
-    words, names = calib_words(firmware), names_of(firmware.plan)
-    provenance = firmware.provenance
     little = linked is None or linked.little_endian
+    text = "byte order of the linked program"
     context = {
+        "symbol": linked.symbol if linked else f"{names_of(firmware.plan).linked}_calib_constants",
+        "place": linked,
+        "epk_address": linked.epk_address if linked else None,
+        "byte_order": "MSB_LAST" if little else "MSB_FIRST",
+        "byte_order_text": text if linked else _ADJUST,
+        "commands": _COMMANDS,
+        "node": None,
+    }
+    return _rendered(firmware, calib_words(firmware), [], context, xcp)
+
+
+def node_a2l(firmware: Firmware, xcp: XcpOnCan) -> bytes:
+    """Text of the file for a node with `firmware_ref/xcp`: what its addresses are is known."""
+    signals, methods = measurements(firmware)
+    context = {
+        "symbol": "constants in triax_calib.bin",
+        "place": place_of(firmware.plan),
+        "epk_address": None,
+        "byte_order": "MSB_LAST",
+        "byte_order_text": "as the node has it, whatever its core",
+        "commands": NODE_COMMANDS,
+        "node": {
+            "measurements": signals,
+            "change_extension": CHANGE,
+            "sample_extension": SAMPLE,
+        },
+    }
+    return _rendered(firmware, calib_words(firmware), methods, context, xcp)
+
+
+def _rendered(
+    firmware: Firmware,
+    words: list[Word],
+    methods: list[Method],
+    context: dict[str, Any],
+    xcp: XcpOnCan | None,
+) -> bytes:
+    provenance = firmware.provenance
+    shared = {
         "version": __version__,
         "inputs": provenance.inputs_sha256[:16],
         "serial": provenance.serial,
         "epk": provenance.epk,
-        "TRIAD": names.triad.upper(),
-        "symbol": linked.symbol if linked else f"{names.linked}_calib_constants",
+        "TRIAD": names_of(firmware.plan).triad.upper(),
         "words": words,
-        "methods": list({w.method.name: w.method for w in words}.values()),
-        "linked": linked,
-        "byte_order": "MSB_LAST" if little else "MSB_FIRST",
+        "methods": list({m.name: m for m in [*(w.method for w in words), *methods]}.values()),
         "xcp": xcp.context if xcp else None,
-        "commands": _COMMANDS,
     }
-    return environment().get_template("a2l/triax_calib.a2l.j2").render(context).encode()
-
-
-def calib_words(firmware: Firmware) -> list[Word]:
-    """Every adjustable word of the constants; the gains of x, which fix formats, are none."""
-    prefix = names_of(firmware.plan).triad.upper()
-    return [
-        replace(
-            word,
-            name=f"{prefix}_{word.name}",
-            method=replace(word.method, name=f"{prefix}_{word.method.name}"),
-        )
-        for word in _words(firmware.plan, firmware.fitted.unit.temperature_sensor)
-    ]
-
-
-def _words(plan: Plan, sensor: TemperatureSensor) -> list[Word]:
-    """The same, without the prefix of the names."""
-    temperature = Method(
-        "TEMPERATURE", "temperature code", "degC", sensor.degc_per_code, sensor.degc_at_zero
-    )
-    words = [
-        Word("temp_min", "lowest temperature of the range", 0, temperature),
-        Word("temp_max", "highest temperature of the range", _WORD, temperature),
-    ]
-    order = plan.shape.order
-    size = _SEGMENT_HEAD_WORDS + 12 * (order + 1)
-    for s in range(len(plan.segments)):
-        base = _HEAD_WORDS + s * size
-        first, origin = f"s{s}_first", f"s{s}_origin"
-        words.append(Word(first, f"first temperature of segment {s}", base * _WORD, temperature))
-        words.append(
-            Word(origin, f"temperature of segment {s} where x = 0", (base + 1) * _WORD, temperature)
-        )
-        for f in range(12):
-            at = base + _SEGMENT_HEAD_WORDS + f * (order + 1)
-            words += [_coefficient(plan, s, f, k, (at + k) * _WORD) for k in range(order + 1)]
-    return words + _terms(plan, sensor, (_HEAD_WORDS + len(plan.segments) * size) * _WORD)
-
-
-def _terms(plan: Plan, sensor: TemperatureSensor, offset: int) -> list[Word]:
-    """Words of quadratic terms and of a term in dT/dt, which stand behind the segments."""
-    words = []
-    if plan.quadratic is not None:
-        log2 = quadratic_log2(plan.shape.output_q, plan.shape.output_shift - 32)
-        method = Method("QUADRATIC", "quadratic term", "g/g^2", 2.0**-log2, 0.0)
-        for name in QUADRATIC_NAMES:
-            words.append(Word(f"{name}", f"{name}, quadratic term", offset, method))
-            offset += _WORD
-    if plan.rate is not None:
-        step = sensor.degc_per_code * 2.0**-RATE_Q
-        fraction = plan.shape.output_q + plan.shape.output_shift - 32
-        lsb = plan.rate.gain / step * 2.0 ** -(fraction + 32)
-        of_range = Method("RATE_RANGE", "rate of temperature", "K/s", step, 0.0)
-        of_offset = Method("RATE_OFFSET", "offset for dT/dt", "g/(K/s)", lsb, 0.0)
-        words += [
-            Word("rate_min", "lowest rate of the range", offset, of_range),
-            Word("rate_max", "highest rate of the range", offset + _WORD, of_range),
-        ]
-        # The gain, which fixes a format, stands between.
-        words += [
-            Word(f"r{axis}", f"offset of {axis} for dT/dt", offset + (3 + i) * _WORD, of_offset)
-            for i, axis in enumerate(AXES)
-        ]
-    return words
-
-
-def _coefficient(plan: Plan, segment: int, function: int, power: int, offset: int) -> Word:
-    name = FUNCTION_NAMES[plan.shape.form][function]
-    return Word(
-        f"s{segment}_{name}_{power}",
-        f"{name}, coefficient of x^{power} in segment {segment}",
-        offset,
-        _method(plan, function, power),
-    )
-
-
-def _method(plan: Plan, function: int, power: int) -> Method:
-    unit, lsb, _ = function_format(plan, function)
-    is_offset = function % 4 == 3
-    slope = lsb / 2.0**power
-    centre = 0.5 if power < plan.shape.order else 0.0
-    if is_offset and power == 0 and plan.shape.form != INVERSE:
-        centre += plan.shape.rounding_in_offset
-    kind = "OFFSET" if is_offset else "GAIN"
-    text = f"coefficient of x^{power}"
-    return Method(f"{kind}_{power}", text, unit, slope, -centre * slope)
+    template = environment().get_template("a2l/triax_calib.a2l.j2")
+    return template.render(shared | context).encode()
