@@ -24,6 +24,7 @@ from triaxcal.keytable.reference import reference_markdown
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
 from triaxcal.readings.format import FORMATS, Format
+from triaxcal.rig.instrument import DRIVERS
 from triaxcal.rig.source import SOURCES
 
 DOCS = Path(__file__).parent.parent
@@ -69,6 +70,11 @@ def _sources() -> str:
     return _table(("`--bus`", "where the frames come from"), rows)
 
 
+def _drivers() -> str:
+    rows = ((f'`"{e.name}"`', e.doc, ", ".join(f"`{n}`" for n in e.needs)) for e in DRIVERS)
+    return _table(("`driver`", "what it speaks", "keys that it needs"), rows)
+
+
 def _commands() -> str:
     """The help of every command, as a terminal of 80 columns shows it."""
     names = [name for section in SECTIONS.values() for name in section]
@@ -106,6 +112,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "methods": lambda: _named(METHODS),
     "functions": lambda: _named(THERMAL_FUNCTIONS),
     "sources": _sources,
+    "drivers": _drivers,
     "commands": _commands,
     "causes": lambda: _causes(CAUSES),
     "pose-causes": lambda: _causes(POSE_CAUSES),

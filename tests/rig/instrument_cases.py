@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rig_cases import BENCH, SHORT_PLAN, bench_unit, dbc
 
-from triaxcal.rig.engine import Setup
+from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.plan import SessionPlan, read_plan
 
 SIMULATED = f"{Path(__file__).parent / 'instruments.yaml'}@sim"
@@ -69,3 +69,18 @@ def modbus_server(registers: list[int]):
         loop.call_soon_threadsafe(loop.stop)
         thread.join(20)
         loop.close()
+
+
+def walk(setup: Setup, rig, attendant, limit_s=4000, each=lambda: None):
+    """Walk the plan without a person; events, and what attendant said with the second."""
+    engine, events, said = Engine(setup, "test"), [], []
+    while not engine.session.done:
+        assert rig.seconds < limit_s, f"not done after {limit_s} s: {said[-3:]}"
+        new = engine.feed(rig.advance())
+        each()
+        events += new
+        try:
+            attendant.act(engine.session, new)
+        finally:
+            said += [(rig.seconds, text) for text in attendant.notes()]
+    return engine, events, said

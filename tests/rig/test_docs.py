@@ -21,6 +21,18 @@ def test_the_plan_of_the_page_is_read(tmp_path):
     assert [step.temp_degc for step in plan.steps] == [-40, -10, 20, 45, 70]
 
 
+def test_the_plans_of_the_unattended_page_are_read(tmp_path):
+    page = (REPO / "docs/how-to/unattended.md").read_text(encoding="utf-8")
+    whole, *tables = [part.split("```")[0] for part in page.split("```toml\n")[1:]]
+    first = whole[: whole.index("[chamber]")]
+    path = tmp_path / "plan.toml"
+    for text in (whole, *(first + table for table in tables)):
+        path.write_text(text, encoding="utf-8")
+        plan = read_plan(path, read_unit(REPO / "units/AT-SIM-BENCH"))
+        assert plan.equipment.chamber_by.readable
+    assert len(tables) == 2
+
+
 def test_every_command_is_named():
     assert isinstance(rig, Group)
     assert [name for name in rig.commands if f"rig {name}" not in PAGE] == []

@@ -51,7 +51,7 @@ def test_any_command_line_sets_and_reads(tmp_path):
     chamber = chamber_of(plan)
     chamber.write(plan.equipment.chamber.order(-12.5))
     assert state.read_text() == "-12.50"
-    assert chamber.readable
+    assert plan.equipment.chamber_by.readable
     assert chamber.read() == (-12.5,)
 
 
@@ -313,8 +313,6 @@ def test_a_driver_added_at_run_time_is_read_and_explained(tmp_path):
     told = []
 
     class Toy:
-        readable = False
-
         def write(self, order):
             told.append(order.numbers)
 

@@ -15,6 +15,7 @@ from triaxcal.cli.rig_options import (
     PLAIN,
     SECONDS,
     SESSIONS,
+    UNATTENDED,
     BusChoice,
     bus_options,
     open_source,
@@ -45,7 +46,8 @@ def rig() -> None:
 @bus_options
 @SESSIONS
 @PLAIN
-def run(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool) -> None:
+@UNATTENDED
+def run(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool, unattended: bool) -> None:
     """Guide a session through the plan.
 
     It ends with measurements.csv in the unit's folder.
@@ -54,7 +56,7 @@ def run(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool) -> Non
     from triaxcal.rig.recording import next_folder  # noqa: PLC0415
 
     source = open_source(setup, bus)
-    guide(setup, source, next_folder(sessions or setup.folder / "sessions"), plain)
+    guide(setup, source, next_folder(sessions or setup.folder / "sessions"), plain, unattended)
 
 
 @rig.command(epilog=example("triaxcal rig resume --bus can0 --unit AT-7"))
@@ -65,13 +67,22 @@ def run(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool) -> Non
 @click.option(
     "--mend", is_flag=True, help="Go on from what is whole of a damaged journal, without asking."
 )
-def resume(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool, mend: bool) -> None:
+@UNATTENDED
+def resume(
+    setup: Setup,
+    bus: BusChoice,
+    sessions: Path | None,
+    *,
+    plain: bool,
+    mend: bool,
+    unattended: bool,
+) -> None:
     """Go on with the last session, whatever ended it."""
     from triaxcal.cli.rig_live import guide  # noqa: PLC0415
 
     folder = _last_session(sessions or setup.folder / "sessions")
     _mend(setup, folder, mend)
-    guide(setup, open_source(setup, bus), folder, plain)
+    guide(setup, open_source(setup, bus), folder, plain, unattended)
 
 
 def _mend(setup: Setup, folder: Path, agreed: bool) -> None:

@@ -11,6 +11,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -18,11 +19,13 @@ from rich.console import Console
 from rich.live import Live
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.cli.rig_hands import hands_of
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.rig import recording, replay, runner, store
-from triaxcal.rig.canbus import Bus, SimulatedSource, messages_of
+from triaxcal.rig.canbus import Bus, messages_of
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.events import Agree, Command, Redo
+from triaxcal.rig.forecast import duration
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.rawlog import LogState
 from triaxcal.rig.screen import BusView, plain_status, screen
@@ -80,13 +83,15 @@ class _Keys:
         return words
 
 
-def guide(setup: Setup, source: Source, folder: Path, plain: bool) -> None:
+def guide(
+    setup: Setup, source: Source, folder: Path, plain: bool, unattended: bool = False
+) -> None:
     """Guide a session to its end and write the records."""
     start = time.monotonic()
-    with contextlib.closing(source):
+    with contextlib.closing(source), hands_of(setup, source, unattended) as hands:
         taken = recording.Recording(setup, folder, source.name)
         try:
-            log = _guided(taken, source, plain, start)
+            log = _guided(taken, source, hands, plain, start)
         except (_Stop, KeyboardInterrupt):
             click.echo(f"stopped; go on with: triaxcal rig resume --unit {setup.folder}", err=True)
             sys.exit(1)
@@ -95,7 +100,13 @@ def guide(setup: Setup, source: Source, folder: Path, plain: bool) -> None:
     _write(setup, taken, log)
 
 
-def _guided(taken: recording.Recording, source: Source, plain: bool, start: float) -> LogState:
+def _guided(
+    taken: recording.Recording,
+    source: Source,
+    hands: runner.Hands | None,
+    plain: bool,
+    start: float,
+) -> LogState:
     """Guide a session to its end; the state of its log."""
     if taken.lock.left_by is not None:
         click.echo(f"taken over from {taken.lock.left_by.described}, which has ended")
@@ -106,14 +117,16 @@ def _guided(taken: recording.Recording, source: Source, plain: bool, start: floa
             "dwells kept"
         )
         click.echo(session.last_event)
-    robot = runner.Robot(source.rig) if isinstance(source, SimulatedSource) else None
     keys = _Keys(plain)
     with keys.listening():
-        ticks = runner.live(taken, source, keys.words, robot)
+        ticks = runner.live(taken, source, keys.words, hands)
+        left_s = hands.left_s(taken.engine.session) if hands else None
+        if left_s:
+            click.echo(f"predicted: about {duration(left_s)}")
         if plain:
             _plainly(ticks, taken)
         else:
-            _on_screen(ticks, taken, source)
+            _on_screen(ticks, taken, source, hands)
     taken.log.flush(sync=True)
     return taken.log.state  # reads the log: while it is open
 
@@ -150,17 +163,24 @@ def _plainly(ticks: Iterator[runner.Tick], taken: recording.Recording) -> None:
             before = event.text
         for note in tick.notes:
             click.echo(f"bus: {note}")
+        for text in tick.done:
+            click.echo(text)
     click.echo(plain_status(view(taken.engine.session)))
 
 
-def _on_screen(ticks: Iterator[runner.Tick], taken: recording.Recording, source: Source) -> None:
+def _on_screen(
+    ticks: Iterator[runner.Tick],
+    taken: recording.Recording,
+    source: Source,
+    hands: runner.Hands | None,
+) -> None:
     alarms: deque[tuple[float, str]] = deque(maxlen=8)
     shown = 0.0
     with Live(console=Console(), screen=True, auto_refresh=False) as picture:
         for tick in ticks:
             now = time.monotonic()
             said = [e.text for e in tick.events if e.kind in {"refused", "trouble", "left"}]
-            alarms.extend((now, text) for text in (*said, *tick.notes))
+            alarms.extend((now, text) for text in (*said, *tick.notes, *tick.done))
             if now - shown < _REFRESH_S:
                 continue
             shown = now
@@ -169,7 +189,11 @@ def _on_screen(ticks: Iterator[runner.Tick], taken: recording.Recording, source:
             dropped = source.dropped if isinstance(source, SocketSource) else 0
             bus = BusView(source.name, tick.frames_per_s, tick.bits_per_s, dropped, _BITRATE)
             texts = tuple(text for _, text in alarms)
-            picture.update(screen(view(taken.engine.session), bus, texts), refresh=True)
+            shown_view = view(taken.engine.session)
+            left_s = hands.left_s(taken.engine.session) if hands else None
+            if left_s is not None:
+                shown_view = replace(shown_view, left_s=left_s)
+            picture.update(screen(shown_view, bus, texts), refresh=True)
 
 
 def simulate_on(

@@ -101,6 +101,11 @@ SESSIONS = click.option(
     help="Folder of the unit's sessions; sessions/ in the unit's folder by default.",
 )
 PLAIN = click.option("--plain", is_flag=True, help="One line an event, for logs and CI.")
+UNATTENDED = click.option(
+    "--unattended",
+    is_flag=True,
+    help="Set the chamber and turn the unit by [chamber] and [positioner] of the plan.",
+)
 SECONDS = click.option("--seconds", type=float, help="Stop after this time; by default at Ctrl-C.")
 
 

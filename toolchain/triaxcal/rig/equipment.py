@@ -202,6 +202,11 @@ class Connection:
         """A person does it."""
         return self.driver.name == OPERATOR
 
+    @property
+    def readable(self) -> bool:
+        """It can be asked."""
+        return bool(self.driver.reads and getattr(self.settings, self.driver.reads))
+
 
 @dataclass(frozen=True)
 class Equipment:

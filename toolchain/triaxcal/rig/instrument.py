@@ -40,15 +40,7 @@ class Order:
 
 
 class Instrument(Protocol):
-    """A connection to one instrument; every call ends within the time-out it was opened with.
-
-    Attributes
-    ----------
-    readable : bool
-        It can be asked.
-    """
-
-    readable: bool
+    """A connection to one instrument; every call ends within the time-out it was opened with."""
 
     def write(self, order: Order, /) -> None:
         """Tell it."""
@@ -77,6 +69,8 @@ class Driver:
         Keys that must be given.
     texts : tuple of str
         Keys with names in braces, filled from `Order.words`.
+    reads : str
+        Key without which it cannot be asked; "" for a driver that never can.
     files : tuple of str
         Keys that name a file, from the plan's folder.
     packages : tuple of str
@@ -92,6 +86,7 @@ class Driver:
     open: Callable[[Any, float], Instrument]
     needs: tuple[str, ...] = ()
     texts: tuple[str, ...] = ()
+    reads: str = ""
     files: tuple[str, ...] = ()
     packages: tuple[str, ...] = ()
     rank: int = 100

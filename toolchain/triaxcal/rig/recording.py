@@ -106,6 +106,16 @@ class Recording:
         self.journal.append({"kind": "command", "command": said, **self._place()})
         return [*events, *self._acknowledge(self.engine.command(command, t_ns))]
 
+    def note(self, text: str, t_ns: int) -> None:
+        """Record what was done to chamber and positioner; it decides nothing.
+
+        Raises
+        ------
+        RefusedError
+            When the disk refuses.
+        """
+        self.journal.append({"kind": "note", "text": text, "t_ns": t_ns})
+
     def close(self) -> None:
         """Close log and journal, and let go of the folder.
 

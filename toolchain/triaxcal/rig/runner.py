@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -30,6 +31,8 @@ class Tick:
     ----------
     notes : tuple of str
         About the connection; they change no decision.
+    done : tuple of str
+        What the hands did.
     frames_per_s : float
         By the frames' own times.
     bits_per_s : float
@@ -38,8 +41,22 @@ class Tick:
 
     events: tuple[Event, ...]
     notes: tuple[str, ...]
+    done: tuple[str, ...]
     frames_per_s: float
     bits_per_s: float
+
+
+class Hands(Protocol):
+    """Who sets the chamber and turns the unit where no person does."""
+
+    def act(self, session: Session, events: Sequence[Event], /) -> None:
+        """Do what the session wants; `events` are new."""
+
+    def notes(self) -> list[str]:
+        """What was done since last asked, one line each."""
+
+    def left_s(self, session: Session, /) -> float | None:
+        """Predicted seconds to the end; None where nothing is predicted."""
 
 
 class Robot:
@@ -48,7 +65,7 @@ class Robot:
     def __init__(self, rig: SimulatedRig) -> None:
         self._rig = rig
 
-    def act(self, session: Session) -> None:
+    def act(self, session: Session, _: Sequence[Event] = ()) -> None:
         """Set the chamber, turn the tilter."""
         if session.done:
             return
@@ -58,12 +75,19 @@ class Robot:
         elif session.wanted is not None:
             self._rig.turn_to(session.wanted)
 
+    def notes(self) -> list[str]:
+        """It says nothing."""
+        return []
+
+    def left_s(self, _: Session) -> None:
+        """It predicts nothing."""
+
 
 def live(
     recording: Recording,
     source: Source,
     words: Callable[[], Sequence[Command]],
-    robot: Robot | None = None,
+    hands: Hands | None = None,
 ) -> Iterator[Tick]:
     """Run until the session is done; the caller may stop at any tick.
 
@@ -81,11 +105,17 @@ def live(
         for word in words():
             events += recording.command(word, now_ns)
         recording.log.flush()
-        if robot is not None:
-            robot.act(session)
+        done: list[str] = []
+        if hands is not None:
+            try:
+                hands.act(session, events)
+            finally:
+                done = hands.notes()
+                for text in done:
+                    recording.note(text, now_ns)
         rate, bits = meter.add(frames)
         notes = [*source.notes(), *meter.notes(session)]
-        yield Tick(tuple(events), tuple(notes), rate, bits)
+        yield Tick(tuple(events), tuple(notes), tuple(done), rate, bits)
 
 
 class _Meter:

@@ -25,9 +25,15 @@ KINDS = {
     "serial": "another serial number from then on",
     "status": "value in the status byte",
     "notemp": "no frames of the thermometer",
+    "deaf": "chamber and positioner do not answer",
+    "kelvin": "the chamber answers in kelvin",
+    "runaway": "the chamber goes value K beyond its set point",
+    "halt": "a turn that begins now stops half way",
+    "astray": "a turn that begins now ends in the next position",
 }
 _FORM = re.compile(r"([a-z]+)@([0-9.]+)(?::([0-9.]+))?(?::([0-9.]+))?")
-_DEFAULTS = {"nudge": (10.0, 0.3), "slip": (30.0, 0.0), "creep": (20.0, 20.0), "lose": (50.0, 0.0)}
+_DEFAULTS = {"nudge": (10.0, 0.3), "slip": (30.0, 0.0), "creep": (20.0, 20.0), "lose": (50.0, 0.0),
+             "runaway": (20.0, 3600.0)}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.rig.dbc import RigDbc
+from triaxcal.rig.equipment import POSITIONS
 from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.simframes import FrameMaker, with_frame_faults
@@ -25,6 +27,8 @@ from triaxcal.unit.description import UnitDescription
 EPOCH_NS = 1_700_000_000 * 10**9
 """When simulated sessions begin."""
 _VIBRATION_G = 0.02  # while turning
+_CHAMBER_STEPS = 20
+"""Of a second, for the chamber's equation of motion."""
 _FLICKER_TAU_S = (1.0, 10.0, 100.0)
 
 
@@ -36,6 +40,8 @@ class RigSettings:
     ----------
     chamber_tau_s, unit_tau_s : float
         Time constants of the chamber after its set point and of the unit after the chamber.
+    overshoot : float
+        Of the chamber, as a share of a step of its set point; 0 makes it first-order.
     cycle_k, cycle_s : float
         Amplitude and period of the chamber's cycling.
     flicker_micro_g : float
@@ -48,6 +54,7 @@ class RigSettings:
     start_degc: float = 20.0
     chamber_tau_s: float = 30.0
     unit_tau_s: float = 80.0
+    overshoot: float = 0.0
     cycle_k: float = 0.0
     cycle_s: float = 120.0
     flicker_micro_g: float = 0.0
@@ -81,8 +88,10 @@ class SimulatedRig:
         self._faults = faults
         self._rng = np.random.Generator(np.random.PCG64(settings.seed))
         self._chamber_degc = self._temp_degc = settings.start_degc
+        self._chamber_rate = 0.0
         self._from = truth_force_g(self.position, unit.gravity_g)
         self._turn_at: float | None = None
+        self._turn_share = 1.0
         self._rested_since = -math.inf
         self._flicker_g = np.zeros((3, len(_FLICKER_TAU_S)))
         self._maker = FrameMaker(dbc, plan.layout, self._rate, EPOCH_NS)
@@ -95,13 +104,31 @@ class SimulatedRig:
         """True temperature of the unit."""
         return self._temp_degc
 
+    @property
+    def chamber_degc(self) -> float:
+        """True temperature of the chamber."""
+        return self._chamber_degc
+
+    @property
+    def turning(self) -> bool:
+        """A turn is under way, or has stopped half way."""
+        return self._turn_at is not None
+
+    def active(self, kind: str) -> Fault | None:
+        """Fault of a kind that is in force now."""
+        now = (f for f in self._faults if f.at_s <= self.seconds < f.at_s + f.length_s)
+        return next((f for f in now if f.kind == kind), None)
+
     def turn_to(self, position: str) -> None:
         """Start a turn, unless it is there or on its way."""
-        if position == self.position:
+        if self.active("astray"):
+            position = POSITIONS[(POSITIONS.index(position) + 1) % len(TEST_POSITIONS)]
+        if position == self.position and self._turn_share == 1.0:
             return
         self._from = truth_force_g(self.position, self._unit.gravity_g)
         self.position = position
         self._turn_at = float(self.seconds)
+        self._turn_share = 0.5 if self.active("halt") else 1.0
 
     def advance(self) -> Frames:
         """Frames of the next second."""
@@ -125,11 +152,12 @@ class SimulatedRig:
         end = truth_force_g(self.position, gravity)
         force: FloatArray = np.repeat(end[None], len(t_s), axis=0)
         if self._turn_at is not None:
-            share = np.clip((t_s - self._turn_at) / self.settings.turn_s, 0.0, 1.0)[:, None]
+            share = (t_s - self._turn_at) / self.settings.turn_s
+            share = np.clip(share, 0.0, self._turn_share)[:, None]
             aside = np.roll(end + self._from, 1) + np.array([0.3, 0.2, 0.1])
             path = (1 - share) * self._from + share * end + np.sin(math.pi * share) * aside
             path *= gravity / np.linalg.norm(path, axis=1)[:, None]
-            shaking = (share > 0.0) & (share < 1.0)
+            shaking = (share > 0.0) & (share < self._turn_share)
             path += shaking * _VIBRATION_G * self._rng.standard_normal((len(t_s), 3))
             force = np.where(share < 1.0, path, force)
             if share[-1, 0] >= 1.0:
@@ -159,13 +187,28 @@ class SimulatedRig:
         """True temperature of each sample of this second; chamber and unit go on by it."""
         settings = self.settings
         swing = settings.cycle_k * math.sin(2 * math.pi * self.seconds / settings.cycle_s)
-        chamber_share = -math.expm1(-1.0 / settings.chamber_tau_s)
-        self._chamber_degc += chamber_share * (self.target_degc - self._chamber_degc)
+        runaway = self.active("runaway")
+        self._move_chamber(self.target_degc + (runaway.value if runaway else 0.0))
         before = self._temp_degc
         unit_share = -math.expm1(-1.0 / settings.unit_tau_s)
         self._temp_degc += unit_share * (self._chamber_degc + swing - before)
         share = np.arange(self._rate) / self._rate
         return before + share * (self._temp_degc - before)
+
+    def _move_chamber(self, target_degc: float) -> None:
+        """One second of the chamber: first order, or second order with its overshoot."""
+        tau = self.settings.chamber_tau_s
+        if not self.settings.overshoot:
+            share = -math.expm1(-1.0 / tau)
+            self._chamber_degc += share * (target_degc - self._chamber_degc)
+            return
+        log = math.log(self.settings.overshoot)
+        damping = -log / math.hypot(math.pi, log)
+        for _ in range(_CHAMBER_STEPS):
+            pull = (target_degc - self._chamber_degc) / tau**2
+            pull -= 2.0 * damping / tau * self._chamber_rate
+            self._chamber_rate += pull / _CHAMBER_STEPS
+            self._chamber_degc += self._chamber_rate / _CHAMBER_STEPS
 
     def _codes(self, force: FloatArray, temps: FloatArray, t_s: FloatArray) -> IntArray:
         adc = self._unit.adc

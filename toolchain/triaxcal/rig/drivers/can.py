@@ -55,7 +55,6 @@ class _CanInstrument:
 
         self._settings = settings
         self._timeout_s = timeout_s
-        self.readable = bool(settings.can_read)
         self._messages = _messages(settings)
         fd = any(message.is_fd for message in self._messages.values())
         bus = settings.can_bus
@@ -172,5 +171,6 @@ ENTRY = Driver(
     needs=("can_bus", "can_dbc", "can_set"),
     files=("can_dbc",),
     packages=("can", "cantools"),
+    reads="can_read",
     rank=50,
 )

@@ -36,7 +36,6 @@ class _Commands:
     def __init__(self, settings: _Settings, timeout_s: float) -> None:
         self._settings = settings
         self._timeout_s = timeout_s
-        self.readable = bool(settings.command_read)
 
     def write(self, order: Order) -> None:
         """Run the program that sets."""
@@ -80,5 +79,6 @@ ENTRY = Driver(
     _Commands,
     needs=("command",),
     texts=("command",),
+    reads="command_read",
     rank=20,
 )

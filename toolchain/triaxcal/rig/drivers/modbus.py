@@ -58,7 +58,6 @@ class _Modbus:
 
     def __init__(self, settings: _Settings, timeout_s: float) -> None:
         self._settings = settings
-        self.readable = bool(settings.modbus_read)
         self._client = _client(settings, timeout_s)
         self._type: Any = self._client.DATATYPE[settings.modbus_type.upper()]
         if not self._client.connect():
@@ -136,5 +135,6 @@ ENTRY = Driver(
     _Modbus,
     needs=("modbus_address", "modbus_set"),
     packages=("pymodbus",),
+    reads="modbus_read",
     rank=40,
 )

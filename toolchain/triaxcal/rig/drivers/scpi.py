@@ -44,7 +44,6 @@ class _Scpi:
 
     def __init__(self, settings: _Settings, timeout_s: float) -> None:
         self._settings = settings
-        self.readable = bool(settings.scpi_read)
         self._visa = Visa(
             settings.scpi_resource, settings.scpi_library, settings.scpi_end, timeout_s
         )
@@ -80,5 +79,6 @@ ENTRY = Driver(
     needs=("scpi_resource", "scpi_set"),
     texts=("scpi_set",),
     packages=("pyvisa",),
+    reads="scpi_read",
     rank=30,
 )

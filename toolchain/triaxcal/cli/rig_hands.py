@@ -1,0 +1,55 @@
+"""Who does what a session wants: nobody, the simulated operator, or the instruments of a plan."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import time
+from collections.abc import Iterator
+
+import click
+
+from triaxcal.rig.attendant import Attendant, attendant
+from triaxcal.rig.canbus import SimulatedSource
+from triaxcal.rig.engine import Setup
+from triaxcal.rig.runner import Hands, Robot
+from triaxcal.rig.simhands import simulated_attendant
+from triaxcal.rig.source import Source
+
+
+@contextlib.contextmanager
+def hands_of(setup: Setup, source: Source, unattended: bool) -> Iterator[Hands | None]:
+    """Hands of a session; chamber and positioner are brought to safety however it ends."""
+    rig = source.rig if isinstance(source, SimulatedSource) else None
+    if not unattended:
+        yield Robot(rig) if rig is not None else None
+        return
+    by_plan = not setup.plan.equipment.positioner_by.by_hand
+    if rig is not None and not by_plan:
+        hands = simulated_attendant(setup.plan, rig)
+    elif rig is not None:
+        hands = attendant(setup.plan, lambda: float(rig.seconds), at_once=True)
+    else:
+        hands = attendant(setup.plan, time.monotonic)
+    try:
+        yield hands
+    finally:
+        with _uninterrupted():
+            _end(hands)
+
+
+def _end(hands: Attendant) -> None:
+    for text in (*hands.notes(), *hands.make_safe()):
+        click.echo(text, err=True)
+
+
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """A second Ctrl-C does not keep the chamber hot; the last orders end by their time-outs."""
+    names = [n for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
+    before = {n: signal.signal(getattr(signal, n), signal.SIG_IGN) for n in names}
+    try:
+        yield
+    finally:
+        for name, handler in before.items():
+            signal.signal(getattr(signal, name), handler)

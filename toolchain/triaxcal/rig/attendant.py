@@ -1,0 +1,157 @@
+"""The operator's place in an unattended run: chamber and positioner are told what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.rig.chamberhand import ChamberHand
+from triaxcal.rig.equipment import Connection
+from triaxcal.rig.events import Event
+from triaxcal.rig.forecast import Forecast, duration
+from triaxcal.rig.instrument import Instrument, refuse_missing
+from triaxcal.rig.link import Link
+from triaxcal.rig.phases import Warming
+from triaxcal.rig.plan import SessionPlan
+from triaxcal.rig.session import Session
+from triaxcal.rig.tablehand import TableHand
+from triaxcal.rig.watch import Watch
+
+Open = Callable[[], Instrument]
+
+
+class Attendant:
+    """Walks a plan without a person.
+
+    Parameters
+    ----------
+    clock : callable
+        Seconds from any moment on; those of the readings where the rig is simulated.
+    at_once : bool
+        Instruments are asked in the loop itself: where the time is simulated.
+    """
+
+    def __init__(
+        self,
+        plan: SessionPlan,
+        chamber: tuple[Open, bool] | None,
+        table: tuple[Open, bool],
+        clock: Callable[[], float],
+        at_once: bool = False,
+    ) -> None:
+        equipment = plan.equipment
+        limits = equipment.limits
+        self._plan = plan
+        self._clock = clock
+        self._said: list[str] = []
+        self._watch = Watch(plan)
+        self.forecast = Forecast(plan, equipment.chamber.safe_degc)
+
+        def link(name: str, open_: Open, timeout_s: float, again_s: float) -> Link:
+            return Link(
+                name,
+                open_,
+                timeout_s=timeout_s,
+                again_s=again_s,
+                attempts=limits.attempts,
+                at_once=at_once,
+            )
+
+        own, turns = equipment.chamber, equipment.positioner
+        self._chamber = None
+        if chamber is not None:
+            line = link("chamber", chamber[0], own.timeout_s, own.poll_s)
+            self._chamber = ChamberHand(own, line, chamber[1], self._said.append)
+        line = link("positioner", table[0], turns.timeout_s, turns.poll_s)
+        self._table = TableHand(turns, line, table[1], limits.attempts, self._said.append)
+
+    def act(self, session: Session, events: Sequence[Event]) -> None:
+        """Do what the session wants.
+
+        Raises
+        ------
+        RefusedError
+            When the run cannot go on.
+        """
+        now_s = self._clock()
+        if self.forecast.see(now_s, session, events) and not session.done:
+            self._said.append(f"left: about {duration(self.left_s(session))}")
+        if session.done:
+            return
+        reason = self._watch.look(now_s, session, events, self._table.arrived_s)
+        if reason:
+            raise RefusedError(
+                "unattended run", reason, remedy="what was accepted is kept: `triaxcal rig resume`"
+            )
+        if session.previous is None:
+            return
+        if self._chamber is not None:
+            self._chamber.tend(now_s, session.target_degc, session.temp_degc)
+            rests = any(event.kind == "equilibrium" for event in events)
+            if rests and session.temp_degc is not None:
+                self._chamber.refuse_disagreement(session.temp_degc)
+        if not self._watch.silent(now_s):
+            wanted, away = self._positions(session)
+            self._table.tend(now_s, wanted, away, session.seen)
+
+    def left_s(self, session: Session) -> float:
+        """Predicted seconds to the end."""
+        return self.forecast.left_s(self._clock(), session)
+
+    def notes(self) -> list[str]:
+        """What was done since last asked, one line each."""
+        said = list(self._said)
+        self._said.clear()
+        return said
+
+    def make_safe(self) -> list[str]:
+        """Bring chamber and positioner to where they stay; what was done, one line each."""
+        hands = [hand for hand in (self._chamber, self._table) if hand is not None]
+        return [hand.make_safe() for hand in hands]
+
+    def _positions(self, session: Session) -> tuple[str, str]:
+        """Position to go to, and another one to come from."""
+        wanted = session.wanted
+        if isinstance(session.phase, Warming) and self._table.told is not None:
+            # A position taken up before the temperature has changed would be taken up again.
+            wanted = self._table.told
+        assert wanted is not None
+        others = [p for step in self._plan.steps for p in step.positions if p != wanted]
+        if session.reseat is not None and session.reseat.position == wanted:
+            return others[0], wanted
+        return wanted, others[0]
+
+
+def attendant(plan: SessionPlan, clock: Callable[[], float], at_once: bool = False) -> Attendant:
+    """Attendant that speaks to the instruments of a plan.
+
+    Raises
+    ------
+    RefusedError
+        When the plan leaves to a person what a person must not be needed for, or a package is
+        missing.
+    """
+    equipment = plan.equipment
+    if equipment.positioner_by.by_hand:
+        raise _by_hand(plan, "positioner")
+    if equipment.chamber_by.by_hand and len(plan.steps) > 1:
+        raise _by_hand(plan, "chamber")
+    table = _opened(equipment.positioner_by, equipment.positioner.timeout_s)
+    chamber = None
+    if not equipment.chamber_by.by_hand:
+        chamber = _opened(equipment.chamber_by, equipment.chamber.timeout_s)
+    return Attendant(plan, chamber, table, clock, at_once)
+
+
+def _opened(by: Connection, timeout_s: float) -> tuple[Open, bool]:
+    refuse_missing(by.driver)
+    return lambda: by.driver.open(by.settings, timeout_s), by.readable
+
+
+def _by_hand(plan: SessionPlan, table: str) -> RefusedError:
+    return RefusedError(
+        f"{plan.source}, [{table}] driver",
+        'found "operator"',
+        expected="a driver: --unattended has nobody to do it",
+        remedy=f"name one in [{table}], or run without --unattended",
+    )
