@@ -16,7 +16,8 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.constants import function_format
 from triaxcal.codegen.names import names_of
 from triaxcal.delivery.unit import Delivery
-from triaxcal.report.a2l import calib_a2l, calib_words
+from triaxcal.report.a2l import calib_a2l
+from triaxcal.report.a2l_words import calib_words
 from triaxcal.report.dcc import DCC, SI, certificate_xml
 from triaxcal.report.files import CERTIFICATE, all_files
 from triaxcal.report.passport.content import passport

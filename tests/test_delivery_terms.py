@@ -16,7 +16,7 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, Terms
 from triaxcal.readings.measurements import MeasurementSet
-from triaxcal.report.a2l import calib_words
+from triaxcal.report.a2l_words import calib_words
 from triaxcal.unit.description import UnitDescription
 
 assert EXAMPLE_TERMS.quadratic_per_g is not None

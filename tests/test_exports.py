@@ -146,7 +146,7 @@ def test_costs_are_of_what_is_left_out(delivered: Path, fitted: Fitted, tmp_path
 
 
 def test_betaflight_trims_whole_codes(delivered: Path, fitted: Fitted) -> None:
-    with pytest.raises(RefusedError, match="found 24; expected at most 16: Betaflight"):
+    with pytest.raises(RefusedError, match="raw codes of 24 bits; expected at most 16: Betaflight"):
         TARGETS["betaflight"].make(Source(delivered, fitted))
     narrow = replace(fitted, unit=replace(fitted.unit, adc=whole_adc(16, 2.5)))
     made = TARGETS["betaflight"].make(Source(delivered, narrow))

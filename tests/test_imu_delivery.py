@@ -169,6 +169,7 @@ def test_what_is_written_and_said(ran: Ran) -> None:
     assert names == {
         "calibration.json",
         "dynamic.html",
+        "triax_calib.a2l",
         "verification.json",
         *ran.made.c.build.files,
     }

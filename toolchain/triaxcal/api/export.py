@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.api.calibration import load
+from triaxcal.api.delivered import load_delivered
 from triaxcal.api.delivery import delivered_file
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.publish import renew
+from triaxcal.delivery.fitted import Fitted
 from triaxcal.exports.registry import TARGETS
 from triaxcal.exports.target import Source
 
@@ -42,7 +43,7 @@ def export(
     Parameters
     ----------
     unit : path
-        A unit, a delivered folder, or its calibration.json.
+        A unit or an IMU, a delivered folder, or its calibration.json.
     to : str
         Name of a target, as `triaxcal export --help` lists them.
     into : path or None
@@ -57,14 +58,15 @@ def export(
         hold the calibration.
     """
     target = TARGETS[to]
-    path = delivered_file(Path(unit), Path(build))
-    done = load(path).fitted
-    made = target.make(Source(path.parent, done))
-    folder = Path(into) if into is not None else Path(build) / f"{done.unit.name}-{to}"
+    delivered = delivered_file(Path(unit), Path(build)).parent
+    done = load_delivered(unit, build).fitted
+    made = target.make(Source(delivered, done))
+    name = done.unit.name if isinstance(done, Fitted) else done.name
+    folder = Path(into) if into is not None else Path(build) / f"{name}-{to}"
     if folder.is_file():
         raise RefusedError(str(folder), "a file", expected="a folder")
-    for name, content in made.files.items():
-        place = folder / name
+    for file, content in made.files.items():
+        place = folder / file
         try:
             place.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:

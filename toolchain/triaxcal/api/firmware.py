@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
@@ -17,7 +17,6 @@ from triaxcal.api.calibration import Calibration
 from triaxcal.base.arrays import int32
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import publish, renew
-from triaxcal.codegen.names import names_of
 from triaxcal.codegen.routines import Int32Array, UInt32Array, routines_of, start_generated
 from triaxcal.delivery.firmware import make_firmware
 from triaxcal.delivery.fitted import refuse_beyond_limits
@@ -183,7 +182,7 @@ class Firmware:
         elf: str | Path,
         path: str | Path | None = None,
         *,
-        variable: str | None = None,
+        variables: Sequence[str] = (),
         can_ids: tuple[int, int] | None = None,
         bitrate: int | None = None,
     ) -> Path:
@@ -195,9 +194,9 @@ class Firmware:
             The program as the linker wrote it, with its symbols.
         path : path or None
             File to write; None is triax_calib.a2l beside the program.
-        variable : str or None
-            A `triax_calib_t` that the program loads from an image. None is the constants that
-            triax_calib.c defines; they must be these.
+        variables : sequence of str
+            The `triax_calib_t` that the program loads from an image. Without it the constants are
+            those that triax_calib.c defines; they must be these.
         can_ids : tuple of two int, or None
             CAN identifiers of the XCP commands and of the answers; above 0x7FF they are extended
             ones. None leaves XCP on CAN to the tool.
@@ -210,18 +209,14 @@ class Firmware:
             When the file is no linked program, its constants are not these, or an identifier is
             none.
         """
-        from triaxcal.codegen.elf import linked_constants  # noqa: PLC0415
-        from triaxcal.report.a2l import XcpOnCan, calib_a2l  # noqa: PLC0415
+        from triaxcal.api.a2lfile import write_linked_a2l, xcp_on_can  # noqa: PLC0415
 
-        if can_ids is None and bitrate is not None:
-            raise RefusedError("bitrate", "stated", expected="CAN identifiers as well")
-        xcp = None if can_ids is None else XcpOnCan(*can_ids, bitrate)
-        program = Path(elf)
-        linked = linked_constants(program, self.plan, self._made.provenance.epk, variable)
-        name = names_of(self.plan).file("triax_calib.a2l")
-        target = program.with_name(name) if path is None else Path(path)
-        renew({target.name: calib_a2l(self._made, linked, xcp)}, target.parent)
-        return target
+        sensor = self._made.fitted.unit.temperature_sensor
+        xcp = xcp_on_can(can_ids, bitrate)
+        provenance = self._made.provenance
+        return write_linked_a2l(
+            elf, path, ((self.plan, sensor),), provenance, variables=variables, xcp=xcp
+        )
 
     def write_node_a2l(
         self, path: str | Path, can_ids: tuple[int, int], *, bitrate: int | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -87,6 +88,32 @@ class ImuFirmware:
         """Write the C and the image, all of them or none, into a folder of their own."""
         publish(self.files, Path(folder))
         return tuple(Path(folder) / name for name in self.files)
+
+    def write_a2l(
+        self,
+        elf: str | Path,
+        path: str | Path | None = None,
+        *,
+        variables: Sequence[str] = (),
+        can_ids: tuple[int, int] | None = None,
+        bitrate: int | None = None,
+    ) -> Path:
+        """Write one A2L of the constants of both triads; arguments as `Firmware.write_a2l`.
+
+        `variables` are the two that `triax_imu_calib_load` writes: accelerometer, gyro.
+
+        Raises
+        ------
+        RefusedError
+            As `Firmware.write_a2l`.
+        """
+        from triaxcal.api.a2lfile import write_linked_a2l, xcp_on_can  # noqa: PLC0415
+
+        fitted, build = self.c.fitted, self.build
+        sensor, provenance = fitted.device.temperature_sensor, fitted.provenances[0]
+        triads = ((build.accel, sensor), (build.gyro, sensor))
+        xcp = xcp_on_can(can_ids, bitrate)
+        return write_linked_a2l(elf, path, triads, provenance, variables=variables, xcp=xcp)
 
 
 def firmware_imu(calibration: ImuCalibration, prefix: str | None = None) -> ImuFirmware:

@@ -105,6 +105,7 @@ def read_unit(folder: str | Path) -> Unit:
             f"{path / UNIT_FILE}",
             "a whole IMU, [dynamic]",
             expected="the unit of one accelerometer",
-            remedy=f"run `triaxcal dynamic {path}`; in Python, triaxcal.read_imu",
+            remedy=f"`triaxcal dynamic {path}` says what the recording of an IMU shows; in Python, "
+            "triaxcal.read_imu",
         )
     return Unit.of(read_description(path), path)

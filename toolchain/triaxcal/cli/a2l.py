@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import DELIVERED, HexNumber, UnitFolder, command, example, say
+from triaxcal.cli.options import DELIVERED, PREFIX, HexNumber, UnitFolder, command, example, say
 
 
 @command(
@@ -29,9 +29,13 @@ from triaxcal.cli.options import DELIVERED, HexNumber, UnitFolder, command, exam
     type=click.Path(path_type=Path),
     help="Write this file; default: triax_calib.a2l beside the program.",
 )
+@PREFIX
 @click.option(
     "--variable",
-    help="Variable that the program loads an image into, in place of its linked constants.",
+    "variables",
+    multiple=True,
+    help="Variable that the program loads an image into, in place of its linked constants; of an "
+    "IMU twice, accelerometer first.",
 )
 @click.option(
     "--can-ids",
@@ -46,18 +50,19 @@ def a2l(
     *,
     elf: Path,
     to: Path | None,
-    variable: str | None,
+    prefix: str | None,
+    variables: tuple[str, ...],
     can_ids: tuple[int, int] | None,
     bitrate: int | None,
 ) -> None:
     """Write the A2L of the constants in a linked program.
 
-    UNIT is a unit, whose calibration is in build/UNIT, or a delivered folder. Constants that are
-    linked into the program must be those of the unit. Addresses and byte order are the program's.
+    UNIT is a unit or an IMU, whose calibration is in build/UNIT, or a delivered folder. Constants
+    that are linked into the program must be those of the unit. Addresses and byte order are the
+    program's.
     """
     import triaxcal  # noqa: PLC0415
-    from triaxcal.api.delivery import delivered_file  # noqa: PLC0415
 
-    made = triaxcal.firmware(triaxcal.load(delivered_file(unit, build)))
-    path = made.write_a2l(elf, to, variable=variable, can_ids=can_ids, bitrate=bitrate)
+    made = triaxcal.delivered_firmware(unit, build, prefix)
+    path = made.write_a2l(elf, to, variables=variables, can_ids=can_ids, bitrate=bitrate)
     say(f"{path} written")

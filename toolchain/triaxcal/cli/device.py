@@ -185,11 +185,13 @@ def verify(opener: Opener, unit: Path, samples: int) -> None:
     Result and status of each must be equal bit for bit. The node must have this UNIT's
     calibration in use.
     """
+    from triaxcal.api.unit import read_unit  # noqa: PLC0415
     from triaxcal.codegen.crosscheck import python_routine  # noqa: PLC0415
     from triaxcal.delivery.unit import deliver  # noqa: PLC0415
     from triaxcal.device.compare import compare, take_samples  # noqa: PLC0415
     from triaxcal.device.unit import require_in_use  # noqa: PLC0415
 
+    read_unit(unit)  # refuses an IMU
     delivery = deliver(unit)
     plan = delivery.plan
     if plan.rate is not None:

@@ -186,22 +186,23 @@ def _function_context(plan: Plan, s: int, f: int) -> dict[str, Any]:
 
 def function_format(plan: Plan, f: int) -> tuple[str, float, int]:
     """Physical unit of a function, its last place in that unit, and its Q in `_raw_unit`."""
-    shape = plan.shape
+    shape, reading = plan.shape, plan.reading
     unit = shape.unit
     gain = f % 4 < 3
     if shape.inverse is not None:
         bits = shape.inverse.scale_log2 - shape.output_q - shape.output_shift if gain else 0
-        return (
-            (f"V/({unit})" if gain and shape.gyro else "V/g" if gain else "V"),
-            2.0**-bits * plan.volts_per_lsb,
-            bits,
-        )
+        return (_per(reading, unit) if gain else reading, 2.0**-bits * plan.volts_per_lsb, bits)
     bits = shape.output_q + shape.output_shift - (0 if gain else 32)
     return (
-        (f"({unit})/V" if gain and shape.gyro else "g/V" if gain else unit),
+        _per(unit, reading) if gain else unit,
         2.0**-bits / (plan.volts_per_lsb if gain else 1.0),
         bits,
     )
+
+
+def _per(unit: str, by: str) -> str:
+    """A unit by another: m/s^2 by g is (m/s^2)/g."""
+    return "/".join(f"({name})" if "/" in name else name for name in (unit, by))
 
 
 def _raw_unit(plan: Plan, f: int) -> str:

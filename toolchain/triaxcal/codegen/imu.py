@@ -86,8 +86,8 @@ def build_imu(
     RefusedError
         When no format holds, a check fails or the compiler is missing.
     """
-    accel = make_plan(imu.accel, triads[0])
-    gyro = make_gyro_plan(imu, triads[1], accel.shape.output_q)
+    accel = replace(make_plan(imu.accel, triads[0]), reading="g")
+    gyro = replace(make_gyro_plan(imu, triads[1], accel.shape.output_q), reading="rad/s")
     files = render_imu(accel, gyro, triads, provenances)
     bounds = prove(accel), prove(gyro)
     with tempfile.TemporaryDirectory(prefix="triaxcal-imu-") as name:

@@ -143,7 +143,7 @@ def make_firmware(fitted: Fitted) -> Firmware:
     """
     unit, calibration = fitted.unit, fitted.calibration
     compensation = compensation_of(unit, calibration, unit.method)
-    plan = make_plan(compensation, unit)
+    plan = replace(make_plan(compensation, unit), reading=calibration.reading_unit)
     error_g = model_error_g(unit, calibration.thermal, plan)
     _refuse_model_error(unit, plan, error_g)
     return Firmware(fitted, compensation, plan, error_g)
@@ -196,7 +196,7 @@ def _reading_note(unit: UnitDescription, calibration: Calibration) -> tuple[str,
     if reading == "V":
         return tuple(columns)
     code = f"{unit.adc.volts_per_code:.9g} {reading}"
-    return (*columns, f"raw code = reading / {code}; V below stands for {reading}")
+    return (*columns, f"raw code = reading / {code}")
 
 
 def _constants_at_t0(calibration: Calibration) -> list[str]:

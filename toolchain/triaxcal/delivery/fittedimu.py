@@ -106,7 +106,6 @@ def saved_for_c(done: DynamicUnit, device: Device) -> SavedForC:
         f"accelerometer code: {accel.bits} bits for {accel.full_scale_v:.9g} g full scale",
         f"gyro code: {gyro.bits} bits for {gyro_deg_per_s:.9g} deg/s full scale",
         *turned_columns(done.unit),
-        "V below stands for g in the accelerometer, for rad/s in the gyro",
         *(f"not corrected: {title}" for title in left_out(done.result.layout)),
         f"verdict of the filter: {verdict(done.result)}",
         "not tested: nothing was held out, and no limit is stated for an IMU",

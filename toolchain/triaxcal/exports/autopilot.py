@@ -9,6 +9,9 @@ With U = K(T) f + U0(T) and r = c U, the error of axis i for a force f is
 Over forces of one size in all directions the mean square of the first two terms is least for
 s = <K_ii> / (c <|K_i|^2>), <> being the mean over the working range. d is the least-squares
 polynomial of c U0_i over the range.
+
+A gyro has no scale factor, s = 1: w_i = r_i - d_i(T), and nothing for the g-sensitivity G, with
+U = K(T) (w + G f) + U0(T).
 """
 
 from __future__ import annotations
@@ -17,19 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.delivery.fitted import Fitted
-from triaxcal.fitting.tilter.acceptance import dwells_in_range
+from triaxcal.exports.triad import Gyro, Triad, directions
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
-from triaxcal.model.positions import CHECK_POSITIONS
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
-_GRID = 257
-_IN_M_PER_S2 = {
-    "m/s^2": 1.0,
-    "g": STANDARD_GRAVITY_M_PER_S2,
-    "mg": STANDARD_GRAVITY_M_PER_S2 * 1e-3,
-}
+TURNING_DEG_PER_S = 100.0
+"""Rate at which the cost of a gyro's model is stated."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +36,11 @@ class AxisModel:
     Attributes
     ----------
     per_reading : array, shape (3,)
-        c: m/s^2 of one unit of the readings, with its sign. The driver multiplies by it.
+        c: m/s^2 or rad/s of one unit of the readings, with its sign. The driver multiplies by it.
     scale : array, shape (3,)
         s.
     offset : array, shape (order + 1, 3)
-        Of d in m/s^2, by powers of T - reference_degc, the constant first.
+        Of d in m/s^2 or rad/s, by powers of T - reference_degc, the constant first.
     reference_degc : float
     range_degc : tuple of two floats
         Temperatures outside are clamped.
@@ -56,7 +53,7 @@ class AxisModel:
     range_degc: tuple[float, float]
 
     def offset_at(self, temp_degc: FloatArray | float) -> FloatArray:
-        """d (..., 3) in m/s^2 at temperatures of shape (...)."""
+        """d (..., 3) in m/s^2 or rad/s at temperatures of shape (...)."""
         delta = np.clip(temp_degc, *self.range_degc) - self.reference_degc
         powers = np.asarray(delta)[..., None] ** np.arange(len(self.offset))
         result: FloatArray = powers @ self.offset
@@ -79,49 +76,45 @@ class Loss:
     component_largest_g: float
 
 
-def fit_axis_model(fitted: Fitted, reference_degc: float, order: int) -> AxisModel:
+@dataclass(frozen=True)
+class GyroLoss:
+    """A model of a gyro: its largest error of a component at rest, under 1 g, and while turning."""
+
+    what: str
+    at_rest_rad_per_s: float
+    turning_rad_per_s: float
+
+
+def fit_axis_model(triad: Triad, reference_degc: float, order: int) -> AxisModel:
     """The model of an autopilot that fits best over the working range, all directions alike."""
-    temps, K, U0 = _over_range(fitted)
-    per_reading = nominal_m_per_s2(fitted)
+    _, K, _ = triad.over_range()
     diagonal = np.einsum("tii->ti", K).mean(axis=0)
-    scale = diagonal / (K**2).sum(axis=2).mean(axis=0) * STANDARD_GRAVITY_M_PER_S2 / per_reading
+    scale = diagonal / (K**2).sum(axis=2).mean(axis=0) * STANDARD_GRAVITY_M_PER_S2
+    return _with_offset(triad, scale / triad.per_reading, reference_degc, order)
+
+
+def fit_gyro_offset(triad: Triad, reference_degc: float, order: int) -> AxisModel:
+    """The same of a gyro, which has no scale factor."""
+    return _with_offset(triad, np.ones(3), reference_degc, order)
+
+
+def _with_offset(triad: Triad, scale: FloatArray, reference_degc: float, order: int) -> AxisModel:
+    temps, _, U0 = triad.over_range()
     order = order if temps[-1] > temps[0] else 0
     powers = (temps - reference_degc)[:, None] ** np.arange(order + 1)
-    offset: FloatArray = np.linalg.lstsq(powers, U0 * per_reading, rcond=None)[0].astype(np.float64)
-    return AxisModel(per_reading, scale, offset, reference_degc, fitted.calibration.range_degc)
+    bias = U0 * triad.per_reading
+    middle = bias[len(bias) // 2]  # off it, a constant bias has coefficients of exactly 0
+    offset: FloatArray = np.linalg.lstsq(powers, bias - middle, rcond=None)[0].astype(np.float64)
+    offset[0] += middle
+    return AxisModel(triad.per_reading, scale, offset, reference_degc, triad.range_degc)
 
 
-def nominal_m_per_s2(fitted: Fitted) -> FloatArray:
-    """m/s^2 of one unit of the readings, (3,): by their unit, or a nominal sensitivity.
-
-    Where unit.toml states none, it is the mean size of the three at T0, with their signs.
-    """
-    unit, calibration = fitted.unit, fitted.calibration
-    known = _IN_M_PER_S2.get(calibration.reading_unit)
-    if known is not None:
-        return np.full(3, known)
-    nominal = unit.nominal_v_per_g
-    if nominal is None:
-        K, _ = unpack_constants(calibration.thermal.constants_at(unit.t0_degc))
-        diagonal = np.diag(K)
-        nominal = tuple(np.sign(diagonal) * np.abs(diagonal).mean())
-    return STANDARD_GRAVITY_M_PER_S2 / np.array(nominal)
-
-
-def losses(fitted: Fitted, model: AxisModel, label: str) -> tuple[str, tuple[Loss, ...]]:
-    """Which dwells they are, and what each simplification costs there."""
-    unit, calibration = fitted.unit, fitted.calibration
-    inside = dwells_in_range(unit, calibration.range_degc, fitted.measurements)
-    checks = [d for d in inside if d.position in CHECK_POSITIONS]
-    dwells = checks or inside
-    readings = np.array([d.voltage_v for d in dwells])
-    temps = np.array([d.temp_degc for d in dwells])
-    constants = calibration.thermal.constants_at(temps)
-    K, U0 = unpack_constants(constants)
-    full = calibration.terms.force_g(
-        force_from_voltage(constants, readings), np.array([d.rate_k_per_s for d in dwells])
-    )
-    _, over_range, _ = _over_range(fitted)
+def losses(triad: Triad, model: AxisModel, label: str) -> tuple[Loss, ...]:
+    """What each simplification costs at the triad's samples."""
+    samples = triad.samples
+    readings, temps, full = samples.readings, samples.temps_degc, samples.full
+    K, U0 = unpack_constants(triad.thermal.constants_at(temps))
+    _, over_range, _ = triad.over_range()
     alone = np.einsum("tii->ti", K) / (K**2).sum(axis=2)
     constant = np.linalg.solve(over_range.mean(axis=0), (readings - U0).T).T
     per_g = model.per_reading * model.scale / STANDARD_GRAVITY_M_PER_S2
@@ -130,12 +123,38 @@ def losses(fitted: Fitted, model: AxisModel, label: str) -> tuple[str, tuple[Los
         ("the fitted model", full),
         ("without cross terms", (readings - U0) * alone),
         ("K constant over temperature", constant),
-        (f"bias of order {len(model.offset) - 1}", force_from_voltage(_with(K, bias), readings)),
+        (_bias_words(model), force_from_voltage(_with(K, bias), readings)),
         (f"all of this: {label}", (readings - bias) * per_g),
     )
-    rows = tuple(_loss(what, force, full, unit.gravity_g) for what, force in found)
-    where = "check dwells, which were not fitted" if checks else "dwells of the fit: none held out"
-    return f"{len(dwells)} {where}", rows
+    return tuple(_loss(what, force, full, triad.gravity_g) for what, force in found)
+
+
+def gyro_losses(gyro: Gyro, model: AxisModel, label: str) -> tuple[GyroLoss, ...]:
+    """What each simplification of a gyro costs: under 1 g, and at `TURNING_DEG_PER_S`."""
+    triad, G = gyro.triad, gyro.g_sensitivity
+    temps = triad.samples.temps_degc
+    unit = np.tile(directions(), (len(temps) // 26, 1))
+    K, U0 = unpack_constants(triad.thermal.constants_at(temps))
+    turning = np.deg2rad(TURNING_DEG_PER_S) * unit
+    bias = U0 * triad.per_reading - model.offset_at(temps)
+    by_force = unit @ G.T
+    by_turning = np.einsum("nij,nj->ni", K, turning) * triad.per_reading - turning
+    force_read = np.einsum("nij,nj->ni", K, by_force) * triad.per_reading
+    none = np.zeros_like(unit)
+    found = (
+        ("without g-sensitivity", by_force, none),
+        ("without scale factors and cross terms", none, by_turning),
+        (_bias_words(model), bias, bias),
+        (f"all of this: {label}", bias + force_read, bias + by_turning),
+    )
+    return tuple(
+        GyroLoss(what, float(np.abs(rest).max()), float(np.abs(turned).max()))
+        for what, rest, turned in found
+    )
+
+
+def _bias_words(model: AxisModel) -> str:
+    return f"bias of order {len(model.offset) - 1}"
 
 
 def _with(K: FloatArray, U0: FloatArray) -> FloatArray:
@@ -146,11 +165,3 @@ def _loss(what: str, force: FloatArray, full: FloatArray, gravity_g: float) -> L
     error = np.linalg.norm(force, axis=1) - gravity_g
     largest = float(np.abs(force - full).max())
     return Loss(what, float(np.abs(error).max()), float(np.sqrt((error**2).mean())), largest)
-
-
-def _over_range(fitted: Fitted) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Temperatures (t,), K (t, 3, 3) and U0 (t, 3) evenly over the working range."""
-    calibration = fitted.calibration
-    temps = np.linspace(*calibration.range_degc, _GRID)
-    K, U0 = unpack_constants(calibration.thermal.constants_at(temps))
-    return temps, K, U0

@@ -10,6 +10,9 @@ from triaxcal.base.shipped import shipped
 from triaxcal.codegen.templates import environment
 from triaxcal.exports.target import Exported, Source
 
+_TO_INCLUDE = ("_calib.h", "_imu.h")
+"""What a program includes: the constants, and of an IMU the call for both triads."""
+
 
 def layout(source: Source, name: str, sources: str = "src", headers: str = "include") -> Exported:
     """The C of a delivery in the layout of a build system.
@@ -31,7 +34,9 @@ def layout(source: Source, name: str, sources: str = "src", headers: str = "incl
         "prefix": prefix,
         "PREFIX": prefix.upper(),
         "version": __version__.split(".dev", maxsplit=1)[0],
-        "serial": source.fitted.unit.serial,
+        "serial": source.serial,
+        "sensor": source.sensor,
+        "headers": [name for name in delivered if name.endswith(_TO_INCLUDE)],
         "sources": sorted(p for p in files if p.endswith(".c")),
         "link_names": _link_names(delivered),
     }

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import Fitted
+from triaxcal.delivery.fittedimu import FittedImu
+from triaxcal.exports.triad import Gyro, Triad, triad_of, triads_of
 
 
 @dataclass(frozen=True)
@@ -20,12 +22,28 @@ class Source:
     ----------
     folder : Path
         With the C and verification.json.
-    fitted : Fitted
-        The fit in its calibration.json.
+    fitted : Fitted or FittedImu
+        The calibration in its calibration.json.
     """
 
     folder: Path
-    fitted: Fitted
+    fitted: Fitted | FittedImu
+
+    @property
+    def serial(self) -> str:
+        """Serial number."""
+        return self.fitted.serial if isinstance(self.fitted, FittedImu) else self.fitted.unit.serial
+
+    @property
+    def sensor(self) -> str:
+        """What it is, in words."""
+        return "IMU" if isinstance(self.fitted, FittedImu) else "accelerometer"
+
+    def triads(self) -> tuple[Triad, Gyro | None]:
+        """The accelerometer, and the gyro of an IMU."""
+        if isinstance(self.fitted, FittedImu):
+            return triads_of(self.fitted)
+        return triad_of(self.fitted), None
 
     def c_files(self) -> dict[str, bytes]:
         """Name and content of the C and the image, which are those that were checked.

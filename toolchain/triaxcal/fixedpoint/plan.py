@@ -75,6 +75,8 @@ class Plan:
         The term in dT/dt.
     prefix : str
         What the names in its C begin with.
+    reading : str
+        Unit of the readings, which the names of variables call volts.
     """
 
     shape: Shape
@@ -90,6 +92,7 @@ class Plan:
     force_q: int = 0
     rate: RatePlan | None = None
     prefix: str = DEFAULT_PREFIX
+    reading: str = "V"
 
     @property
     def temp_codes(self) -> IntArray:

@@ -4,23 +4,27 @@ A CHARACTERISTIC for each word of `triax_calib_t`: the temperature range, where 
 and has its origin, and each coefficient. They stand at SYMBOL_LINK of the constants with their byte
 offset. In a delivery the addresses are 0, and the tool that includes the fragment fills them in;
 with the linked program (`codegen.elf`) they are final, and so they are for a node with
-`firmware_ref/xcp`, which has MEASUREMENTs too.
+`firmware_ref/xcp`, which has MEASUREMENTs too. Of an IMU one file has both triads.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.constants import Provenance
 from triaxcal.codegen.elf import Linked
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.templates import environment
 from triaxcal.delivery.firmware import Firmware
 from triaxcal.device.layout import CHANGE, SAMPLE
-from triaxcal.report.a2l_node import NODE_COMMANDS, measurements, place_of
-from triaxcal.report.a2l_words import Method, Word, calib_words
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.report.a2l_node import NODE_COMMANDS, Place, measurements, place_of
+from triaxcal.report.a2l_words import Method, Word, plan_words
+from triaxcal.unit.thermometer import TemperatureSensor
 
 _LAST_STANDARD = 0x7FF
 """Last CAN identifier of 11 bits."""
@@ -72,33 +76,71 @@ class XcpOnCan:
         return {"master": master, "slave": slave, "bitrate": self.bitrate}
 
 
+@dataclass(frozen=True)
+class Triad:
+    """Constants of one triad as a tool sees them.
+
+    Attributes
+    ----------
+    plan : Plan
+    sensor : TemperatureSensor
+    place : Linked, Place or None
+        Where they stand in a program or a node; None leaves the addresses 0.
+    """
+
+    plan: Plan
+    sensor: TemperatureSensor
+    place: Linked | Place | None = None
+
+    @property
+    def words(self) -> list[Word]:
+        """What a tool may change."""
+        return plan_words(self.plan, self.sensor)
+
+    @property
+    def name(self) -> str:
+        """What every name in the file begins with."""
+        return names_of(self.plan).triad.upper()
+
+    @property
+    def symbol(self) -> str:
+        """Name of the constants."""
+        if isinstance(self.place, Place):
+            return "constants in triax_calib.bin"
+        own = f"{names_of(self.plan).linked}_calib_constants"
+        return self.place.symbol if self.place else own
+
+
 def calib_a2l(
     firmware: Firmware, linked: Linked | None = None, xcp: XcpOnCan | None = None
 ) -> bytes:
-    """Text of the fragment: a project with one module.
+    """Text of the file of a unit; `linked` are its constants in a program."""
+    triad = Triad(firmware.plan, firmware.fitted.unit.temperature_sensor, linked)
+    return linked_a2l((triad,), firmware.provenance, xcp)
 
-    `linked` are the constants in a program; without it the addresses are 0.
-    """
+
+def linked_a2l(
+    triads: Sequence[Triad], provenance: Provenance, xcp: XcpOnCan | None = None
+) -> bytes:
+    """Text of a project with one module; `triads` are one, or accelerometer and gyro."""
+    linked = triads[0].place
+    assert not isinstance(linked, Place)
     little = linked is None or linked.little_endian
-    text = "byte order of the linked program"
     context = {
-        "symbol": linked.symbol if linked else f"{names_of(firmware.plan).linked}_calib_constants",
-        "place": linked,
         "epk_address": linked.epk_address if linked else None,
         "byte_order": "MSB_LAST" if little else "MSB_FIRST",
-        "byte_order_text": text if linked else _ADJUST,
+        "byte_order_text": "byte order of the linked program" if linked else _ADJUST,
         "commands": _COMMANDS,
         "node": None,
     }
-    return _rendered(firmware, calib_words(firmware), [], context, xcp)
+    return _rendered(triads, provenance, [], context, xcp)
 
 
 def node_a2l(firmware: Firmware, xcp: XcpOnCan) -> bytes:
     """Text of the file for a node with `firmware_ref/xcp`: what its addresses are is known."""
     signals, methods = measurements(firmware)
+    plan, sensor = firmware.plan, firmware.fitted.unit.temperature_sensor
     context = {
-        "symbol": "constants in triax_calib.bin",
-        "place": place_of(firmware.plan),
         "epk_address": None,
         "byte_order": "MSB_LAST",
         "byte_order_text": "as the node has it, whatever its core",
@@ -109,25 +151,26 @@ def node_a2l(firmware: Firmware, xcp: XcpOnCan) -> bytes:
             "sample_extension": SAMPLE,
         },
     }
-    return _rendered(firmware, calib_words(firmware), methods, context, xcp)
+    triads = (Triad(plan, sensor, place_of(plan)),)
+    return _rendered(triads, firmware.provenance, methods, context, xcp)
 
 
 def _rendered(
-    firmware: Firmware,
-    words: list[Word],
+    triads: Sequence[Triad],
+    provenance: Provenance,
     methods: list[Method],
     context: dict[str, Any],
     xcp: XcpOnCan | None,
 ) -> bytes:
-    provenance = firmware.provenance
+    of_words = [word.method for triad in triads for word in triad.words]
     shared = {
         "version": __version__,
         "inputs": provenance.inputs_sha256[:16],
         "serial": provenance.serial,
         "epk": provenance.epk,
-        "TRIAD": names_of(firmware.plan).triad.upper(),
-        "words": words,
-        "methods": list({m.name: m for m in [*(w.method for w in words), *methods]}.values()),
+        "TRIAD": triads[0].name,
+        "triads": triads,
+        "methods": list({m.name: m for m in [*of_words, *methods]}.values()),
         "xcp": xcp.context if xcp else None,
     }
     template = environment().get_template("a2l/triax_calib.a2l.j2")

@@ -12,6 +12,7 @@ from triaxcal.codegen.constants import function_format
 from triaxcal.codegen.names import names_of
 from triaxcal.delivery.firmware import Firmware
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
+from triaxcal.fixedpoint.gyro import SENSITIVITY_NAMES, sensitivity_log2
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
 from triaxcal.fixedpoint.rate import RATE_Q
@@ -55,11 +56,16 @@ class Word:
 
 
 def calib_words(firmware: Firmware) -> list[Word]:
+    """Every adjustable word of the constants of a unit."""
+    return plan_words(firmware.plan, firmware.fitted.unit.temperature_sensor)
+
+
+def plan_words(plan: Plan, sensor: TemperatureSensor) -> list[Word]:
     """Every adjustable word of the constants; the gains of x, which fix formats, are none."""
-    prefix = names_of(firmware.plan).triad.upper()
+    prefix = names_of(plan).triad.upper()
     return [
         replace(word, name=f"{prefix}_{word.name}", method=word.method.prefixed(prefix))
-        for word in _words(firmware.plan, firmware.fitted.unit.temperature_sensor)
+        for word in _words(plan, sensor)
     ]
 
 
@@ -93,13 +99,19 @@ def _words(plan: Plan, sensor: TemperatureSensor) -> list[Word]:
 
 
 def _terms(plan: Plan, sensor: TemperatureSensor, offset: int) -> list[Word]:
-    """Words of quadratic terms and of a term in dT/dt, which stand behind the segments."""
+    """Words of the terms beyond the linear ones, which stand behind the segments."""
     words = []
     if plan.quadratic is not None:
         log2 = quadratic_log2(plan.shape.output_q, plan.shape.output_shift - 32)
         method = Method("QUADRATIC", "quadratic term", "g/g^2", 2.0**-log2, 0.0)
         for name in QUADRATIC_NAMES:
             words.append(Word(f"{name}", f"{name}, quadratic term", offset, method))
+            offset += _WORD
+    if plan.sensitivity is not None:
+        unit, lsb = f"({plan.shape.unit})/g", 2.0 ** -sensitivity_log2(plan)
+        method = Method("SENSITIVITY", "subtracted from the rate for 1 g", unit, -lsb, 0.0)
+        for name in SENSITIVITY_NAMES:
+            words.append(Word(name, f"{name}, g-sensitivity", offset, method))
             offset += _WORD
     if plan.rate is not None:
         step = sensor.degc_per_code * 2.0**-RATE_Q

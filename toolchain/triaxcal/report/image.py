@@ -12,9 +12,8 @@ def image_text(name: str, content: bytes, parts: tuple[ImagePart, ...]) -> str:
     padding = len(content) - taken
     size = f"{taken} bytes" + (f", and {padding} of erased flash" if padding else "")
     rows: list[tuple[str, str]] = []
-    for before, part in zip((None, *parts), parts, strict=False):
-        same = before is not None and before.identity == part.identity
-        rows += [] if same else _identity(part.identity)
+    for part in parts:  # a gyro's identity differs in its axes alone
+        rows += [row for row in _identity(part.identity) if row not in rows]
         rows += _constants(part)
     lines = [f"  {key:<15} {value}" for key, value in rows]
     return "\n".join([f"{name}: {size}; every CRC is correct", *lines])

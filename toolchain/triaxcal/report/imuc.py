@@ -9,19 +9,20 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes, sha256_of_files
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import CrossCheck
-from triaxcal.codegen.names import shape_id
+from triaxcal.codegen.names import names_of, shape_id
 from triaxcal.delivery.imu import METHOD, ImuC, ImuDelivery
 from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.device import REQUIRED
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
+from triaxcal.report.a2l import Triad, linked_a2l
 from triaxcal.report.words.firmware import checked_words, proven_words
 from triaxcal.report.words.numbers import g_in_words, significant, thousands
 
 VERIFICATION_FILE = "verification.json"
 C_FILES = (
-    "*_comp.h", "*_comp.c", "*_calib.h", "*_calib.c", "*_selftest.h", "*_selftest.c", "*_imu.h",
-    "*_imu.c", "*_imu.bin", VERIFICATION_FILE,
+    "*_comp.h", "*_comp.c", "*_calib.h", "*_calib.c", "*_calib.a2l", "*_selftest.h",
+    "*_selftest.c", "*_imu.h", "*_imu.c", "*_imu.bin", VERIFICATION_FILE,
 )  # fmt: skip
 """What a unit with [device] receives besides; * is its prefix."""
 NO_C = "none: unit.toml has no [device]; add it with " + ", ".join(REQUIRED)
@@ -48,7 +49,17 @@ def imu_c_files(made: ImuDelivery) -> dict[str, bytes]:
     """Name and content of `C_FILES`; nothing if there is no C."""
     if made.c is None:
         return {}
-    return {**made.c.build.files, VERIFICATION_FILE: _verification_json(made, made.c)}
+    c = made.c
+    name = names_of(c.build.accel).file("triax_calib.a2l")
+    own = {name: imu_a2l(c), VERIFICATION_FILE: _verification_json(made, c)}
+    return {**c.build.files, **own}
+
+
+def imu_a2l(c: ImuC) -> bytes:
+    """The constants of both triads for calibration tools; addresses are 0 until it is linked."""
+    sensor = c.device.temperature_sensor
+    triads = tuple(Triad(plan, sensor) for plan in (c.build.accel, c.build.gyro))
+    return linked_a2l(triads, c.fitted.provenances[0])
 
 
 def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:

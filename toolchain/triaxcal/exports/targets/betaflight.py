@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.exports.autopilot import AxisModel, nominal_m_per_s2
-from triaxcal.exports.parameters import Notes, exported
+from triaxcal.exports.autopilot import AxisModel
+from triaxcal.exports.parameters import Models, Notes, exported
 from triaxcal.exports.target import Exported, Source, Target
 from triaxcal.model.metrological import unpack_constants
+from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 _LABEL = "Betaflight"
 _INT16 = 2**15
@@ -20,32 +21,38 @@ _WORDS = (
     "Paste into the command line. Axes are those of the sensor after its alignment. The last",
     "number says that the accelerometer has been calibrated.",
 )
+_GYRO_WORDS = (
+    "Nothing of the gyro: Betaflight measures its offset at each start, and has no scale for it.",
+)
 
 
 def _make(source: Source) -> Exported:
-    unit, calibration = source.fitted.unit, source.fitted.calibration
-    if unit.adc.bits > 16:
+    accel, gyro = source.triads()
+    adc = accel.adc
+    if adc.bits > 16:
         raise RefusedError(
-            f"{unit.source}, adc.bits",
-            f"found {unit.adc.bits}",
+            f"{source.sensor} {source.serial}",
+            f"raw codes of {adc.bits} bits",
             expected="at most 16: Betaflight's drivers give int16",
         )
-    low, high = calibration.range_degc
-    _, U0 = unpack_constants(calibration.thermal.constants_at(min(max(unit.t0_degc, low), high)))
-    per_reading = nominal_m_per_s2(source.fitted)
-    sign = np.sign(per_reading)
-    trim = np.rint(sign * U0 / unit.adc.volts_per_code)
+    _, U0 = unpack_constants(accel.thermal.constants_at(accel.t0_degc))
+    sign = np.sign(accel.per_reading)
+    trim = np.rint(sign * U0 / adc.volts_per_code)
     if np.abs(trim).max() >= _INT16:
         raise RefusedError(
-            f"unit {unit.serial}", f"an offset of {np.abs(trim).max():g} codes", expected="int16"
+            f"{source.sensor} {source.serial}",
+            f"an offset of {np.abs(trim).max():g} codes",
+            expected="int16",
         )
-    offset = (sign * trim * unit.adc.volts_per_code * per_reading)[None]
-    model = AxisModel(per_reading, np.ones(3), offset, unit.t0_degc, (low, high))
-    one_g = ", ".join(f"{c:.6g}" for c in 9.80665 / np.abs(per_reading) / unit.adc.volts_per_code)
+    offset = (sign * trim * adc.volts_per_code * accel.per_reading)[None]
+    model = AxisModel(accel.per_reading, np.ones(3), offset, accel.t0_degc, accel.range_degc)
+    one_g = STANDARD_GRAVITY_M_PER_S2 / np.abs(accel.per_reading) / adc.volts_per_code
+    codes = ", ".join(f"{c:.6g}" for c in one_g)
     turned = " ".join(f"{'-' * bool(s < 0)}{a}" for s, a in zip(sign, "xyz", strict=True))
-    words = (*_WORDS, f"Codes of {turned}; acc_1G of the driver must be {one_g}.")
+    words = (*_WORDS, f"Codes of {turned}; acc_1G of the driver must be {codes}.")
     lines = [f"set acc_calibration = {','.join(f'{t:.0f}' for t in trim)},1", "save"]
-    return exported(source, Notes(_LABEL, "betaflight.txt", words), model, lines)
+    notes = Notes(_LABEL, "betaflight.txt", (*words, *(_GYRO_WORDS if gyro else ())))
+    return exported(source, notes, Models(model), lines)
 
 
 ENTRY = Target(
