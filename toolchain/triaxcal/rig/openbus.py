@@ -2,14 +2,78 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
+from typing import Any
+
 import can
 
 from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.base.tomltable import did_you_mean, shown
 
+_CONFIG = "config"
+_OPTION = re.compile(r",(?=[A-Za-z_]\w*=)")
+_FORM = "interface:channel,option=value,... or config:section"
+
+
+@dataclass(frozen=True)
+class BusName:
+    """What a name such as "pcan:PCAN_USBBUS1,bitrate=500000" says.
+
+    Attributes
+    ----------
+    interface, channel : str
+        Of python-can; "" where its configuration says them.
+    section : str
+        Of python-can's configuration file; "" for [default].
+    options : mapping
+        Texts as they stand; python-can makes numbers of them.
+    """
+
+    interface: str
+    channel: str
+    section: str
+    options: dict[str, str]
+
+
+def bus_name(name: str) -> BusName:
+    """Interface, channel and options of a bus.
+
+    A comma belongs to the channel where no option follows it, as in "vector:0,1,bitrate=500000".
+
+    Raises
+    ------
+    UsageError
+        When python-can has no such interface, or an option is given twice.
+    """
+    interface, _, rest = name.partition(":")
+    channel, *given = _OPTION.split(rest)
+    if "=" in channel.partition(",")[0] and _OPTION.match("," + channel):
+        channel, given = "", [channel, *given]
+    options = dict(part.split("=", 1) for part in given)
+    if len(options) != len(given):
+        raise UsageError("--bus", f"found {shown(name)}, with an option twice", expected=_FORM)
+    if interface == _CONFIG:
+        return BusName("", "", channel, options)
+    if interface not in can.VALID_INTERFACES:
+        known = sorted(can.VALID_INTERFACES)
+        raise UsageError(
+            "--bus",
+            f"found {shown(interface)}{did_you_mean(interface, known)}",
+            expected=f"a CAN device, or {_FORM}, interface one of " + ", ".join(known),
+        )
+    return BusName(interface, channel, "", options)
+
 
 def open_bus(name: str, fd: bool) -> can.BusABC:
-    """Bus of a name such as "pcan:PCAN_USBBUS1", through python-can.
+    """Bus of a name such as "pcan:PCAN_USBBUS1,bitrate=500000", through python-can.
+
+    What the name does not say comes from python-can's environment and configuration files.
+
+    Parameters
+    ----------
+    fd : bool
+        The frames are CAN FD's; an option "fd" takes precedence.
 
     Raises
     ------
@@ -18,19 +82,25 @@ def open_bus(name: str, fd: bool) -> can.BusABC:
     RefusedError
         When the channel cannot be opened; lists those that can be found.
     """
-    interface, _, channel = name.partition(":")
-    if interface not in can.VALID_INTERFACES:
-        known = sorted(can.VALID_INTERFACES)
-        raise UsageError(
-            "--bus",
-            f"found {shown(interface)}{did_you_mean(interface, known)}",
-            expected="a CAN device, or interface:channel, interface one of " + ", ".join(known),
-        )
+    said = bus_name(name)
+    wanted: dict[str, Any] = {"fd": fd} if fd or said.interface else {}
     try:
-        return can.Bus(interface=interface, channel=channel or None, fd=fd)
+        return can.Bus(
+            said.channel or None,
+            said.interface or None,
+            said.section or None,
+            **{**wanted, **said.options},
+        )
     except Exception as error:  # each driver raises what its maker chose
-        found = can.detect_available_configs(interface)
+        raise _refusal(name, said, error) from error
+
+
+def _refusal(name: str, said: BusName, error: Exception) -> RefusedError:
+    if not said.interface:
+        section = f"[{said.section or 'default'}]"
+        remedy = f"state interface and channel in {section} of python-can's configuration file"
+    else:
+        found = can.detect_available_configs(said.interface)
         channels = ", ".join(str(c.get("channel")) for c in found[:20]) or "none found"
-        raise RefusedError(
-            name, f"cannot be opened: {error}", remedy=f"channels of {interface}: {channels}"
-        ) from error
+        remedy = f"channels of {said.interface}: {channels}"
+    return RefusedError(name, f"cannot be opened: {error}", remedy=remedy)

@@ -14,8 +14,9 @@ def _open(wanted: Wanted) -> Source:
 
 ENTRY = SourceKind(
     name="python-can",
-    label="interface:channel",
-    doc="anything that python-can supports, as pcan:PCAN_USBBUS1",
+    label="interface:channel,option=value",
+    doc="anything that python-can supports, as pcan:PCAN_USBBUS1,bitrate=500000; config:lab for a "
+    "section of its configuration file",
     takes=lambda bus: True,  # noqa: ARG005
     open=_open,
     rank=900,

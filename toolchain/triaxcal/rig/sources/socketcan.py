@@ -20,7 +20,7 @@ ENTRY = SourceKind(
     name="socketcan",
     label="can0",
     doc="a CAN device of Linux",
-    takes=lambda bus: ":" not in _device(bus),
+    takes=lambda bus: not {":", ","} & set(_device(bus)),
     open=_open,
     rank=30,
 )
