@@ -6,7 +6,6 @@ beyond (docs/explanation/fixed-point.md), of another shape, damaged, with and wi
 
 from __future__ import annotations
 
-import itertools
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,33 +15,13 @@ import numpy as np
 from triaxcal.codegen.identity import IDENTITY_SIZE, MAGIC, VERSION
 from triaxcal.codegen.image import header_words, image_bytes
 from triaxcal.codegen.image_cases import layout_of
-from triaxcal.codegen.image_layout import (
-    COEFFICIENTS,
-    GAIN,
-    ORIGIN,
-    RATE_GAIN,
-    RATE_MAX,
-    RATE_MIN,
-    RATE_WORDS,
-    Layout,
-    sum_of_floors,
-)
-from triaxcal.codegen.inverse_edges import inverse_edges
-from triaxcal.codegen.rate_ties import rate_ties
+from triaxcal.codegen.image_layout import COEFFICIENTS, RATE_WORDS, Layout
+from triaxcal.codegen.selftest_limits import Change, Limits
 from triaxcal.codegen.selftest_vectors import Vectors, answers_of
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
 from triaxcal.fixedpoint.plan import Plan
 
 IDENTITY_WORDS = IDENTITY_SIZE // 4
-
-
-@dataclass(frozen=True)
-class Change:
-    """`count` words of a file, from index `first`, get a value."""
-
-    first: int
-    value: int
-    count: int = 1
 
 
 @dataclass(frozen=True)
@@ -132,7 +111,6 @@ class _Maker:
         self.layout = layout_of(plan)
         self.words: list[int] = np.frombuffer(image_bytes(plan), "<i4").tolist()
         self.length = len(self.words)
-        self.nil = 4 * (plan.shape.order + 1)
 
     def file(self, changes: tuple[Change, ...]) -> list[int]:
         """Words of the whole file; changes before a CRC is made, and again after it."""
@@ -175,11 +153,7 @@ class _Maker:
         yield SelftestImage("constants", short, ())
         yield SelftestImage("with identity", long, ())
         yield from self._damaged(short, long)
-        limits = itertools.chain(
-            self._temperatures(), self._coefficients(), self._rows(), self._terms(),
-            self._rates(), self._inverses(),
-        )  # fmt: skip
-        for name, changes in limits:
+        for name, changes in Limits(self.plan, self.layout, self.words).all():
             yield SelftestImage(name, short, tuple(changes))
 
     def _damaged(self, short: int, long: int) -> Iterator[SelftestImage]:
@@ -196,138 +170,3 @@ class _Maker:
             value = self.file(())[at] ^ 1
             yield SelftestImage(name, size, (Change(at, value),))
         yield SelftestImage("4 bytes more", short + 4, ())
-
-    def _temperatures(self) -> Iterator[tuple[str, list[Change]]]:
-        layout, words = self.layout, self.words
-        reaches = layout.reaches(words)
-        low, high = words[layout.temp_min], words[layout.temp_max]
-        yield "temp_min_code", [Change(layout.temp_min, low + 1)]
-        at, first, last = reaches[-1]
-        yield "no codes", [Change(layout.temp_max, first - 1)]
-        yield "one code", [Change(layout.temp_max, first)]
-        yield "gain 0", [Change(at + GAIN, 0)]
-        for beyond in (0, 1):
-            origins = last - INT32_MAX - beyond, first + INT32_MAX + beyond
-            for origin in origins:
-                if INT32_MIN <= origin <= INT32_MAX:
-                    yield f"origin {origin}", [Change(at + ORIGIN, origin), Change(at + GAIN, 1)]
-        fullest = INT32_MAX // max(1, last - first)
-        for origin, gain in itertools.product((first, last), (fullest, fullest + 1)):
-            yield f"gain {gain}", [Change(at + ORIGIN, origin), Change(at + GAIN, gain)]
-        for s, (at, _, _) in list(enumerate(reaches))[1:][-1:]:
-            before = reaches[s - 1][0]
-            gains = [Change(at + GAIN, 1), Change(before + GAIN, 1)]
-            start = low if s == 1 else reaches[s - 1][1]
-            for first in (start, start + 1, high, high + 1):
-                yield f"first_code {first}", [Change(at, first), *gains]
-
-    def _coefficients(self) -> Iterator[tuple[str, list[Change]]]:
-        """A function at its bound and one beyond; the rest of its row is nil."""
-        layout, order = self.layout, self.layout.order
-        s = layout.segments - 1
-        for f, k, sign in ((0, 0, 1), (6, min(1, order), -1), (11, 0, -1)):
-            room = INT32_MAX - _floors_above(order, k)
-            for value in (room, room + 1):
-                yield (
-                    f"c_{k} of function {f}",
-                    [
-                        Change(layout.coefficient(s, f - f % 4, 0), 0, self.nil),
-                        Change(layout.coefficient(s, f, k), sign * value),
-                    ],
-                )
-        yield "INT32_MIN", [Change(layout.coefficient(s, 5, order), INT32_MIN)]
-
-    def _rows(self) -> Iterator[tuple[str, list[Change]]]:
-        """Rows just below their limit and at it: a gain, and what is left as the offset."""
-        layout = self.layout
-        if layout.inverse:
-            return
-        floors = sum_of_floors(layout.order)
-        for row, excess in itertools.product(range(3), (-1, 0)):
-            left = layout.row_limit + excess - 5 * floors
-            if layout.rate:
-                left -= 2 * (abs(self.words[layout.rate_word(RATE_WORDS + row)]) // 2 + 1)
-            offset = left // 2 - 2**29
-            s = row % layout.segments
-            yield (
-                f"row {row} at its limit {excess:+d}",
-                [
-                    Change(layout.coefficient(s, 4 * row, 0), 0, self.nil),
-                    Change(layout.coefficient(s, 4 * row + row, 0), left - 2 * offset),
-                    Change(layout.coefficient(s, 4 * row + 3, 0), -offset),
-                ],
-            )
-
-    def _terms(self) -> Iterator[tuple[str, list[Change]]]:
-        layout = self.layout
-        if not layout.columns:
-            return
-        share = layout.limit // layout.columns
-        for row, excess in ((0, 1), (2, 0), (2, 1)):
-            last = layout.limit + excess - (layout.columns - 1) * share
-            yield (
-                f"terms of row {row} at their limit {excess:+d}",
-                [
-                    Change(layout.term(row, 0), share, layout.columns),
-                    Change(layout.term(row, layout.columns - 1 if excess else 0), -last),
-                ],
-            )
-
-    def _rates(self) -> Iterator[tuple[str, list[Change]]]:
-        layout = self.layout
-        if not layout.rate:
-            return
-        low, high, gain = (layout.rate_word(k) for k in (RATE_MIN, RATE_MAX, RATE_GAIN))
-        for first, last in ((1, 1), (-1, -1), (-INT32_MAX, 0), (INT32_MIN, 0), (0, INT32_MAX)):
-            changes = [Change(low, first), Change(high, last), Change(gain, 1)]
-            yield f"rates {first} to {last}", changes
-        yield "rate gain 0", [Change(gain, 0)]
-        left = (layout.row_limit - 1 - 5 * sum_of_floors(layout.order) - 2**31) // 2
-        for offset in (left, left + 1):
-            yield (
-                f"rate and offset {offset}",
-                [
-                    Change(layout.coefficient(0, 4, 0), 0, self.nil),
-                    Change(layout.coefficient(0, 7, 0), offset),
-                    Change(layout.rate_word(RATE_WORDS + 1), 2**31 - 2),
-                ],
-            )
-        for name, words in itertools.islice(rate_ties(layout, self.plan.shape), 0, 4, 2):
-            yield name, _runs(words)
-
-    def _inverses(self) -> Iterator[tuple[str, list[Change]]]:
-        shape, layout = self.plan.shape, self.layout
-        if shape.inverse is None:
-            return
-        largest = INT32_MAX - sum_of_floors(layout.order)
-        edges = inverse_edges(shape.inverse, largest, shape.rounding_in_offset, layout.row_limit)
-        # Sums of rows first: only they show what is done where K has no usable inverse.
-        for name, k00, k01, u0, k10 in sorted(edges, key=lambda edge: edge[0][:3] != "row"):
-            constant = {0: k00, 1: k01, 3: u0, 4: k10, 5: largest, 10: largest}
-            yield (
-                name,
-                [
-                    Change(layout.coefficient(0, 0, 0), 0, 3 * self.nil),
-                    *(Change(layout.coefficient(0, f, 0), v) for f, v in constant.items() if v),
-                ],
-            )
-
-
-def _floors_above(order: int, k: int) -> int:
-    """What Horner's rule adds to c_k when all others are nil."""
-    above = 0
-    for higher in range(order, k, -1):
-        above = 0 if higher == order else above // 2 + 1
-    return 0 if k == order else above // 2 + 1
-
-
-def _runs(words: dict[int, int]) -> list[Change]:
-    """Changes of single words, neighbours of one value taken together."""
-    found: list[Change] = []
-    for at, value in sorted(words.items()):
-        last = found[-1] if found else None
-        if last is not None and (last.first + last.count, last.value) == (at, value):
-            found[-1] = replace(last, count=last.count + 1)
-        else:
-            found.append(Change(at, value))
-    return found
