@@ -21,8 +21,9 @@ from plans import (
     raw_shift_of,
     unit_of,
 )
+from triaxcal.fixedpoint.device_units import MAX_TEMPERATURE_CODES
 from triaxcal.fixedpoint.formats import MAX_SPARE_BITS
-from triaxcal.fixedpoint.plan import MAX_TEMPERATURE_CODES, Plan, make_plan
+from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.methods.compensation import Compensation, compensate

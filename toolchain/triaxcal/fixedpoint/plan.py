@@ -18,7 +18,8 @@ from typing import Protocol
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.fixedpoint.arithmetic import INT32_MAX, round_half_up
+from triaxcal.fixedpoint.arithmetic import round_half_up
+from triaxcal.fixedpoint.device_units import device_polynomials, temperature_codes
 from triaxcal.fixedpoint.formats import choose_inverse, choose_matrix_bits, choose_spare_bits
 from triaxcal.fixedpoint.horner import Segment, horner, segment_of
 from triaxcal.fixedpoint.quadratic import quadratic_log2, quantise_quadratic
@@ -31,17 +32,11 @@ from triaxcal.unit.adc import Adc
 from triaxcal.unit.prefix import DEFAULT_PREFIX
 from triaxcal.unit.thermometer import TemperatureSensor
 
-MAX_TEMPERATURE_CODES = 2**17
-"""Proof and cross-check visit every temperature code: this many take some seconds."""
 MAX_SEGMENTS = 64
 """Of the reference C; a piecewise-linear model with more knots follows noise."""
 
 MAX_RAW_SHIFT = 30
 """The C multiplies by 2^raw_shift in int32."""
-
-ROWS = tuple(3 * i + j if j < 3 else 9 + i for i in range(3) for j in range(4))
-"""Where each function of the image's order (row by row: three of the matrix, then the offset)
-stands in the order of `CONSTANT_NAMES`."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +153,7 @@ def make_plan(compensation: Compensation, unit: Triad) -> Plan:
 def triad_plan(compensation: Compensation, unit: Triad, *, gyro: bool) -> Plan:
     """The plan of either triad, without a gyro's g-sensitivity: `make_plan`, `make_gyro_plan`."""
     where = f"unit {unit.name}"
-    low, high = _temperature_codes(compensation, unit.temperature_sensor, where)
+    low, high = temperature_codes(compensation, unit.temperature_sensor, where)
     bits = max(unit.adc.code_max.bit_length(), (-unit.adc.code_min - 1).bit_length())
     raw_shift = min(31 - bits, MAX_RAW_SHIFT)
     if len(compensation.curves.origins_degc) > MAX_SEGMENTS:
@@ -169,7 +164,9 @@ def triad_plan(compensation: Compensation, unit: Triad, *, gyro: bool) -> Plan:
             remedy="choose fewer knots in thermal.knots_degc",
         )
     volts_per_lsb = unit.adc.volts_per_code / 2.0**raw_shift
-    real, frames = _device_polynomials(compensation, unit, low, high, volts_per_lsb)
+    real, frames = device_polynomials(
+        compensation, unit.temperature_sensor, unit.output_q, (low, high), volts_per_lsb
+    )
     shape = Shape(
         form=compensation.form,
         segments=len(frames),
@@ -197,86 +194,6 @@ def triad_plan(compensation: Compensation, unit: Triad, *, gyro: bool) -> Plan:
     fraction = plan.shape.output_q + plan.shape.output_shift - 32
     rate = plan_rate(terms.rate, fraction, unit.temperature_sensor.degc_per_code, where)
     return replace(plan, rate=rate)
-
-
-def _temperature_codes(
-    compensation: Compensation, sensor: TemperatureSensor, where: str
-) -> tuple[int, int]:
-    low, high = compensation.curves.breaks_degc[0], compensation.curves.breaks_degc[-1]
-    # A range end that is a code but for rounding counts as that code.
-    codes = [(t - sensor.degc_at_zero) / sensor.degc_per_code for t in (low, high)]
-    first, last = int(np.ceil(codes[0] - 1e-6)), int(np.floor(codes[1] + 1e-6))
-    if last < first:
-        raise RefusedError(
-            where,
-            f"no temperature code lies in {low:g} to {high:g} degC: "
-            f"temperature_sensor.degc_per_code = {sensor.degc_per_code:g}",
-            remedy="check temperature_sensor, or widen thermal.range_degc",
-        )
-    if last - first >= MAX_TEMPERATURE_CODES:
-        raise RefusedError(
-            where,
-            f"temperature_sensor.degc_per_code = {sensor.degc_per_code:g} makes "
-            f"{last - first + 1} codes of {low:g} to {high:g} degC",
-            expected=f"at most {MAX_TEMPERATURE_CODES}, because the proof checks each of them",
-            remedy="drop the lowest bits of the temperature code in the driver and enlarge "
-            "degc_per_code accordingly",
-        )
-    if max(abs(first), abs(last)) > INT32_MAX // 2:
-        raise RefusedError(
-            where,
-            f"temperature codes {first} to {last} do not fit int32 with a bit to spare",
-            remedy="check temperature_sensor.degc_per_code and degc_at_zero",
-        )
-    return first, last
-
-
-def _device_polynomials(
-    compensation: Compensation,
-    unit: Triad,
-    low: int,
-    high: int,
-    volts_per_lsb: float,
-) -> tuple[FloatArray, list[Segment]]:
-    """Real polynomials in x, in device units, and the frames (integers still zero) they live in.
-
-    Direct: N in 2^-(output_q + 32) g per raw LSB, b in 2^-output_q g.
-    Inverse: K in raw LSB per g, U0 in raw LSB.
-    """
-    curves, sensor = compensation.curves, unit.temperature_sensor
-    breaks = [(t - sensor.degc_at_zero) / sensor.degc_per_code for t in curves.breaks_degc]
-    firsts = [low, *(int(np.ceil(b - 1e-6)) for b in breaks[1:-1]), high + 1]
-    frames, rows = [], []
-    scale = np.empty(12)
-    if compensation.form == INVERSE:
-        scale[:] = 1.0 / volts_per_lsb
-    else:
-        scale[:9] = volts_per_lsb * 2.0 ** (unit.output_q + 32)
-        scale[9:] = 2.0**unit.output_q
-    for s in range(len(curves.origins_degc)):
-        first, last = firsts[s], firsts[s + 1] - 1
-        if last < first:
-            continue
-        origin = (first + last + 1) // 2
-        gain_log2 = 31 - max(1, origin - first).bit_length()
-        middle = sensor.degc(origin) - curves.origins_degc[s]
-        half = sensor.degc_per_code * 2.0 ** (31 - gain_log2)
-        in_x = _substitute(curves.coefficients[s], middle, half)
-        frames.append(Segment(first, origin, 1 << gain_log2, np.zeros(in_x.shape, np.int64)))
-        rows.append((in_x * scale[:, None])[list(ROWS)])
-    return np.array(rows), frames
-
-
-def _substitute(coefficients: FloatArray, middle: float, half: float) -> FloatArray:
-    """Coefficients in x of polynomials in dT = middle + half x; shape (functions, order + 1)."""
-    order = coefficients.shape[1] - 1
-    result = np.zeros_like(coefficients)
-    for n in range(order, -1, -1):
-        shifted = np.zeros_like(result)
-        shifted[:, 1:] = result[:, :-1] * half
-        result = result * middle + shifted
-        result[:, 0] += coefficients[:, n]
-    return result
 
 
 def _direct_plan(plan: Plan, room: FloatArray, where: str) -> Plan:
