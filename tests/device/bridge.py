@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from random import Random
 
 import can
 
@@ -26,18 +27,33 @@ def passed_on(_number: int, data: bytes) -> list[bytes]:
     return [data]
 
 
+def losing(share: float, seed: int) -> Fault:
+    rng = Random(seed)
+    return lambda _number, data: [] if rng.random() < share else [data]
+
+
+def doubling(share: float, seed: int) -> Fault:
+    rng = Random(seed)
+    return lambda _number, data: [data, data] if rng.random() < share else [data]
+
+
+def both(share: float, seed: int) -> Fault:
+    lose, double = losing(share, seed), doubling(share, seed + 1)
+    return lambda number, data: double(number, data) if lose(number, data) else []
+
+
 @dataclass
 class Bridge:
     """Carries frames until it is stopped, or the node is gone."""
 
-    channel: str
+    bus: Callable[[], can.BusABC]
     node: socket.socket
     fault: Fault = passed_on
     frames: int = 0
     _stop: threading.Event = field(default_factory=threading.Event)
 
     def run(self) -> None:
-        bus = can.Bus(interface="virtual", channel=self.channel)
+        bus = self.bus()
         try:
             while not self._stop.is_set():
                 self._from_bus(bus)
@@ -78,21 +94,30 @@ class Bridge:
 
 
 @contextlib.contextmanager
+def running(bridge: Bridge) -> Iterator[None]:
+    """A bridge at work."""
+    thread = threading.Thread(target=bridge.run, daemon=True)
+    thread.start()
+    time.sleep(0.05)  # the virtual bus keeps nothing for who joins later
+    try:
+        yield
+    finally:
+        bridge.stop()
+        thread.join(5)
+
+
+@contextlib.contextmanager
 def bridged(
     node: Node, fault: Fault = passed_on, stop: int | None = None, channel: str = ""
 ) -> Iterator[str]:
     """Name of a bus that has the node on it, with power."""
     channel = channel or f"device-{next(CHANNELS)}"
-    with node.on(stop) as link:
-        bridge = Bridge(channel, link, fault)
-        thread = threading.Thread(target=bridge.run, daemon=True)
-        thread.start()
-        time.sleep(0.05)  # the virtual bus keeps nothing for who joins later
-        try:
-            yield f"virtual:{channel}"
-        finally:
-            bridge.stop()
-            thread.join(5)
+
+    def virtual() -> can.BusABC:
+        return can.Bus(interface="virtual", channel=channel)
+
+    with node.on(stop) as link, running(Bridge(virtual, link, fault)):
+        yield f"virtual:{channel}"
 
 
 @contextlib.contextmanager

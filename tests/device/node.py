@@ -50,6 +50,18 @@ class Node:
             link.close()
             self.code = process.wait(10)
 
+    @contextlib.contextmanager
+    def on_can(self, device: str, stop: int | None = None) -> Iterator[None]:
+        """On a CAN device; when its power is switched off, `code` is negative."""
+        last = [] if stop is None else [str(stop)]
+        command = [str(self.program), "can", device, str(self.flash), str(self.samples), *last]
+        process = subprocess.Popen(command)
+        try:
+            yield
+        finally:
+            process.terminate()
+            self.code = process.wait(10)
+
 
 def write_samples(path: Path, temp: np.ndarray, raw: np.ndarray) -> None:
     path.write_bytes(np.column_stack([temp, raw]).astype("<i4").tobytes())

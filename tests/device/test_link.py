@@ -21,7 +21,7 @@ pytest.importorskip("can")
 import can
 
 from builds import PROVENANCE, Builds, Built
-from device.bridge import CHANNELS, bridged, linked
+from device.bridge import CHANNELS, both, bridged, doubling, linked, losing
 from device.conftest import file_of
 from device.node import POWER_FAILED, REQUEST, RESPONSE, Node, build_node, write_samples
 from plans import vectors
@@ -129,21 +129,6 @@ def test_power_cycle(node: Node, unit: Built) -> None:
 
 
 # ---- a disturbed bus ----
-
-
-def losing(share: float, seed: int) -> Callable[[int, bytes], list[bytes]]:
-    rng = Random(seed)
-    return lambda _number, data: [] if rng.random() < share else [data]
-
-
-def doubling(share: float, seed: int) -> Callable[[int, bytes], list[bytes]]:
-    rng = Random(seed)
-    return lambda _number, data: [data, data] if rng.random() < share else [data]
-
-
-def both(share: float, seed: int) -> Callable[[int, bytes], list[bytes]]:
-    lose, double = losing(share, seed), doubling(share, seed + 1)
-    return lambda number, data: double(number, data) if lose(number, data) else []
 
 
 @pytest.mark.parametrize("kind", [losing, doubling, both])

@@ -1,15 +1,24 @@
-"""Builds the node and computes its answers, for a guest too slow to do it: prepare.py FOLDER."""
+"""Builds the nodes and computes their answers, for a guest too slow to do it: prepare.py FOLDER."""
 
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
+from random import Random
 
 import numpy as np
 
+from builds import PROVENANCE, Built
+from device import node as xcp
+from plans import GOLDEN, SENSOR
+from plans import vectors as at_limits
 from triaxcal.cli.rig_fil import build_node
 from triaxcal.codegen.crosscheck import python_routine
-from triaxcal.delivery.unit import deliver
+from triaxcal.codegen.identity import with_identity
+from triaxcal.codegen.image import image_bytes
+from triaxcal.delivery.unit import Delivery, deliver
+from triaxcal.device import link  # noqa: F401  what is missing is noticed here, not in the guest
 from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import BATCH, vectors
@@ -31,6 +40,26 @@ def main(target: Path) -> None:
     each = np.repeat(temps, BATCH)[:SAMPLES]
     accel, status = python_routine(delivery.plan)(each, raw)
     np.savez(target / "answers.npz", temps=temps, raw=raw, accel=accel, status=status)
+    xcp_node(target / "xcp", delivery)
+
+
+def xcp_node(target: Path, delivery: Delivery) -> None:
+    """The node with the XCP slave, files for it, and what its samples are compensated to."""
+    target.mkdir()
+    for name, content in delivery.files.items():
+        (target / name).write_bytes(content)
+    plan = delivery.plan
+    built = Built(plan, target, None)  # type: ignore[arg-type]
+    xcp.build_node(built, target / "node")
+    xcp.build_node(built, target / "node-17", '-DNODE_SERIAL="SN-17"')
+    other = GOLDEN["direct-cubic-24-bit"]
+    for file, of, serial in (("old", plan, "OLD"), ("new", plan, "NEW"), ("other", other, "NEW")):
+        whose = replace(PROVENANCE, serial=serial)
+        (target / f"{file}.bin").write_bytes(with_identity(image_bytes(of), SENSOR, whose))
+    temps, raw = (np.array(codes, np.int32) for codes in at_limits(plan, Random(8), 60))
+    xcp.write_samples(target / "samples.bin", temps, raw)
+    accel, status = python_routine(plan)(temps, raw)
+    np.savez(target / "samples.npz", temps=temps, raw=raw, accel=accel, status=status)
 
 
 main(Path(sys.argv[1]))

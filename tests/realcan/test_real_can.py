@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import socket
 import subprocess
 import time
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from realcan.conftest import WORK, ip
 from triaxcal.rig import socketcan
 from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.fil import exchange
@@ -18,7 +18,6 @@ from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.simframes import FrameMaker
 from triaxcal.rig.source import Wanted, kind_of
 
-WORK = os.environ.get("TRIAXCAL_CAN_WORK")
 pytestmark = pytest.mark.skipif(not WORK, reason="`make test-can` runs these on real SocketCAN")
 LIMIT_S = 60.0
 
@@ -28,18 +27,6 @@ def opened(device: str, fd: bool = False) -> socketcan.SocketSource:
     source = kind_of(device).open(Wanted(device, fd, lambda: pytest.fail("a CAN device")))
     assert isinstance(source, socketcan.SocketSource)
     return source
-
-
-def ip(*arguments):
-    subprocess.run(["ip", "link", *arguments], check=True, capture_output=True, text=True)
-
-
-@pytest.fixture
-def vcan():
-    ip("add", "dev", "vcan0", "type", "vcan")
-    ip("set", "vcan0", "mtu", "72", "up")
-    yield "vcan0"
-    subprocess.run(["ip", "link", "del", "vcan0"], check=False, capture_output=True)
 
 
 def some_frames(seconds=2, layout="classic", rate=100):
