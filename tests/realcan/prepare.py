@@ -11,7 +11,7 @@ import numpy as np
 
 from builds import PROVENANCE, Built
 from device import node as xcp
-from plans import GOLDEN, SENSOR
+from plans import COVERING, SENSOR, random_plan
 from plans import vectors as at_limits
 from triaxcal.cli.rig_fil import build_node
 from triaxcal.codegen.crosscheck import python_routine
@@ -52,7 +52,7 @@ def xcp_node(target: Path, delivery: Delivery) -> None:
     built = Built(plan, target, None)  # type: ignore[arg-type]
     xcp.build_node(built, target / "node")
     xcp.build_node(built, target / "node-17", '-DNODE_SERIAL="SN-17"')
-    other = GOLDEN["direct-cubic-24-bit"]
+    other = random_plan(Random(1), COVERING["direct-cubic-24-bit"])
     for file, of, serial in (("old", plan, "OLD"), ("new", plan, "NEW"), ("other", other, "NEW")):
         whose = replace(PROVENANCE, serial=serial)
         (target / f"{file}.bin").write_bytes(with_identity(image_bytes(of), SENSOR, whose))

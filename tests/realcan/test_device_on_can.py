@@ -14,9 +14,6 @@ from random import Random
 import numpy as np
 import pytest
 
-from realcan.conftest import WORK
-
-pytestmark = pytest.mark.skipif(not WORK, reason="`make test-can` runs these on real SocketCAN")
 pytest.importorskip("pyxcp")
 pytest.importorskip("can")
 
@@ -24,8 +21,11 @@ import can
 
 from device.bridge import Bridge, Fault, both, doubling, losing, running
 from device.node import POWER_FAILED, Node
+from realcan.conftest import WORK, ip
 from triaxcal.base.errors import RefusedError
 from triaxcal.rig.openbus import open_bus
+
+pytestmark = pytest.mark.skipif(not WORK, reason="`make test-can` runs these on real SocketCAN")
 
 INTERRUPTED = int(os.environ.get("TRIAXCAL_CAN_INTERRUPTED", "100"))
 """Downloads; fewer in the guest, where each takes seconds."""
@@ -199,8 +199,6 @@ def test_wrong_node_and_wrong_shape(vcan: str, node: Node) -> None:
 
 
 def test_the_device_goes_down(vcan: str, node: Node) -> None:
-    from realcan.conftest import ip
-
     with on(node, vcan), linked(vcan, answer_s=0.1) as link:
         ip("set", vcan, "down")
         assert "vcan0" in refused(link.info)
