@@ -63,10 +63,12 @@ mount -t 9p -o \$o,ro,cache=loose host /host || poweroff -f
 mount -t 9p -o \$o work /host$work || poweroff -f
 mount -t proc proc /host/proc
 mount -t sysfs sys /host/sys; mount --bind /dev /host/dev
+mkdir -p /host$work/tmp  # 9p has neither shared mappings nor files without a name
+mount -t tmpfs tmpfs /host$work/tmp || poweroff -f
 ip link set lo up
 echo started > /host$work/started
 chroot /host /bin/bash -c "cd $PWD && export PATH=$PATH PYTHONDONTWRITEBYTECODE=1 \
-    PYTHONPATH=$PYTHONPATH TRIAXCAL_CAN_WORK=$work TMPDIR=$work TRIAXCAL_CAN_INTERRUPTED=20 && $PWD/$python -m pytest -q -p no:cacheprovider \
+    PYTHONPATH=$PYTHONPATH TRIAXCAL_CAN_WORK=$work TMPDIR=$work/tmp TRIAXCAL_CAN_INTERRUPTED=20 && $PWD/$python -m pytest -q -p no:cacheprovider \
     -p no:hypothesispytest tests/realcan; echo \\\$? > $work/status"
 sync; poweroff -f
 INIT
