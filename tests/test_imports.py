@@ -40,7 +40,10 @@ MAY_IMPORT = {
         "base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery",
         "targets",
     },
-    "batch": {"base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery"},
+    "batch": {
+        "base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery",
+        "device",
+    },
     "report": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
         "fixedpoint", "codegen", "uncertainty", "delivery", "batch", "device",

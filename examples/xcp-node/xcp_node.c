@@ -155,6 +155,9 @@ int main(int argc, char **argv)
     }
     memory = flash_file_open(argv[3]);
     node.samples = fopen(argv[4], "rb");
+    if (node.samples != NULL) {
+        (void)setvbuf(node.samples, NULL, _IONBF, 0); /* each sample is what is in the file now */
+    }
     opened = strcmp(argv[1], "can") == 0 ? open_can(argv[2]) : (int)strtol(argv[2], NULL, 10);
     if (memory == NULL || node.samples == NULL || opened < 0) {
         return fail(memory == NULL ? argv[3] : node.samples == NULL ? argv[4] : argv[2]);

@@ -99,9 +99,12 @@ def test_the_length_of_the_mean(node: Node, unit: Built) -> None:
     one_g = 1 << unit.plan.shape.output_q
     samples.accel[:] = [[0, 0, one_g + k] for k in (-3, -1, 1, 3)]
     found = compare(samples, python_routine(unit.plan), unit.plan.shape.output_q)
-    assert found.norm_error_mg == pytest.approx(0.0, abs=1e-9)
+    assert found.length_error_g == pytest.approx(0.0, abs=1e-12)
+    assert found.mean_g == pytest.approx((0.0, 0.0, 1.0), abs=1e-12)
     # sd of -3, -1, 1, 3 is sqrt(20 / 3); of their mean half of it.
-    assert found.norm_error_sd_mg == pytest.approx(1e3 * (20 / 3) ** 0.5 / 2 / one_g)
+    assert found.length_sd_g == pytest.approx((20 / 3) ** 0.5 / 2 / one_g)
+    found = compare(samples, python_routine(unit.plan), unit.plan.shape.output_q, 1.25)
+    assert found.length_error_g == pytest.approx(-0.25)
 
 
 def test_power_cycle(node: Node, unit: Built) -> None:

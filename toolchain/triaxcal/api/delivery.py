@@ -82,6 +82,7 @@ def _deliver_unit(unit: Path, build: Path, reference: Compilation) -> Delivered:
     from triaxcal.base.publish import publish_beside  # noqa: PLC0415
     from triaxcal.delivery.saved import Saved  # noqa: PLC0415
     from triaxcal.delivery.unit import deliver as made_of  # noqa: PLC0415
+    from triaxcal.device.record import read_record, record_path  # noqa: PLC0415
     from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415
@@ -95,9 +96,9 @@ def _deliver_unit(unit: Path, build: Path, reference: Compilation) -> Delivered:
         from triaxcal.report.history import contradiction_of  # noqa: PLC0415
 
         warnings = contradiction_of(unit, delivery)
-    made = passport(delivery, {})
-    files = all_files(delivery, made)
     target = build / delivery.unit.name
+    made = passport(delivery, {}, read_record(record_path(target)))
+    files = all_files(delivery, made)
     kept = _kept_update(target)
     publish_beside(files, target, kept, SOMETIMES)
     calibration = Calibration(Unit.of(delivery.unit, unit), Saved.of(delivery))
@@ -186,6 +187,7 @@ def _deliver_update(made: Updated, target: Path, kept: Path | None) -> Delivered
     from triaxcal.base.publish import publish_beside  # noqa: PLC0415
     from triaxcal.delivery.saved import Saved  # noqa: PLC0415
     from triaxcal.delivery.unit import deliver_fitted  # noqa: PLC0415
+    from triaxcal.device.record import read_record, record_path  # noqa: PLC0415
     from triaxcal.report.files import SOMETIMES, all_files  # noqa: PLC0415
     from triaxcal.report.passport.content import passport  # noqa: PLC0415
     from triaxcal.report.summary import summary  # noqa: PLC0415
@@ -193,7 +195,7 @@ def _deliver_update(made: Updated, target: Path, kept: Path | None) -> Delivered
 
     with reference_under_way() as reference:
         delivery = deliver_fitted(made.fitted, reference)
-    page = passport(delivery, {})
+    page = passport(delivery, {}, read_record(record_path(target)))
     files = all_files(delivery, page)
     publish_beside(files, target, kept, SOMETIMES)
     changed = changed_text(delivery.unit.serial, made.found, made.before.calibration)

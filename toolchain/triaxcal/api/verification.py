@@ -11,6 +11,7 @@ from triaxcal.base.publish import publish, renew
 from triaxcal.base.tomltable import has_table
 from triaxcal.delivery.imu import deliver_imu
 from triaxcal.delivery.unit import deliver
+from triaxcal.device.record import read_record, record_path
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.report.dynamic import dynamic_files
 from triaxcal.report.dynamicpage import dynamic_page
@@ -69,14 +70,15 @@ def verify_unit(
 def _verify_accelerometer(unit: Path, build: Path) -> Verification:
     delivery = deliver(unit)
     target = build / delivery.unit.name
-    files = all_files(delivery)
+    device = read_record(record_path(target))
+    files = all_files(delivery, passport(delivery, {}, device))
     if not is_delivered(target, files):
         publish(files, target, SOMETIMES)
     with tempfile.TemporaryDirectory(prefix="triaxcal-verify-") as folder:
         outcomes = verify_files(Path(folder), delivery.files, delivery.plan, delivery.bound)
     tools = entries(outcomes)
     record(target, tools)
-    renew(passport_files(passport(delivery, tools)), target)
+    renew(passport_files(passport(delivery, tools, device)), target)
     rows = table([*delivery_outcomes(delivery.bound, delivery.check), *outcomes])
     text = f"unit {delivery.unit.name}\n\n{rows}"
     return Verification(target, tuple(outcomes), exit_code(outcomes) != 0, text)

@@ -32,6 +32,8 @@ class Order:
         What the result must be made by (`batch.toolchain`).
     files : tuple of str
         Names of its inputs: unit.toml, and measurements.csv or a recording, which may be a folder.
+    device : bytes
+        Record of the device that was verified, for its passport; empty where there is none.
     inputs : dict
         Name and content of each file, once it is `filled`.
     """
@@ -41,6 +43,7 @@ class Order:
     key: str
     toolchain: str
     files: tuple[str, ...]
+    device: bytes = b""
     inputs: dict[str, bytes] = field(default_factory=dict)
 
     def refuse_change(self, inputs_sha256: str) -> None:

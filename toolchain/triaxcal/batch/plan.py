@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.tomltable import has_table, read_toml
 from triaxcal.batch import journal
 from triaxcal.batch.order import Order, Outcome, planned, refused
 from triaxcal.batch.toolchain import toolchain
+from triaxcal.device.record import record_path
 from triaxcal.readings.measurements import MEASUREMENTS_FILE
 from triaxcal.unit.folder import UNIT_FILE, find_unit, list_units
 from triaxcal.unit.recordingfile import is_in_folder
@@ -62,7 +63,7 @@ def plan_work(folders: Iterable[Path], build: Path) -> Work:
             if reason:
                 skipped.append((path, reason))
             else:
-                orders.append(_order(path, by))
+                orders.append(replace(_order(path, by), device=_device(build, path)))
         except RefusedError as refusal:
             failed.append(Outcome(path.absolute().name, "", str(refusal)))
     if not orders and not failed:
@@ -92,6 +93,15 @@ def _order(folder: Path, by: str) -> Order:
     # A recording that lies elsewhere is refused when the unit is made.
     named = (_recorded(description), *_pair(description))
     return planned(folder, by, (UNIT_FILE, *filter(is_in_folder, named)))
+
+
+def _device(build: Path, folder: Path) -> bytes:
+    """Record of the device that was verified with an earlier delivery, or this one."""
+    path = record_path(build / folder.absolute().name)
+    try:
+        return path.read_bytes() if path.exists() else b""
+    except OSError as error:
+        raise refused_by_system(path, "read", error) from error
 
 
 def _pair(path: Path) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from triaxcal.base.extras import install_command
 from triaxcal.cli.options import DELIVERED, HELP, HexNumber, UnitFolder, example, say
 
 if TYPE_CHECKING:
+    from triaxcal.delivery.unit import Delivery
     from triaxcal.device.link import Link
     from triaxcal.device.unit import Node
 
@@ -174,46 +175,102 @@ def _ask_for_power_cycle() -> None:
     epilog=example(
         "triaxcal device verify AT-7 --bus can0",
         "triaxcal device verify AT-7 --bus can0 --samples 1000",
+        "triaxcal device verify AT-7 --bus can0 --positions 6",
     )
 )
 @click.argument("unit", type=UnitFolder())
+@DELIVERED
 @_node_options
-@click.option("--samples", type=click.IntRange(min=2), default=100, show_default=True)
-def verify(opener: Opener, unit: Path, samples: int) -> None:
+@click.option(
+    "--samples",
+    type=click.IntRange(min=10),
+    default=100,
+    show_default=True,
+    help="How many, in each position.",
+)
+@click.option(
+    "--positions",
+    type=click.IntRange(1, 6),
+    help="Walk through so many check positions, and write the result beside the delivery.",
+)
+@click.option(
+    "--gravity", "gravity_m_per_s2", type=click.FloatRange(9.7, 9.9),
+    help="Local gravity here, m/s^2; default: that of the unit.",
+)  # fmt: skip
+def verify(  # noqa: PLR0917
+    opener: Opener,
+    unit: Path,
+    build: Path,
+    samples: int,
+    positions: int | None,
+    gravity_m_per_s2: float | None,
+) -> None:
     """Compare a node's samples with the integer model.
 
     Result and status of each must be equal bit for bit. The node must have this UNIT's
-    calibration in use.
+    calibration in use. With --positions, passport and certificate state the result.
     """
     from triaxcal.api.unit import read_unit  # noqa: PLC0415
-    from triaxcal.codegen.crosscheck import python_routine  # noqa: PLC0415
     from triaxcal.delivery.unit import deliver  # noqa: PLC0415
-    from triaxcal.device.compare import compare, take_samples  # noqa: PLC0415
-    from triaxcal.device.unit import require_in_use  # noqa: PLC0415
 
     read_unit(unit)  # refuses an IMU
     delivery = deliver(unit)
-    plan = delivery.plan
-    if plan.rate is not None:
+    if delivery.plan.rate is not None:
         raise RefusedError(str(unit), "a term in dT/dt", expected="none: not verified on a device")
+    if positions is None:
+        _verify_samples(opener, delivery, samples, gravity_m_per_s2)
+        return
+    from triaxcal.api.device import require_delivered, verify_at_positions  # noqa: PLC0415
+    from triaxcal.report.words.device import device_words  # noqa: PLC0415
+
+    target = build / delivery.unit.name
+    require_delivered(delivery, target)
     with opener() as link:
-        content = next(c for n, c in delivery.files.items() if n.endswith("_calib.bin"))
-        node = require_in_use(link, content, str(unit))
-        found = compare(take_samples(link, samples), python_routine(plan), plan.shape.output_q)
-        name = link.name
-    if found.differing:
-        raise RefusedError(
-            name,
-            f"{found.differing} of {found.samples} samples differ, by {found.largest_lsb} LSB at "
-            f"most; {found.first}",
-            remedy="the node does not run this unit's triax_comp.c",
+        record = verify_at_positions(
+            link, delivery, target, positions, samples, _ask_for_position, gravity_m_per_s2
         )
+        name = link.name
+    rows = [
+        f"  {p.position:<15} {1e3 * p.error_g:+.3f} mg, standard error "
+        f"{1e3 * p.standard_error_g:.3f} mg; {p.temp_degc:.1f} degC"
+        for p in record.positions
+    ]
+    say("\n".join([f"{name}: {device_words(record)}", *rows, f"{target}: passport renewed"]))
+
+
+def _verify_samples(
+    opener: Opener, delivery: Delivery, samples: int, gravity_m_per_s2: float | None
+) -> None:
+    from triaxcal.codegen.crosscheck import python_routine  # noqa: PLC0415
+    from triaxcal.codegen.names import names_of  # noqa: PLC0415
+    from triaxcal.device.compare import compare, take_samples  # noqa: PLC0415
+    from triaxcal.device.unit import require_in_use  # noqa: PLC0415
+    from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2  # noqa: PLC0415
+
+    plan, unit = delivery.plan, delivery.unit
+    gravity_g = unit.gravity_g
+    if gravity_m_per_s2 is not None:
+        gravity_g = gravity_m_per_s2 / STANDARD_GRAVITY_M_PER_S2
+    with opener() as link:
+        image = delivery.files[names_of(plan).file("triax_calib.bin")]
+        node = require_in_use(link, image, unit.name)
+        taken = take_samples(link, samples)
+        name = link.name
+    found = compare(taken, python_routine(plan), plan.shape.output_q, gravity_g)
+    found.refuse_difference(name)
     say(
         f"{name}: verified on device {node.serial}\n"
         f"  samples         {found.samples}, largest difference 0 LSB; "
         f"{found.flagged} with a status other than 0\n"
-        f"  |a| - g         {found.norm_error_mg:+.3f} mg of the mean, standard error "
-        f"{found.norm_error_sd_mg:.3f} mg; for a unit at rest only"
+        f"  |a| - g         {1e3 * found.length_error_g:+.3f} mg of the mean, standard error "
+        f"{1e3 * found.length_sd_g:.3f} mg; for a unit at rest only"
+    )
+
+
+def _ask_for_position(position: str, why: str) -> None:
+    words = f"Put the unit in check position {position}, at rest, then press Enter"
+    click.prompt(
+        f"{why}. {words}" if why else words, default="", show_default=False, prompt_suffix=""
     )
 
 

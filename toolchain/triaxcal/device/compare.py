@@ -59,9 +59,11 @@ class Agreement:
         The first sample that differs, with both answers; "" where none does.
     flagged : int
         Samples whose status is not 0.
-    norm_error_mg : float
-        Length of the mean specific force, minus 1 g.
-    norm_error_sd_mg : float
+    mean_g : tuple of three floats
+        Mean specific force, in g of 9.80665 m/s^2.
+    length_error_g : float
+        Its length, minus the local gravity.
+    length_sd_g : float
         Standard error of that by the scatter of |a|, as if the samples were independent.
     """
 
@@ -70,8 +72,19 @@ class Agreement:
     largest_lsb: int
     first: str
     flagged: int
-    norm_error_mg: float
-    norm_error_sd_mg: float
+    mean_g: tuple[float, float, float]
+    length_error_g: float
+    length_sd_g: float
+
+    def refuse_difference(self, place: str) -> None:
+        """Refuse samples of which a bit differs; `place` is the node."""
+        if self.differing:
+            raise RefusedError(
+                place,
+                f"{self.differing} of {self.samples} samples differ, by {self.largest_lsb} LSB at "
+                f"most; {self.first}",
+                remedy="the node does not run this unit's triax_comp.c",
+            )
 
 
 def take_samples(link: Link, count: int) -> Samples:
@@ -103,7 +116,7 @@ def take_samples(link: Link, count: int) -> Samples:
     )
 
 
-def compare(samples: Samples, routine: Routine, output_q: int) -> Agreement:
+def compare(samples: Samples, routine: Routine, output_q: int, gravity_g: float = 1.0) -> Agreement:
     """Hold a node's results against the routine's; `output_q` is the Q of its accelerations."""
     accel, status = routine(samples.temp, samples.raw)
     difference = np.abs(accel.astype(np.int64) - samples.accel)
@@ -118,6 +131,7 @@ def compare(samples: Samples, routine: Routine, output_q: int) -> Agreement:
         )
     force_g = samples.accel * 2.0**-output_q
     norms = np.linalg.norm(force_g, axis=1)
+    x, y, z = force_g.mean(axis=0).tolist()
     n = len(samples)
     return Agreement(
         samples=n,
@@ -125,6 +139,7 @@ def compare(samples: Samples, routine: Routine, output_q: int) -> Agreement:
         largest_lsb=int(difference.max()),
         first=first,
         flagged=int((samples.status != 0).sum()),
-        norm_error_mg=1e3 * (float(np.linalg.norm(force_g.mean(axis=0))) - 1),
-        norm_error_sd_mg=1e3 * float(norms.std(ddof=1)) / float(np.sqrt(n)) if n > 1 else np.nan,
+        mean_g=(x, y, z),
+        length_error_g=float(np.linalg.norm((x, y, z))) - gravity_g,
+        length_sd_g=float(norms.std(ddof=1)) / float(np.sqrt(n)) if n > 1 else np.nan,
     )

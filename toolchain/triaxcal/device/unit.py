@@ -160,9 +160,18 @@ def require_in_use(link: Link, content: bytes, where: str) -> Node:
     Raises
     ------
     RefusedError
-        When it has another one, or uses the one in RAM.
+        When it has another one, uses the one in RAM, or has another serial number.
     """
     node = identify(link)
+    part = single_part(content, where)
+    serial = part.identity.serial if part.identity else ""
+    if node.hardware not in ("", serial):
+        raise RefusedError(
+            link.name,
+            f"the device has the serial number {node.hardware}",
+            expected=f"{serial or 'none'}, that of {where}",
+            remedy="connect the device of this unit",
+        )
     if node.content != content or node.info.page_used != FLASH_PAGE:
         whose = f"a calibration of {node.serial}" if node.part else "no calibration"
         found = f"{whose} in flash"

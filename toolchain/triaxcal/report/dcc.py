@@ -17,6 +17,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.model.types import FloatArray
 from triaxcal.report.passport.content import Passport
+from triaxcal.report.words.device import device_words
 from triaxcal.uncertainty.coverage import LEVEL
 from triaxcal.unit.certificate import CertificateDetails
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
@@ -135,6 +136,11 @@ def _statements(data: ET.Element, p: Passport) -> None:
         _text(statement, "declaration", found)
         whole = limit.shown and not unknown and not p.verdict.not_tested
         _add(statement, "conformity", "pass" if whole else "conditionalPass")
+    if p.verified_device is not None:
+        statement = _add(statements, "statement")
+        _text(statement, "name", "compensated output of the device itself at check positions")
+        _text(statement, "declaration", device_words(p.verified_device))
+        _add(statement, "conformity", "pass")
 
 
 def _measurement_results(root: ET.Element, p: Passport) -> None:

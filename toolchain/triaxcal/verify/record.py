@@ -42,6 +42,18 @@ def entries(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     return {outcome.key: outcome.json() for outcome in outcomes}
 
 
+def tools_of(target: Path) -> dict[str, Any]:
+    """Section of the tools in verification.json of a delivery; empty when none have been run.
+
+    Raises
+    ------
+    RefusedError
+        When the file is no JSON object.
+    """
+    path = target / FILE
+    return dict(_load(path.read_bytes(), path).get(SECTION) or {})
+
+
 def record(target: Path, section: Mapping[str, Any]) -> None:
     """Set the section of the tools in verification.json; everything else keeps its bytes.
 

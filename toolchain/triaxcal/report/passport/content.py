@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from triaxcal.codegen.names import names_of
 from triaxcal.codegen.tryout import Residual
 from triaxcal.delivery.causes import DOUBT, causes_of
 from triaxcal.delivery.judgement import limits_that_apply
 from triaxcal.delivery.posecauses import causes_of_poses, doubtful_poses
 from triaxcal.delivery.unit import Delivery
 from triaxcal.delivery.verdict import UNCERTAINTY, Verdict, worst
+from triaxcal.device.record import DeviceRecord
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.evaluate import LENGTH, Uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
@@ -65,10 +67,13 @@ class Passport:
     ----------
     tools : mapping
         Section "tools" of verification.json; empty when no tools have been run.
+    device : DeviceRecord or None
+        The device that was verified last; it may have had another delivery.
     """
 
     delivery: Delivery
     tools: Mapping[str, Any]
+    device: DeviceRecord | None = None
 
     @property
     def uncertainty(self) -> Uncertainty:
@@ -79,6 +84,12 @@ class Passport:
     def verdict(self) -> Verdict:
         """Of the unit with its firmware."""
         return self.delivery.verdict
+
+    @property
+    def verified_device(self) -> DeviceRecord | None:
+        """The device that was verified with this very delivery."""
+        image = self.delivery.files[names_of(self.delivery.plan).file("triax_calib.bin")]
+        return self.device if self.device is not None and self.device.is_of(image) else None
 
     @cached_property
     def constant_budgets(self) -> tuple[Budget, ...]:
@@ -160,9 +171,11 @@ class Passport:
         return self.verdict.checked and (recording is None or recording.tested)
 
 
-def passport(delivery: Delivery, tools: Mapping[str, Any]) -> Passport:
+def passport(
+    delivery: Delivery, tools: Mapping[str, Any], device: DeviceRecord | None = None
+) -> Passport:
     """Passport of a delivery; `tools` is the section of that name in verification.json."""
-    return Passport(delivery, tools)
+    return Passport(delivery, tools, device)
 
 
 def _acceptance(

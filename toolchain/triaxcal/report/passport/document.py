@@ -9,6 +9,7 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.base.jsontext import json_bytes, sha256_of_files
+from triaxcal.base.plaindata import plain
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Passport
 from triaxcal.uncertainty.budget import Budget
@@ -33,8 +34,15 @@ def passport_json(p: Passport) -> bytes:
         "warnings": [*p.uncertainty.warnings, *filter(None, [p.cause])],
         "files_sha256": sha256_of_files(d.files),
         "tools": dict(p.tools),
+        "device": _device(p),
     }
     return json_bytes(document)
+
+
+def _device(p: Passport) -> dict[str, Any] | None:
+    if p.device is None:
+        return None
+    return {"of_this_delivery": p.verified_device is not None, **plain(p.device)}
 
 
 def _judged(p: Passport) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from triaxcal.report.pictures.curves import (
     uncertainty_panel,
 )
 from triaxcal.report.pictures.residual_panels import residual_panels
+from triaxcal.report.words.device import device_not_counted, device_words
 from triaxcal.report.words.firmware import checked_words, file_rows, proven_words, tool_rows
 from triaxcal.report.words.measured import measured_words
 from triaxcal.report.words.numbers import (
@@ -269,4 +270,12 @@ def _verification(p: Passport) -> list[tuple[str, str]]:
         ("Method against the fitted model", method),
         ("Both together", f"≤ {g_in_words(d.firmware.error_g)}, the sum"),
         ("Cross-check", checked_words(d.check)),
+        *_device(p),
     ]
+
+
+def _device(p: Passport) -> list[tuple[str, str]]:
+    if p.device is None:
+        return []
+    words = device_words(p.device) if p.verified_device else device_not_counted(p.device)
+    return [("On the device", signed(words))]

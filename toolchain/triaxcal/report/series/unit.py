@@ -17,6 +17,7 @@ from triaxcal.batch.toolchain import toolchain
 from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.routines import Reference
 from triaxcal.delivery.unit import Delivery, deliver
+from triaxcal.device.record import DeviceRecord, parsed_record
 from triaxcal.model.curves import ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.report.files import all_files
@@ -45,7 +46,7 @@ def make_unit(order: Order) -> Outcome:
                 (folder / name).write_bytes(content)
             delivery = deliver(folder, _reference())
             order.refuse_change(delivery.inputs_sha256)
-            made = passport(delivery, {})
+            made = passport(delivery, {}, _device(order))
             return Outcome(order.name, order.key, "", all_files(delivery, made), unit_record(made))
         except RefusedError as refusal:
             return refused(order, str(refusal).replace(str(folder), order.folder))
@@ -58,6 +59,11 @@ def make_unit(order: Order) -> Outcome:
                 f"{Path(frame.filename).name}:{frame.lineno}: {type(fault).__name__}: {fault}; "
                 "please report it with the unit's folder",
             )
+
+
+def _device(order: Order) -> DeviceRecord | None:
+    """The device that was verified, with this delivery or an earlier one."""
+    return parsed_record(order.device, f"{order.name}, its device") if order.device else None
 
 
 @cache
