@@ -25,6 +25,7 @@ from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
 from triaxcal.readings.format import FORMATS, Format
 from triaxcal.rig.instrument import DRIVERS
+from triaxcal.rig.logfile import LOG_FORMATS
 from triaxcal.rig.source import SOURCES
 
 DOCS = Path(__file__).parent.parent
@@ -75,6 +76,10 @@ def _drivers() -> str:
     return _table(("`driver`", "what it speaks", "keys that it needs"), rows)
 
 
+def _logs() -> str:
+    return _table(("format", "what it is"), ((e.label, e.doc) for e in LOG_FORMATS))
+
+
 def _commands() -> str:
     """The help of every command, as a terminal of 80 columns shows it."""
     names = [name for section in SECTIONS.values() for name in section]
@@ -113,6 +118,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "functions": lambda: _named(THERMAL_FUNCTIONS),
     "sources": _sources,
     "drivers": _drivers,
+    "logs": _logs,
     "commands": _commands,
     "causes": lambda: _causes(CAUSES),
     "pose-causes": lambda: _causes(POSE_CAUSES),

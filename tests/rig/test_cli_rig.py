@@ -46,7 +46,11 @@ def bench_copy(folder):
         (("run", "--bus", "virtual", "--unit", "AT-SIM-BENCH", "--fault", "x"), 2, "--fault"),
         (("run", "--bus", "can0", "--unit", "AT-SIM-BENCH", "--fault", "slip@3"), 1, "virtual"),
         (("replay", "--unit", "AT-SIM-BENCH", "nothing.log"), 1, "nothing.log: cannot be read"),
-        (("export", "nothing.log", "x.xyz"), 1, "expected one of .asc, .blf, .csv, .mf4, .parquet"),
+        (
+            ("export", "nothing.log", "x.xyz"),
+            1,
+            "expected one of .asc, .blf, .csv, .log, .mf4, .parquet",
+        ),
         (
             ("run", "--bus", "virtual", "--unit", "AT-CHERNIAK"),
             1,

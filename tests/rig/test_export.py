@@ -38,7 +38,7 @@ def exported(folder, frames, suffix):
     log, target = folder / "frames.log", folder / f"frames{suffix}"
     log.write_bytes(format_frames(frames, "can0"))
     counts = []
-    assert export_log(log, target, counts.append) == len(frames)
+    assert export_log(log, target, counts.append) == (len(frames), [])
     assert counts[-1] == len(frames)
     assert {p.name for p in folder.iterdir()} == {"frames.log", f"frames{suffix}"}
     return target
@@ -154,7 +154,7 @@ def test_what_is_no_log_gives_no_file(tmp_path, suffix, content):
     log, target = tmp_path / "x.log", tmp_path / f"x{suffix}"
     if content is not None:
         log.write_bytes(content)
-    said = "no frames in it" if content is not None else "cannot be read: No such file"
+    said = "no frames in it" if content is not None else "cannot be read: no such file"
     with pytest.raises(RefusedError, match=rf"x\.log: {said}"):
         export_log(log, target, lambda _: None)
     assert [p.name for p in tmp_path.iterdir()] == (["x.log"] if content is not None else [])

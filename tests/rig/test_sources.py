@@ -199,7 +199,7 @@ def test_a_log_is_a_source_until_it_ends(tmp_path):
     wanted = Wanted(f"replay:{path}", False, lambda: source_rig)
     source = kind_of(wanted.bus).open(wanted)
     same(source.read(), concatenate(frames))
-    assert source.notes() == [f"{path}: 1 lines are no frames"]
+    assert source.notes() == [f"{path}: 1 line is no frame; the first: 'no frame'"]
     assert source.notes() == []
     with pytest.raises(RefusedError, match=r"the log has ended; .*`triaxcal rig replay`"):
         source.read()

@@ -125,18 +125,20 @@ def _last_session(root: Path) -> Path:
 def replay(setup: Setup, log: Path, into: Path | None) -> None:
     """Make the records of a session again from its log.
 
-    LOG has the frames of the session; the journal is beside it.
+    LOG has the frames: frames.log of a session, with its journal beside it, or a recording in any
+    format of `rig export` and python-can, also compressed by gzip.
     """
     from triaxcal.cli.rig_live import show_written  # noqa: PLC0415
     from triaxcal.rig import recording, replay, store  # noqa: PLC0415
 
     journal = log.with_name(recording.JOURNAL_FILE)
-    played = replay.replay(setup, log, journal if journal.exists() else None)
+    evidence = log.name == recording.LOG_FILE and journal.exists()
+    played = replay.replay(setup, log, journal if evidence else None)
     for event in played.events:
         if event.kind != "trouble":
             click.echo(event.text)
-    if played.bad_lines:
-        click.echo(f"{played.bad_lines} lines of {log} are no frames", err=True)
+    for note in played.notes:
+        click.echo(note, err=True)
     if not played.engine.session.done:
         done = len(played.engine.session.accepted)
         raise RefusedError(
@@ -145,8 +147,6 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
             expected="a whole session",
             remedy="go on with `triaxcal rig resume`",
         )
-    for note in played.notes:
-        click.echo(note, err=True)
     show_written(
         store.write_records(into or log.parent, played.engine.session, setup.dbc.sha256, played.log)
     )
@@ -245,7 +245,8 @@ def simulate(setup: Setup, bus: BusChoice, seconds: float | None, hold: int) -> 
 def export(log: Path, target: Path) -> None:
     """Convert a log for other tools.
 
-    TARGET ends in .asc, .blf, .csv, .mf4 or .parquet.
+    LOG is of any format that `rig replay` reads. TARGET ends in .asc, .blf, .csv, .log, .mf4 or
+    .parquet.
     """
     refuse_missing_packages()
     from triaxcal.rig.export import export_log  # noqa: PLC0415
@@ -257,10 +258,12 @@ def export(log: Path, target: Path) -> None:
             click.echo(f"\r{count} frames ...", err=True, nl=False)
 
     try:
-        count = export_log(log, target, written)
+        count, notes = export_log(log, target, written)
     finally:
         if shows:
             click.echo("\r\x1b[K", err=True, nl=False)
+    for note in notes:
+        click.echo(note, err=True)
     click.echo(f"{target}: {count} frames")
 
 

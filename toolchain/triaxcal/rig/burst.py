@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.model.types import IntArray
-from triaxcal.rig.frames import ByteArray, Frames
+from triaxcal.rig.frames import BRS, DLC_SHIFT, ESI, SENT, BoolArray, ByteArray, Frames
 
 CLASSIC_BYTES, FD_BYTES = 16, 72
 """Sizes of struct can_frame and canfd_frame."""
@@ -22,6 +22,8 @@ MOST = 4096
 SO_TIMESTAMPNS, SO_RXQ_OVFL = 35, 40
 _CONTROL_BYTES = 128
 _HEADER_BYTES = 16  # struct cmsghdr: size_t, int, int
+_MSG_DONTROUTE = 4
+"""Of a received frame: another program of this machine has sent it."""
 _DONT_WAIT = getattr(socket, "MSG_DONTWAIT", 0)  # not on Windows, which has no SocketCAN
 
 
@@ -83,6 +85,8 @@ class BurstReceiver:
         control_size_at = _Message.header.offset + _Header.control_size.offset
         self._received = _column(table, _Message.received.offset, np.uint32)
         self._control_size = _column(table, control_size_at, np.uint64)
+        flags_at = _Message.header.offset + _Header.flags.offset
+        self._flags = _column(table, flags_at, np.int32)
         data, control = self._data.ctypes.data, self._control.ctypes.data
         part = ctypes.addressof(self._parts)
         for i, message in enumerate(self._messages):
@@ -113,8 +117,14 @@ class BurstReceiver:
         if fd.any():
             data[~fd, CLASSIC_BYTES - 8 :] = 0  # of an earlier, longer frame
         can_id = np.ascontiguousarray(rows[:, :4]).view(np.uint32)[:, 0]
-        frames = Frames(t_ns[good], can_id, rows[:, 4], fd, data)
+        frames = Frames(t_ns[good], can_id, rows[:, 4], fd, data, self._frame_marks(good, rows, fd))
         return Burst(frames, drops, bool((received == 0).any()))
+
+    def _frame_marks(self, good: IntArray, rows: ByteArray, fd: BoolArray) -> ByteArray:
+        """Marks of frames (n,): those of their structures, and what this machine sent."""
+        marks = struct_marks(rows, fd)
+        marks[(self._flags[good] & _MSG_DONTROUTE) != 0] |= SENT
+        return marks
 
     def _marks(self, count: int) -> tuple[IntArray, int | None]:
         """Times (n,) and the last drop count, out of the control messages."""
@@ -142,6 +152,13 @@ class BurstReceiver:
             at[rows] += np.maximum((size + 7) // 8 * 8, _HEADER_BYTES)
             rows = rows[at[rows] + _HEADER_BYTES <= ends[rows]]
         return t_ns, drops
+
+
+def struct_marks(rows: ByteArray, fd: BoolArray) -> ByteArray:
+    """Marks (n,) of struct can_frame or canfd_frame: flags in byte 5, the raw code in byte 7."""
+    raw = (rows[:, 4] == CLASSIC_BYTES - 8) & (rows[:, 7] > CLASSIC_BYTES - 8)
+    code = np.where(raw, rows[:, 7] & 15, 0)
+    return np.where(fd, rows[:, 5] & (BRS | ESI), code << DLC_SHIFT).astype(np.uint8)
 
 
 def _column(table: ByteArray, offset: int, kind: type) -> np.ndarray:

@@ -9,7 +9,18 @@ import can
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG, Frames, empty
+from triaxcal.rig.frames import (
+    BRS,
+    EFF_FLAG,
+    ERR_FLAG,
+    ESI,
+    ID_MASK,
+    RTR_FLAG,
+    SENT,
+    Frames,
+    empty,
+    without_channel,
+)
 from triaxcal.rig.simulator import SimulatedRig
 from triaxcal.rig.source import PACE_S, WAIT_S, Watched
 
@@ -47,7 +58,7 @@ class BusSource(Watched):
                 self.name, f"cannot be read: {error}", remedy="then `triaxcal rig resume`"
             ) from error
         self._watch(bool(messages))
-        return frames_of(messages)
+        return without_channel(frames_of(messages))  # the log has the source's name
 
     def close(self) -> None:
         """Shut the bus down."""
@@ -70,7 +81,7 @@ class SimulatedSource:
         for message in sent:
             self._out.send(message)
         received = [self._in.recv(1.0) for _ in sent]
-        return frames_of([m for m in received if m is not None])
+        return without_channel(frames_of([m for m in received if m is not None]))
 
     def notes(self) -> list[str]:
         """Nothing ever happens to this connection."""
@@ -86,22 +97,35 @@ def frames_of(messages: list[can.Message]) -> Frames:
     """Frames of python-can messages."""
     if not messages:
         return empty()
-    width = 64 if any(m.is_fd for m in messages) else 8
+    # Some files do not say that a frame is CAN FD, and some readers call an empty one remote.
+    fd = [m.is_fd or len(m.data) > 8 for m in messages]
+    remote = [m.is_remote_frame and not m.is_fd for m in messages]
+    width = 64 if any(fd) else 8
     count = len(messages)
     payload = b"".join(bytes(m.data).ljust(width, b"\0") for m in messages)
     ids = [
         m.arbitration_id
         | (EFF_FLAG if m.is_extended_id and not m.is_error_frame else 0)
-        | (RTR_FLAG if m.is_remote_frame else 0)
+        | (RTR_FLAG if is_remote else 0)
         | (ERR_FLAG if m.is_error_frame else 0)
+        for m, is_remote in zip(messages, remote, strict=True)
+    ]
+    lengths = [m.dlc if r else len(m.data) for m, r in zip(messages, remote, strict=True)]
+    marks = [
+        (BRS if m.bitrate_switch else 0)
+        | (ESI if m.error_state_indicator else 0)
+        | (0 if m.is_rx else SENT)
         for m in messages
     ]
+    channels = [b"" if m.channel is None else str(m.channel).encode() for m in messages]
     return Frames(
         np.array([round(m.timestamp * 1e6) * 1000 for m in messages], np.int64),
         np.array(ids, np.uint32),
-        np.array([len(m.data) for m in messages], np.uint8),
-        np.array([m.is_fd for m in messages], np.bool_),
+        np.array(lengths, np.uint8),
+        np.array(fd, np.bool_),
         np.frombuffer(payload, np.uint8).reshape(count, width),
+        np.array(marks, np.uint8),
+        np.array(channels, np.bytes_),
     )
 
 
@@ -113,17 +137,24 @@ def messages_of(frames: Frames) -> list[can.Message]:
         frames.length.tolist(),
         frames.fd.tolist(),
         frames.data,
+        frames.marks.tolist(),
+        frames.channel.tolist(),
         strict=True,
     )
     return [
         can.Message(
             timestamp=t_ns / 1e9,
-            arbitration_id=can_id & 0x1FFF_FFFF,
+            arbitration_id=can_id & ID_MASK,
             is_extended_id=bool(can_id & EFF_FLAG),
             is_remote_frame=bool(can_id & RTR_FLAG),
             is_error_frame=bool(can_id & ERR_FLAG),
             is_fd=fd,
-            data=data[:length].tobytes(),
+            dlc=length,
+            data=None if can_id & RTR_FLAG else data[:length].tobytes(),
+            bitrate_switch=bool(marks & BRS),
+            error_state_indicator=bool(marks & ESI),
+            is_rx=not marks & SENT,
+            channel=channel.decode() or None,
         )
-        for t_ns, can_id, length, fd, data in rows
+        for t_ns, can_id, length, fd, data, marks, channel in rows
     ]

@@ -12,10 +12,16 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.rig.canbus import messages_of
-from triaxcal.rig.candump import NS_PER_US, read_log
+from triaxcal.rig.candump import format_frames
 from triaxcal.rig.export_columns import mf4_writer, parquet_writer
-from triaxcal.rig.frames import ID_MASK, Frames
+from triaxcal.rig.frames import BRS, DLC_SHIFT, ESI, ID_MASK, SENT, Frames
+from triaxcal.rig.logfile import Left, read_frames
 
+COLUMNS = (
+    "time_s", "id", "extended", "remote", "error", "fd", "length", "payload",
+    "brs", "esi", "sent", "dlc", "channel",
+)  # fmt: skip
+"""Of the CSV; the first eight since version 0.1.0."""
 Put = Callable[[Frames], None]
 """Adds frames to a file that is being written."""
 
@@ -34,23 +40,39 @@ def _python_can(target: Path) -> Iterator[Put]:
 @contextmanager
 def _csv(target: Path) -> Iterator[Put]:
     """Open a table, one row a frame; python-can's has no CAN FD flag and payloads in base64."""
-    with target.open("w", encoding="ascii", newline="\n") as file:
-        file.write("time_s,id,extended,remote,error,fd,length,payload\n")
+    with target.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(COLUMNS) + "\n")
 
         def put(frames: Frames) -> None:
-            table = np.stack([*frames.flags, frames.fd, frames.length], axis=1).astype(np.int64)
+            marks = [(frames.marks & bit) != 0 for bit in (BRS, ESI, SENT)]
+            flags = np.stack([*frames.flags, frames.fd, *marks], axis=1).astype(np.int64)
             rows = zip(
-                (frames.t_ns // NS_PER_US).tolist(),
+                frames.t_ns.tolist(),
                 (frames.can_id & np.uint32(ID_MASK)).tolist(),
-                table.tolist(),
+                flags.tolist(),
+                frames.length.tolist(),
                 frames.data,
+                (frames.marks >> DLC_SHIFT).tolist(),
+                frames.channel.tolist(),
                 strict=True,
             )
-            for t_us, can_id, (extended, remote, error, fd, length), data in rows:
+            for t_ns, can_id, (ext, rtr, err, fd, brs, esi, sent), length, data, dlc, name in rows:
+                payload = "" if rtr else data[:length].tobytes().hex().upper()
                 file.write(
-                    f"{t_us // 10**6}.{t_us % 10**6:06d},0x{can_id:X},{extended},{remote},{error},"
-                    f"{fd},{length},{data[:length].tobytes().hex().upper()}\n"
+                    f"{t_ns // 10**9}.{t_ns % 10**9:09d},0x{can_id:X},{ext},{rtr},{err},{fd},"
+                    f"{length},{payload},{brs},{esi},{sent},{dlc or ''},"
+                    f"{name.decode('utf-8', 'replace').replace(',', '_')}\n"
                 )
+
+        yield put
+
+
+@contextmanager
+def _candump(target: Path) -> Iterator[Put]:
+    with target.open("wb") as file:
+
+        def put(frames: Frames) -> None:
+            file.write(format_frames(frames, "can0"))
 
         yield put
 
@@ -59,14 +81,17 @@ WRITERS: dict[str, Callable[[Path], AbstractContextManager[Put]]] = {
     ".asc": _python_can,
     ".blf": _python_can,
     ".csv": _csv,
+    ".log": _candump,
     ".mf4": mf4_writer,
     ".parquet": parquet_writer,
 }
 """By suffix of the target."""
 
 
-def export_log(log: Path, target: Path, written: Callable[[int], None]) -> int:
-    """Write a log in another format, by the target's suffix; returns the number of frames.
+def export_log(log: Path, target: Path, written: Callable[[int], None]) -> tuple[int, list[str]]:
+    """Write a log in another format, by the target's suffix.
+
+    Returns the number of frames, and what of the log could not be used.
 
     Parameters
     ----------
@@ -83,22 +108,26 @@ def export_log(log: Path, target: Path, written: Callable[[int], None]) -> int:
         raise RefusedError(
             str(target), f"suffix {target.suffix!r}", expected="one of " + ", ".join(WRITERS)
         )
-    count = 0
+    count, left = 0, Left()
     # python-can and asammdf choose the format by the suffix: it stays at the end.
     aside = target.with_name(f".{os.getpid()}-{target.name}")
     try:
         try:
             aside.touch()  # says in the system's words why it cannot be
             with WRITERS[target.suffix](aside) as put:
-                for parsed in read_log(log):
+                for parsed in read_frames(log):
                     put(parsed.frames)
+                    left.add(parsed)
                     count += len(parsed.frames)
                     written(count)
             if not count:
-                raise RefusedError(str(log), "no frames in it", expected="a candump log")
+                first = f"; its first line is {left.first}" if left.first else ""
+                raise RefusedError(
+                    str(log), f"no frames in it{first}", expected="a log of CAN frames"
+                )
             aside.replace(target)
         finally:
             aside.unlink(missing_ok=True)
     except OSError as error:
         raise refused_by_system(target, "written", error) from error
-    return count
+    return count, left.notes(log)

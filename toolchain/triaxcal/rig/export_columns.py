@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -13,7 +14,17 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.extras import install_command
 from triaxcal.model.types import FloatArray
-from triaxcal.rig.frames import ID_MASK, BoolArray, Frames, widened
+from triaxcal.rig.frames import (
+    BRS,
+    DLC_SHIFT,
+    ESI,
+    ID_MASK,
+    SENT,
+    BoolArray,
+    ByteArray,
+    Frames,
+    widened,
+)
 
 _FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
@@ -105,18 +116,32 @@ def _of_group(frames: Frames, group: str) -> BoolArray:
 def _records(frames: Frames, group: str) -> Any:
     records = np.zeros(len(frames), _record(group))
     columns = {
-        "BusChannel": 1,
+        "BusChannel": _channel_numbers(frames),
         "ID": frames.can_id & np.uint32(ID_MASK),
         "IDE": frames.flags[0],
-        "DLC": np.searchsorted(_FD_LENGTHS, frames.length),
+        "DLC": np.where(
+            frames.marks >> DLC_SHIFT,
+            frames.marks >> DLC_SHIFT,
+            np.searchsorted(_FD_LENGTHS, frames.length),
+        ),
         "DataLength": frames.length,
         "DataBytes": widened(frames.data, 64),
+        "Dir": (frames.marks & SENT) != 0,
         "EDL": frames.fd,
+        "BRS": (frames.marks & BRS) != 0,
+        "ESI": (frames.marks & ESI) != 0,
     }
     for name, values in columns.items():
         if f"{group}.{name}" in (records.dtype.names or ()):
             records[f"{group}.{name}"] = values
     return records
+
+
+def _channel_numbers(frames: Frames) -> ByteArray:
+    """Number in the name of each frame's channel, 1 where there is none."""
+    names, place = np.unique(frames.channel, return_inverse=True)
+    found = [re.search(rb"\d{1,2}$", name) for name in names.tolist()]
+    return np.array([int(m[0]) if m else 1 for m in found], np.uint8)[place]
 
 
 # ---- Parquet ----
@@ -136,6 +161,10 @@ def parquet_writer(target: Path) -> Iterator[Callable[[Frames], None]]:
             ("id", arrow.uint32()),
             *((flag, arrow.bool_()) for flag in ("extended", "remote", "error", "fd")),
             ("payload", arrow.binary()),
+            ("length", arrow.uint8()),
+            *((flag, arrow.bool_()) for flag in ("brs", "esi", "sent")),
+            ("dlc", arrow.uint8()),
+            ("channel", arrow.string()),
         ]
     )
     with parquet.ParquetWriter(target, schema) as file:
@@ -143,19 +172,25 @@ def parquet_writer(target: Path) -> Iterator[Callable[[Frames], None]]:
         def put(frames: Frames) -> None:
             if not len(frames):
                 return
-            inside = np.arange(frames.data.shape[1]) < frames.length[:, None]
-            ends = np.concatenate([[0], np.cumsum(frames.length, dtype=np.int32)]).astype(np.int32)
+            size = np.where(frames.flags[1], 0, frames.length)  # a remote request has no payload
+            inside = np.arange(frames.data.shape[1]) < size[:, None]
+            ends = np.concatenate([[0], np.cumsum(size, dtype=np.int32)]).astype(np.int32)
             payload = arrow.Array.from_buffers(
                 arrow.binary(),
                 len(frames),
                 [None, arrow.py_buffer(ends), arrow.py_buffer(frames.data[inside].tobytes())],
             )
-            columns = [frames.t_ns, frames.can_id & np.uint32(ID_MASK), *frames.flags]
-            columns += [frames.fd, payload]
-            file.write_table(arrow.Table.from_arrays(
-                [arrow.array(c, type=t.type) for c, t in zip(columns[:-1], schema, strict=False)]
-                + columns[-1:],
-                schema=schema,
-            ))  # fmt: skip
+            columns = [
+                *(frames.t_ns, frames.can_id & np.uint32(ID_MASK), *frames.flags, frames.fd),
+                *(payload, frames.length),
+                *((frames.marks & bit) != 0 for bit in (BRS, ESI, SENT)),
+                frames.marks >> DLC_SHIFT,
+                [name.decode("utf-8", "replace") for name in frames.channel.tolist()],
+            ]
+            arrays = [
+                c if c is payload else arrow.array(c, type=t.type)
+                for c, t in zip(columns, schema, strict=True)
+            ]
+            file.write_table(arrow.Table.from_arrays(arrays, schema=schema))
 
         yield put

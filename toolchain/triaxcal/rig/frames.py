@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,12 +14,19 @@ from triaxcal.model.types import IntArray
 UintArray = npt.NDArray[np.uint32]
 ByteArray = npt.NDArray[np.uint8]
 BoolArray = npt.NDArray[np.bool_]
+NameArray = npt.NDArray[np.bytes_]
 
 EFF_FLAG = 0x8000_0000
 RTR_FLAG = 0x4000_0000
 ERR_FLAG = 0x2000_0000
 ID_MASK = 0x1FFF_FFFF
 """Flags beside the ID, as linux/can.h has them: extended ID, remote request, error frame."""
+
+BRS, ESI, SENT = 1, 2, 4
+"""Marks of a frame: CAN FD with a switched bit rate; its sender is error passive; sent by the
+computer that took it down. Frames without `SENT` were received."""
+DLC_SHIFT = 4
+"""Above the marks: the data length code 9 to 15 of a classic frame of eight bytes, else 0."""
 
 ERROR_BITS = {
     0x0000_0001: "transmit timeout",
@@ -47,11 +55,15 @@ class Frames:
     can_id : uint32 array, shape (n,)
         ID with the flags above.
     length : uint8 array, shape (n,)
-        Bytes of payload.
+        Bytes of payload; of a remote request, those that it asks for.
     fd : bool array, shape (n,)
         CAN FD frame.
     data : uint8 array, shape (n, 8) or (n, 64)
         Payload, zeros behind its end.
+    marks : uint8 array, shape (n,)
+        The marks above; zeros where nothing is said.
+    channel : array of bytes, shape (n,)
+        Name of the channel, ASCII; empty where it is not known.
     """
 
     t_ns: IntArray
@@ -59,14 +71,29 @@ class Frames:
     length: ByteArray
     fd: BoolArray
     data: ByteArray
+    marks: ByteArray = field(default_factory=lambda: np.zeros(0, np.uint8))
+    channel: NameArray = field(default_factory=lambda: np.zeros(0, "S1"))
+
+    def __post_init__(self) -> None:
+        """Marks and channels of frames that were made without them."""
+        for name in ("marks", "channel"):
+            column = getattr(self, name)
+            if len(column) != len(self.t_ns):
+                object.__setattr__(self, name, np.zeros(len(self.t_ns), column.dtype))
 
     def __len__(self) -> int:
         return len(self.t_ns)
 
     def take(self, index: slice | BoolArray | IntArray) -> Frames:
         """Some of the frames."""
-        kinds = self.length[index], self.fd[index]
-        return Frames(self.t_ns[index], self.can_id[index], *kinds, self.data[index])
+        return Frames(*(column[index] for column in self.columns))
+
+    @property
+    def columns(self) -> tuple[Any, ...]:
+        """The arrays, in the order of the attributes."""
+        return (
+            self.t_ns, self.can_id, self.length, self.fd, self.data, self.marks, self.channel
+        )  # fmt: skip
 
     @property
     def flags(self) -> list[BoolArray]:
@@ -86,6 +113,11 @@ def alike(t_ns: IntArray, can_id: int, length: int, fd: bool, data: ByteArray) -
     return Frames(t_ns, np.full(count, can_id, np.uint32), *kinds, data)
 
 
+def without_channel(frames: Frames) -> Frames:
+    """Frames of a channel that goes without saying."""
+    return replace(frames, channel=np.zeros(len(frames), "S1"))
+
+
 def empty(width: int = 8) -> Frames:
     """No frames."""
     return alike(np.zeros(0, np.int64), 0, 0, False, np.zeros((0, width), np.uint8))
@@ -98,13 +130,8 @@ def concatenate(parts: Sequence[Frames]) -> Frames:
     if not parts:
         return empty()
     width = max(part.data.shape[1] for part in parts)
-    return Frames(
-        np.concatenate([p.t_ns for p in parts]),
-        np.concatenate([p.can_id for p in parts]),
-        np.concatenate([p.length for p in parts]),
-        np.concatenate([p.fd for p in parts]),
-        np.concatenate([widened(p.data, width) for p in parts]),
-    )
+    wide = [replace(p, data=widened(p.data, width)) for p in parts]
+    return Frames(*map(np.concatenate, zip(*(p.columns for p in wide), strict=True)))
 
 
 def widened(data: ByteArray, width: int) -> ByteArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -161,8 +161,7 @@ def frames_ns(parts: list[Frames]) -> int:
 
 def whole_microseconds(frames: Frames) -> Frames:
     """Frames with the times that the log keeps: live and replay must see the same."""
-    t_ns = frames.t_ns // NS_PER_US * NS_PER_US
-    return Frames(t_ns, frames.can_id, frames.length, frames.fd, frames.data)
+    return replace(frames, t_ns=frames.t_ns // NS_PER_US * NS_PER_US)
 
 
 def header(setup: Setup) -> dict[str, Any]:

@@ -9,11 +9,11 @@ from itertools import pairwise
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError, refused_by_system
-from triaxcal.rig.candump import read_log
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.events import Agree, Event, Redo
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.journal import ReadJournal, Record, read_journal
+from triaxcal.rig.logfile import Left, read_frames
 from triaxcal.rig.rawlog import LogState, changed_log
 from triaxcal.rig.recording import durable_events, known_log, refuse_other_session
 
@@ -28,15 +28,14 @@ class Replayed:
     Attributes
     ----------
     log : dict
-        Lines, bytes and SHA-256 of the log; lines that were no frame.
+        Lines, bytes and SHA-256 of the log.
     notes : tuple of str
-        What of the journal could not be used.
+        What of the log and the journal could not be used.
     """
 
     engine: Engine
     events: tuple[Event, ...]
     log: LogState
-    bad_lines: int
     notes: tuple[str, ...] = ()
 
 
@@ -56,7 +55,7 @@ def replay(setup: Setup, log: Path, journal: Path | None = None) -> Replayed:
     if records:
         refuse_other_session(journal, records[0], setup)
     played = replay_records(setup, log, records)
-    return replace(played, notes=_notes(journal, found, played))
+    return replace(played, notes=(*played.notes, *_notes(journal, found, played)))
 
 
 def _notes(journal: Path, found: ReadJournal, played: Replayed) -> tuple[str, ...]:
@@ -87,16 +86,15 @@ def replay_records(setup: Setup, log: Path, records: Sequence[Record]) -> Replay
     engine = Engine(setup, str(log))
     words = [r for r in records if r["kind"] in {"command", "resume", "mended"}]
     events: list[Event] = []
-    lines = bad = 0
-    for parsed, frame_lines in _chunks(log, [int(r["log"]["lines"]) for r in words]):
+    lines, left = 0, Left()
+    for frames in _chunks(log, [int(r["log"]["lines"]) for r in words], left):
         while words and int(words[0]["log"]["lines"]) == lines:
             events += _say(engine, words.pop(0))
-        events += engine.feed(parsed)
-        lines += frame_lines[0]
-        bad += frame_lines[1]
+        events += engine.feed(frames)
+        lines += len(frames)
     for word in words:
         events += _say(engine, word)
-    return Replayed(engine, tuple(events), state, bad)
+    return Replayed(engine, tuple(events), state, tuple(left.notes(log)))
 
 
 def _say(engine: Engine, record: Record) -> list[Event]:
@@ -112,17 +110,27 @@ def _say(engine: Engine, record: Record) -> list[Event]:
     return engine.command(Agree() if name == "Agree" else Redo(**said), t_ns)
 
 
-def _chunks(log: Path, cuts: list[int]) -> Iterator[tuple[Frames, tuple[int, int]]]:
-    """Frames of a log, cut after each of these numbers of lines; lines and bad lines of each."""
+def _chunks(log: Path, cuts: list[int], left: Left) -> Iterator[Frames]:
+    """Frames of a log, cut after each of these numbers of lines; what is none is counted."""
     done = 0
-    for parsed in read_log(log):
+    for parsed in read_frames(log):
+        left.add(parsed)
         inner = [c - done for c in cuts if done < c < done + parsed.lines]
-        if inner and parsed.bad_lines:
-            raise RefusedError(str(log), f"{parsed.bad_lines} lines that are no frames")
-        edges = [0, *inner, len(parsed.frames)]
-        for i, (start, end) in enumerate(pairwise(edges)):
-            bad = parsed.bad_lines if i == 0 else 0
-            yield parsed.frames.take(slice(start, end)), (end - start + bad, bad)
+        if cuts and parsed.bad_lines and parsed.lines:
+            raise RefusedError(
+                str(log),
+                f"{parsed.bad_lines} lines that are no frames",
+                expected="frames alone, as the journal beside it counts its lines",
+            )
+        if parsed.untimed:
+            raise RefusedError(
+                str(log),
+                f"{parsed.untimed} frames have no time",
+                expected="a log with times",
+                remedy="record with `candump -l` or `candump -t a`",
+            )
+        for start, end in pairwise([0, *inner, len(parsed.frames)]):
+            yield parsed.frames.take(slice(start, end))
         done += parsed.lines
 
 

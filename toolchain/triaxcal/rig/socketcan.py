@@ -23,8 +23,9 @@ from triaxcal.rig.burst import (
     SO_RXQ_OVFL,
     SO_TIMESTAMPNS,
     BurstReceiver,
+    struct_marks,
 )
-from triaxcal.rig.frames import Frames, empty
+from triaxcal.rig.frames import BRS, DLC_SHIFT, ESI, Frames, empty
 from triaxcal.rig.source import PACE_S, WAIT_S, Watched
 
 QUEUE_BYTES = 4 << 20
@@ -37,7 +38,7 @@ _FULL_RATE = 9000
 _REOPEN_S = 0.2
 _CAN_DEVICE = "280"  # ARPHRD_CAN
 _NETWORK = Path("/sys/class/net")
-_HEAD = struct.Struct("@IB")
+_HEAD = struct.Struct("@IBBBB")
 _GONE = {errno.ENODEV, errno.ENXIO, errno.EBADF, errno.ENETUNREACH}
 
 
@@ -195,13 +196,13 @@ def can_devices() -> list[str]:
 def packed(frames: Frames) -> list[bytes]:
     """Frames as struct can_frame or canfd_frame, to be sent."""
     rows = zip(
-        frames.can_id.tolist(), frames.length.tolist(), frames.fd.tolist(), frames.data, strict=True
-    )
+        frames.can_id.tolist(), frames.length.tolist(), frames.fd.tolist(), frames.marks.tolist(),
+        frames.data, strict=True
+    )  # fmt: skip
     return [
-        _HEAD.pack(can_id, length)
-        + b"\0\0\0"
+        _HEAD.pack(can_id, length, marks & (BRS | ESI) if fd else 0, 0, marks >> DLC_SHIFT)
         + data.tobytes()[: 64 if fd else 8].ljust(64 if fd else 8, b"\0")
-        for can_id, length, fd, data in rows
+        for can_id, length, fd, marks, data in rows
     ]
 
 
@@ -214,12 +215,14 @@ def frames_of_rows(rows: list[tuple[int, bytes]]) -> Frames:
     size = FD_BYTES if wide else CLASSIC_BYTES
     text = b"".join(payload.ljust(size, b"\0") for _, payload in rows)
     table = np.frombuffer(text, np.uint8).reshape(len(rows), size)
+    fd = np.array([len(payload) == FD_BYTES for _, payload in rows], np.bool_)
     return Frames(
         np.array([t_ns for t_ns, _ in rows], np.int64),
         table[:, :4].copy().view(np.uint32)[:, 0],
         table[:, 4],
-        np.array([len(payload) == FD_BYTES for _, payload in rows], np.bool_),
+        fd,
         table[:, 8:],
+        struct_marks(table, fd),
     )
 
 

@@ -18,11 +18,12 @@ class LogSource:
     """Source of the frames that a log holds."""
 
     def __init__(self, path: Path) -> None:
-        from triaxcal.rig.candump import read_log  # noqa: PLC0415
+        from triaxcal.rig.logfile import Left, read_frames  # noqa: PLC0415
 
         self.name = str(path)
-        self._parts = read_log(path)
-        self._bad_lines = 0
+        self._parts = read_frames(path)
+        self._new = Left
+        self._left = Left()
 
     def read(self) -> Frames:
         """Frames of the next part of the log.
@@ -36,13 +37,13 @@ class LogSource:
         if part is None:
             remedy = "`triaxcal rig replay` makes the records of a whole session from its log"
             raise RefusedError(self.name, "the log has ended", remedy=remedy)
-        self._bad_lines += part.bad_lines
+        self._left.add(part)
         return part.frames
 
     def notes(self) -> list[str]:
         """Lines that are no frames."""
-        bad, self._bad_lines = self._bad_lines, 0
-        return [f"{self.name}: {bad} lines are no frames"] if bad else []
+        said, self._left = self._left.notes(self.name), self._new()
+        return said
 
     def close(self) -> None:
         """Close the log."""
