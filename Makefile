@@ -19,7 +19,7 @@ NAMED = case "$$UNIT" in \
     */*) echo "make: UNIT=$$UNIT is a path; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; esac
 
 .DEFAULT_GOAL := help
-.PHONY: help series test-long test-verify rig-demo test-can calib-header verify fuzz mutation simulate test check lint types nightly bench golden docs clean test-targets bench-target
+.PHONY: help series test-long test-verify rig-demo test-can calib-header verify certify fuzz mutation simulate test check lint types nightly bench golden docs clean test-targets bench-target
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -36,6 +36,10 @@ series: $(INSTALLED)  ## Every unit of units/ that is not done yet, and a page a
 verify: $(INSTALLED)  ## UNIT=<name>: Gappa, Frama-C, cppcheck, gcc and clang on the C of a unit
 	@$(NAMED)
 	@$(BIN)/triaxcal verify "units/$$UNIT"
+
+certify: $(INSTALLED)  ## UNIT=<name>: the error bound as theorems that Coq checks (minutes)
+	@$(NAMED)
+	@$(BIN)/triaxcal certify "units/$$UNIT"
 
 fuzz: $(DEVELOPER)  ## Images against the loaders, text against the parsers, for a minute
 	@$(BIN)/python fuzz/run.py

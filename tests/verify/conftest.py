@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from triaxcal.verify.shapes import SHAPES, Subject, subject
+from triaxcal.verify.shapes import ALL_SHAPES, SHAPES, Subject, subject
 from triaxcal.verify.workspace import ROUTINE, Workspace
 
 UNITS = Path(__file__).parent.parent.parent / "units"
@@ -19,7 +19,7 @@ Planter = Callable[..., Workspace]
 
 @pytest.fixture(scope="session")
 def subjects() -> dict[str, Subject]:
-    return {name: subject(name, UNITS) for name in SHAPES}
+    return {name: subject(name, UNITS) for name in ALL_SHAPES}
 
 
 @pytest.fixture

@@ -33,7 +33,7 @@ def test_without_any_tool_everything_is_not_done(
     for outcome in outcomes:
         assert "not found; sudo apt-get install " in outcome.finding
     assert exit_code(outcomes) == 0
-    text = table(outcomes)
+    text = table({"": outcomes})
     assert f"0 passed, 0 failed, {len(CHECKS)} not done: " in text
     assert "frama-c-base" in text
 
@@ -58,7 +58,7 @@ def test_a_tool_that_breaks_fails(
 
 
 def test_table_tells_complaints_of_failures_only() -> None:
-    text = table([PASS, FAIL, LEFT])
+    text = table({"": [PASS, FAIL, LEFT]})
     assert "1 passed, 1 failed, 1 not done: check c" in text
     assert "  9\n  and 2 more" in text
 

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from triaxcal.api.study import Study
     from triaxcal.api.table import TableGrid, study_angle_errors
     from triaxcal.api.unit import Unit, read_unit
-    from triaxcal.api.verification import Verification, verify_unit
+    from triaxcal.api.verification import Verification, certify, verify_unit
     from triaxcal.base.errors import RefusedError, UsageError
     from triaxcal.delivery.verdict import LimitCheck, Verdict
     from triaxcal.uncertainty.budget import Budget
@@ -65,11 +65,12 @@ __all__ = [
     "ExportedFiles", "FieldCheck", "FieldUpdate", "Firmware", "Imu", "ImuCalibration",
     "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck", "LivePair", "MeasurementPlan",
     "RefusedError", "SeriesResult", "Study", "TableGrid", "Unit", "UsageError", "Verdict",
-    "Verification", "__version__", "calibrate_series", "compare_history", "cross_coupling",
-    "deliver", "delivered_firmware", "diagnose", "export", "find_poses", "firmware", "firmware_imu",
-    "fit", "fit_imu", "key_schema", "learn_priors", "load", "load_imu", "plan_measurements",
-    "plan_motion", "read_image", "read_imu", "read_unit", "simulate", "simulate_series",
-    "study_angle_errors", "study_drift", "update", "verify_unit", "write_first_file",
+    "Verification", "__version__", "calibrate_series", "certify", "compare_history",
+    "cross_coupling", "deliver", "delivered_firmware", "diagnose", "export", "find_poses",
+    "firmware", "firmware_imu", "fit", "fit_imu", "key_schema", "learn_priors", "load", "load_imu",
+    "plan_measurements", "plan_motion", "read_image", "read_imu", "read_unit", "simulate",
+    "simulate_series", "study_angle_errors", "study_drift", "update", "verify_unit",
+    "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
@@ -95,7 +96,7 @@ _MODULES = {
     "triaxcal.api.study": ("Study",),
     "triaxcal.api.table": ("TableGrid", "study_angle_errors"),
     "triaxcal.api.unit": ("Unit", "read_unit"),
-    "triaxcal.api.verification": ("Verification", "verify_unit"),
+    "triaxcal.api.verification": ("Verification", "certify", "verify_unit"),
     "triaxcal.base.errors": ("RefusedError", "UsageError"),
     "triaxcal.delivery.verdict": ("LimitCheck", "Verdict"),
     "triaxcal.uncertainty.budget": ("Budget",),

@@ -1,10 +1,12 @@
-"""`verify_unit`: external tools check the delivered C."""
+"""`verify_unit` and `certify`: external tools check the delivered C and the proof of its bound."""
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from triaxcal.base.progress import Progress
 from triaxcal.base.publish import publish, renew
@@ -19,11 +21,17 @@ from triaxcal.report.files import SOMETIMES, all_files, passport_files
 from triaxcal.report.imuc import C_FILES, refuse_no_device
 from triaxcal.report.passport.content import passport
 from triaxcal.unit.folder import find_unit
+from triaxcal.verify import certificate
 from triaxcal.verify.campaign import delivery_outcomes, exit_code, verify_files
-from triaxcal.verify.imu import imu_delivery_outcomes, verify_imu
+from triaxcal.verify.certificate_readme import certificate_readme
+from triaxcal.verify.imu import imu_delivery_outcomes, triads, verify_imu
 from triaxcal.verify.outcome import Outcome
 from triaxcal.verify.record import entries, is_delivered, record
-from triaxcal.verify.table import grouped_table, table
+from triaxcal.verify.table import table
+from triaxcal.verify.workspace import Workspace
+
+Groups = Mapping[str, Sequence[Outcome]]
+"""Outcomes of each part of the C; an accelerometer alone is the part ""."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +48,54 @@ class Verification:
         Whether a check failed.
     summary : str
         The table that the command line prints.
+    certificates : Path or None
+        Folder of the files that Coq accepted.
     """
 
     folder: Path
     outcomes: tuple[Outcome, ...]
     failed: bool
     summary: str
+    certificates: Path | None = None
+
+
+@dataclass(frozen=True)
+class _Delivered:
+    """A delivery in place, and how its parts are verified.
+
+    Attributes
+    ----------
+    verify : callable
+        Runs every check in a folder.
+    workspaces : callable
+        Each part's files in a folder.
+    before : mapping
+        What the delivery itself has proven.
+    renew : callable
+        Writes the passport with the section "tools" of verification.json.
+    """
+
+    name: str
+    target: Path
+    verify: Callable[[Path], Groups]
+    workspaces: Callable[[Path], Mapping[str, Workspace]]
+    before: Groups
+    renew: Callable[[Mapping[str, Any]], None]
+
+    def keep(self, groups: Groups) -> None:
+        """Outcomes into verification.json and the passport."""
+        found: dict[str, Any] = {name: entries(outcomes) for name, outcomes in groups.items()}
+        self.renew(record(self.target, found.pop("", {}) | found))
+
+    def verification(
+        self, groups: Groups, shown: Groups, certificates: Path | None = None
+    ) -> Verification:
+        """The result, with the table of what is shown."""
+        outcomes = tuple(outcome for found in groups.values() for outcome in found)
+        rows = table({name.replace("_", " "): found for name, found in shown.items()})
+        failed = exit_code(outcomes) != 0
+        text = f"unit {self.name}\n\n{rows}"
+        return Verification(self.target, outcomes, failed, text, certificates)
 
 
 def verify_unit(
@@ -61,44 +111,78 @@ def verify_unit(
     RefusedError
         As `deliver`; for an IMU without [device].
     """
-    unit = Path(folder)
+    delivered = _deliver(Path(folder), Path(build), progress)
+    with tempfile.TemporaryDirectory(prefix="triaxcal-verify-") as work:
+        groups = delivered.verify(Path(work))
+    delivered.keep(groups)
+    shown = {name: [*delivered.before[name], *found] for name, found in groups.items()}
+    return delivered.verification(groups, shown)
+
+
+def certify(
+    folder: str | Path, build: str | Path = "build", progress: Progress | None = None
+) -> Verification:
+    """Deliver a unit, then prove its error bound in Coq.
+
+    One theorem for each axis and segment, in the integers of the specification, goes into
+    build/certificates/<unit>/ when Coq has accepted all of them. verification.json and the passport
+    get their hashes. docs/explanation/certificate.md explains what is proven.
+
+    Raises
+    ------
+    RefusedError
+        As `deliver`; for an IMU without [device].
+    """
+    delivered = _deliver(Path(folder), Path(build), progress)
+    groups: dict[str, Sequence[Outcome]] = {}
+    files: dict[str, bytes] = {}
+    with tempfile.TemporaryDirectory(prefix="triaxcal-certify-") as work:
+        for name, workspace in delivered.workspaces(Path(work)).items():
+            outcome, proofs = certificate.certify(workspace, name, progress)
+            groups[name] = [outcome]
+            files |= proofs
+    delivered.keep(groups)
+    place = Path(build) / "certificates" / delivered.name
+    if files:
+        readme = certificate_readme(delivered.name, groups)
+        publish({**files, "README.txt": readme}, place, ["*.v"])
+    return delivered.verification(groups, groups, place if files else None)
+
+
+def _deliver(unit: Path, build: Path, progress: Progress | None) -> _Delivered:
     if has_table(find_unit(unit), "dynamic"):
-        return _verify_imu(unit, Path(build), progress)
-    return _verify_accelerometer(unit, Path(build))
-
-
-def _verify_accelerometer(unit: Path, build: Path) -> Verification:
+        return _deliver_imu(unit, build, progress)
     delivery = deliver(unit)
     target = build / delivery.unit.name
     device = read_record(record_path(target))
     files = all_files(delivery, passport(delivery, {}, device))
     if not is_delivered(target, files):
         publish(files, target, SOMETIMES)
-    with tempfile.TemporaryDirectory(prefix="triaxcal-verify-") as folder:
-        outcomes = verify_files(Path(folder), delivery.files, delivery.plan, delivery.bound)
-    tools = entries(outcomes)
-    record(target, tools)
-    renew(passport_files(passport(delivery, tools, device)), target)
-    rows = table([*delivery_outcomes(delivery.bound, delivery.check), *outcomes])
-    text = f"unit {delivery.unit.name}\n\n{rows}"
-    return Verification(target, tuple(outcomes), exit_code(outcomes) != 0, text)
+    parts = delivery.files, delivery.plan, delivery.bound
+    return _Delivered(
+        delivery.unit.name,
+        target,
+        verify=lambda work: {"": verify_files(work, *parts)},
+        workspaces=lambda work: {"": Workspace.create(work, *parts)},
+        before={"": delivery_outcomes(delivery.bound, delivery.check)},
+        renew=lambda tools: renew(passport_files(passport(delivery, tools, device)), target),
+    )
 
 
-def _verify_imu(unit: Path, build: Path, progress: Progress | None) -> Verification:
+def _deliver_imu(unit: Path, build: Path, progress: Progress | None) -> _Delivered:
     refuse_no_device(read_dynamic(unit))
     made = deliver_imu(unit, progress)
     assert made.c is not None
+    built = made.c.build
     target = build / made.done.unit.name
     files = dynamic_files(made)
     if not is_delivered(target, files):
         publish(files, target, C_FILES)
-    with tempfile.TemporaryDirectory(prefix="triaxcal-verify-") as folder:
-        groups = verify_imu(Path(folder), made.c.build)
-    tools = {name: entries(outcomes) for name, outcomes in groups.items()}
-    record(target, tools)
-    renew({"dynamic.html": dynamic_page(made, tools)}, target)
-    before = imu_delivery_outcomes(made.c.build)
-    shown = {name.replace("_", " "): [*before[name], *groups[name]] for name in groups}
-    outcomes = tuple(o for found in groups.values() for o in found)
-    text = f"unit {made.done.unit.name}\n\n{grouped_table(shown)}"
-    return Verification(target, outcomes, exit_code(list(outcomes)) != 0, text)
+    return _Delivered(
+        made.done.unit.name,
+        target,
+        verify=lambda work: verify_imu(work, built),
+        workspaces=lambda work: triads(work, built),
+        before=imu_delivery_outcomes(built),
+        renew=lambda tools: renew({"dynamic.html": dynamic_page(made, tools)}, target),
+    )

@@ -19,7 +19,7 @@ SECTIONS = {
     "In the field": ("check", "update", "device"),
     "Look at readings and results": ("diagnose", "poses", "drift", "crosscoupling", "history"),
     "Into production": ("firmware", "image", "a2l", "export"),
-    "Check the generated C": ("verify", "target"),
+    "Check the generated C": ("verify", "certify", "target"),
     "Plan, measure, simulate": ("init", "design", "rig", "simulate", "schema"),
 }
 """Every command, in the order of the help. Most are imported from files of their own."""

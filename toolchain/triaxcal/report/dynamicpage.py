@@ -15,7 +15,7 @@ from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.consistency import consistent, verdict
 from triaxcal.dynamic.observability import Weak
 from triaxcal.report.imuc import NO_C, imu_verification
-from triaxcal.report.words.firmware import file_rows, tool_rows
+from triaxcal.report.words.firmware import file_rows, theorem_rows, tool_rows
 from triaxcal.report.words.numbers import signed, superscript, thousands
 
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
@@ -87,7 +87,10 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
             for group, entries in tools.items()
             for row in tool_rows(entries, f"{group.replace('_', ' ')}: ")
         ],
-        "files": [] if made.c is None else file_rows(made.c.build.files),
+        "files": [
+            *([] if made.c is None else file_rows(made.c.build.files)),
+            *(row for entries in tools.values() for row in theorem_rows(entries)),
+        ],
     }
     return environment().get_template("pages/dynamic.html.j2").render(context).encode()
 

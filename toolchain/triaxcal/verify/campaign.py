@@ -34,7 +34,11 @@ def verify_files(
     folder: Path, files: Mapping[str, bytes], plan: Plan, bound: Bound
 ) -> tuple[Outcome, ...]:
     """Run every check on delivered files; `folder` is for the work and stays behind."""
-    work = Workspace.create(folder, files, plan, bound)
+    return verify_work(Workspace.create(folder, files, plan, bound))
+
+
+def verify_work(work: Workspace) -> tuple[Outcome, ...]:
+    """Run every check on the files of a workspace."""
     with ThreadPoolExecutor(2) as pool:
         return tuple(
             pool.map(lambda check: guarded(check[0], check[1], lambda: check[2](work)), CHECKS)

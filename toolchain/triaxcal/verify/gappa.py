@@ -40,7 +40,7 @@ _HARMLESS = re.compile(
     r"Warning: (renaming identifier '\w+' as '\w+' at .*|case split on x has not produced any .*)"
 )
 """Two names for one expression, and slices that gain nothing: of functions that are constant."""
-_INTERVAL = re.compile(rf" in \[{_NUMBER}{_APPROXIMATION}, {_NUMBER}{_APPROXIMATION}\]")
+INTERVAL = re.compile(rf" in \[{_NUMBER}{_APPROXIMATION}, {_NUMBER}{_APPROXIMATION}\]")
 
 
 def check(work: Workspace) -> Outcome:
@@ -89,12 +89,17 @@ def _bound(work: Workspace, image: Image, axis: int, s: int) -> float:
     script = work.render(
         f"verify_{axis}_{s}.g", "verify/gappa.g.j2", script_context(work, image, axis, s)
     )
-    return largest_magnitude(_run(work, script))
+    return largest_magnitude(run_gappa(work, script))
 
 
-def _run(work: Workspace, script: Path) -> str:
-    """What Gappa printed of a script that it could check."""
-    answer = run([GAPPA.find(), script.name], work.folder)
+def run_gappa(work: Workspace, script: Path, *flags: str) -> str:
+    """What Gappa printed of a script that it could check.
+
+    Raises
+    ------
+    MissingToolError, BrokenToolError
+    """
+    answer = run([GAPPA.find(), *flags, script.name], work.folder)
     if answer.code or "arning" in _HARMLESS.sub("", answer.text):
         # A hint that Gappa cannot check itself comes as a warning: then nothing is proven.
         raise BrokenToolError(f"gappa: {' '.join(answer.text.split())[:200]}")
@@ -125,7 +130,7 @@ def _quadratic(work: Workspace, image: Image, linear_lsb: Sequence[float]) -> li
             "error": [_dyadic(e) for e in error],
         }
         script = work.render(f"verify_q{axis}.g", "verify/gappa_quadratic.g.j2", context)
-        found = largest_magnitude(_run(work, script))
+        found = largest_magnitude(run_gappa(work, script))
         bounds.append(math.nextafter(float(Fraction(found) / place), math.inf))
     return bounds
 
@@ -153,17 +158,22 @@ def largest_magnitude(text: str) -> float:
     BrokenToolError
         When it printed none.
     """
-    found = _INTERVAL.search(text)
+    found = INTERVAL.search(text)
     if found is None:
         raise BrokenToolError(f"gappa gave no interval: {' '.join(text.split())[:200]}")
-    ends = [
-        abs(Fraction(int(m)) * Fraction(2) ** int(e or 0))
-        for m, e in (found.group(1, 2), found.group(3, 4))
-    ]
-    largest = max(ends)
+    largest = max(map(abs, ends_of(found)))
     value = float(largest)
     # Shortest step upwards that a float can hold: the stated bound never lies below the proven.
     return value if Fraction(value) >= largest else value * (1 + 2.0**-52)
+
+
+def ends_of(interval: re.Match[str]) -> tuple[Fraction, Fraction]:
+    """Both ends of an interval that `INTERVAL` found."""
+    low, high = (
+        Fraction(int(m)) * Fraction(2) ** int(e or 0)
+        for m, e in (interval.group(1, 2), interval.group(3, 4))
+    )
+    return low, high
 
 
 def script_context(work: Workspace, image: Image, axis: int, s: int) -> dict[str, object]:

@@ -20,10 +20,19 @@ from triaxcal.codegen.names import names_of
 from triaxcal.codegen.shim import write_shim
 from triaxcal.codegen.templates import environment
 from triaxcal.verify import analyzers, cppcheck, eva
-from triaxcal.verify.campaign import delivery_outcomes, guarded, verify_files
+from triaxcal.verify.campaign import delivery_outcomes, guarded, verify_work
 from triaxcal.verify.image_reader import image_length
 from triaxcal.verify.outcome import Outcome
-from triaxcal.verify.workspace import CONSTANTS, IMAGE, LIMBS, PORTABLE, ROUTINE, SELFTEST, SHIM
+from triaxcal.verify.workspace import (
+    CONSTANTS,
+    IMAGE,
+    LIMBS,
+    PORTABLE,
+    ROUTINE,
+    SELFTEST,
+    SHIM,
+    Workspace,
+)
 
 ACCELEROMETER, GYRO, BOTH = "accelerometer", "gyro", "both_triads"
 _DRIVER = "verify_eva_imu.c"
@@ -74,14 +83,19 @@ def verify_imu(folder: Path, build: ImuBuild) -> dict[str, tuple[Outcome, ...]]:
     dict
         Outcomes of `ACCELEROMETER`, `GYRO` and `BOTH`.
     """
+    outcomes = {name: verify_work(work) for name, work in triads(folder, build).items()}
+    return {**outcomes, BOTH: _verify_both(folder / "both", build)}
+
+
+def triads(folder: Path, build: ImuBuild) -> dict[str, Workspace]:
+    """Files of `ACCELEROMETER` and `GYRO`, each in a folder of its own."""
     image = build.files[names_of(build.accel).file(IMU_IMAGE_FILE)]
     length = image_length(image) + IDENTITY_SIZE
     accel = {**build.files, names_of(build.accel).file(IMAGE): image[:length]}
     gyro = {**build.files, names_of(build.gyro).file(IMAGE): image[length:]}
     return {
-        ACCELEROMETER: verify_files(folder / "accel", accel, build.accel, build.accel_bound),
-        GYRO: verify_files(folder / "gyro", gyro, build.gyro, build.gyro_bound),
-        BOTH: _verify_both(folder / "both", build),
+        ACCELEROMETER: Workspace.create(folder / "accel", accel, build.accel, build.accel_bound),
+        GYRO: Workspace.create(folder / "gyro", gyro, build.gyro, build.gyro_bound),
     }
 
 

@@ -54,10 +54,11 @@ def tools_of(target: Path) -> dict[str, Any]:
     return dict(_load(path.read_bytes(), path).get(SECTION) or {})
 
 
-def record(target: Path, section: Mapping[str, Any]) -> None:
-    """Set the section of the tools in verification.json; everything else keeps its bytes.
+def record(target: Path, section: Mapping[str, Any]) -> dict[str, Any]:
+    """Add outcomes to the section of the tools in verification.json, and return the section.
 
-    The new file is written beside the old one and takes its place when it is complete.
+    A check that was done now replaces its outcome; what other checks found stays. The new file is
+    written beside the old one and takes its place when it is complete.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def record(target: Path, section: Mapping[str, Any]) -> None:
     """
     path = target / FILE
     document = _load(path.read_bytes(), path)
-    document[SECTION] = dict(section)
+    document[SECTION] = _merged(document.get(SECTION, {}), section)
     content = json_bytes(document)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{FILE}.", dir=target)
@@ -80,6 +81,16 @@ def record(target: Path, section: Mapping[str, Any]) -> None:
     except OSError as error:
         remedy = "free some space or name another folder"
         raise refused_by_system(path, "written", error, remedy=remedy) from error
+    done: dict[str, Any] = document[SECTION]
+    return done
+
+
+def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """Entries of checks, or groups of them: only an entry has a result."""
+    return dict(old) | {
+        name: value if "result" in value else _merged(old.get(name, {}), value)
+        for name, value in new.items()
+    }
 
 
 def _load(content: bytes, path: Path) -> dict[str, Any]:

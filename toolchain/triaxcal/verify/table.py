@@ -9,16 +9,14 @@ from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 SHOWN_DETAILS = 10
 
 
-def table(outcomes: Sequence[Outcome]) -> str:
-    """Title, result and finding of each check, complaints of those that failed, and the count."""
-    return "\n".join([*_rows(outcomes), "", _count(outcomes)])
+def table(groups: Mapping[str, Sequence[Outcome]]) -> str:
+    """Title, result and finding of each check, complaints of those that failed, and the count.
 
-
-def grouped_table(groups: Mapping[str, Sequence[Outcome]]) -> str:
-    """The same of several groups, each below its name."""
+    Each group stands below its name, where it has one.
+    """
     lines: list[str] = []
     for name, outcomes in groups.items():
-        lines += [name, *_rows(outcomes), ""]
+        lines += [*([name] if name else []), *_rows(outcomes), ""]
     return "\n".join([*lines, _count([o for outcomes in groups.values() for o in outcomes])])
 
 

@@ -23,7 +23,13 @@ from triaxcal.report.pictures.curves import (
 )
 from triaxcal.report.pictures.residual_panels import residual_panels
 from triaxcal.report.words.device import device_not_counted, device_words
-from triaxcal.report.words.firmware import checked_words, file_rows, proven_words, tool_rows
+from triaxcal.report.words.firmware import (
+    checked_words,
+    file_rows,
+    proven_words,
+    theorem_rows,
+    tool_rows,
+)
 from triaxcal.report.words.measured import measured_words
 from triaxcal.report.words.numbers import (
     g_in_words,
@@ -73,7 +79,7 @@ def passport_html(p: Passport) -> bytes:
         "selection_reason": p.delivery.calibration.selection_reason,
         "verification": _verification(p),
         "tools": tool_rows(p.tools),
-        "files": file_rows(p.delivery.files),
+        "files": [*file_rows(p.delivery.files), *theorem_rows(p.tools)],
     }
     return environment().get_template("pages/passport.html.j2").render(context).encode()
 

@@ -41,6 +41,12 @@ def tool_rows(tools: Mapping[str, Any], prefix: str = "") -> list[dict[str, str]
     ]
 
 
+def theorem_rows(tools: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Names and hashes of the theorems that Coq accepted, from a section of entries."""
+    accepted = tools.get("coq", {}).get("sha256", {})
+    return [{"name": f"certificates/{file}", "sha256": sha256} for file, sha256 in accepted.items()]
+
+
 def file_rows(files: Mapping[str, bytes]) -> list[dict[str, str]]:
     """Names and hashes."""
     return [
