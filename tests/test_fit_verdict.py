@@ -188,7 +188,7 @@ def test_the_printed_reason_is_true(seed):
 def test_what_nothing_tests_is_said():
     three = readings(cubic_truth(), TABLE_TEMPS, sd_v=1e-7, count=100)
     untested = "between the temperatures not tested"
-    wide = {"limits": Limits(0.01, 0.01)}
+    wide = {"limits": Limits(0.03, 0.03)}  # exchanged temperatures are 19 mg
     assert verdict(three, **wide).words == f"passed at the dwells; {untested}"
     at_t0 = with_checks(three, cubic_truth(), (20.0,), sd_v=1e-7, count=100)
     assert verdict(at_t0, **wide).words == f"passed at the dwells; {untested}"
@@ -201,6 +201,43 @@ def test_what_nothing_tests_is_said():
         "held out at T0: not tested",
         "held out over the range: not tested",
     ]
+
+
+def slanted(temp):
+    """Sensitivities that change by 2e-4 a degree: 20 mg over 100 degC."""
+    t = (np.asarray(temp, dtype=float) - 20.0)[..., None]
+    slope = np.zeros(12)
+    slope[[0, 4, 8]] = 2e-4 * TABLES[1][[0, 4, 8]]
+    return TABLES[1] + t * slope
+
+
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_exchanged_ends_of_three_temperatures_are_said_to_be_untested(exchanged):
+    """No reading can show it: a unit whose constants change the other way reads the same."""
+    data = readings(slanted, (-30.0, 20.0, 70.0), sd_v=1e-7, count=100)
+    if exchanged:
+        away = with_temperature(data, -30.0, 200.0)
+        data = with_temperature(with_temperature(away, 70.0, -30.0), 200.0, 70.0)
+    found = verdict(data, limits=Limits(0.01, 0.01))
+    assert found.words.startswith(
+        "passed at the dwells; between the temperatures not tested; which temperature is which not "
+        "tested: with two exchanged, a component is up to "
+    )
+    # 2e-4 * 100 / 0.99: 20.2 mg.
+    (stated,) = re.findall(r"up to (\S+) mg wrong", found.words)
+    assert float(stated) == 20.0
+    assert not any(t.whole for t in found.tested if t.what == "with uncertainty")
+    assert verdict(data, limits=Limits(0.03, 0.03)).words == (
+        "passed at the dwells; between the temperatures not tested"
+    )
+
+
+def test_four_temperatures_or_checks_show_which_is_which():
+    four = readings(slanted, (-30.0, 0.0, 20.0, 60.0), sd_v=1e-7, count=100)
+    assert verdict(four, limits=Limits(0.01, 0.01)).words == "passed"
+    three = readings(slanted, (-30.0, 20.0, 60.0), sd_v=1e-7, count=100)
+    checked = with_checks(three, slanted, (-5.0, 40.0), sd_v=1e-7, count=100)
+    assert "which temperature" not in verdict(checked, limits=Limits(0.01, 0.01)).words
 
 
 @pytest.mark.parametrize(

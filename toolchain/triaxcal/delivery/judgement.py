@@ -14,6 +14,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import Fitted, refuse_beyond_limits
+from triaxcal.delivery.unshown import contradictions, temperatures_untested
 from triaxcal.delivery.verdict import (
     AT_DWELLS,
     AT_POSES,
@@ -81,10 +82,11 @@ def verdict_on(fitted: Fitted, errors_g: FloatArray, found: Uncertainty) -> Verd
     result = PASSED
     if untested:
         result = AT_DWELLS if recording is None else AT_POSES
-    if any(t.beyond for t in tested if t.what == UNCERTAINTY):
+    contradicts = contradictions(unit, calibration)
+    if contradicts or any(t.beyond for t in tested if t.what == UNCERTAINTY):
         result = NOT_SHOWN
     note = _estimated(calibration)
-    return Verdict(result, None, tested, untested, _held_out_g(calibration), note)
+    return Verdict(result, None, tested, untested, _held_out_g(calibration), note, contradicts)
 
 
 def _held_out_g(calibration: Calibration) -> float | None:
@@ -118,8 +120,9 @@ def not_tested(unit: UnitDescription, calibration: Calibration) -> tuple[str, ..
     if test is None or test.between:
         estimated = held_out_refusal(unit, calibration, "", 1.0) is not None
         return ("between the temperatures estimated, not tested",) * estimated
-    one = len(calibration.points) == 1
-    return ("nothing was held out" if one else "between the temperatures not tested",)
+    if len(calibration.points) == 1:
+        return ("nothing was held out",)
+    return ("between the temperatures not tested", *temperatures_untested(unit, calibration))
 
 
 def _clipped(calibration: Calibration) -> tuple[str, ...]:
@@ -213,7 +216,8 @@ def _with_uncertainty(
     fitted: Fitted, errors_g: FloatArray, found: Uncertainty
 ) -> Iterator[LimitCheck]:
     """The largest error at any dwell or pose, and the uncertainty (95 %) of |a| beside it."""
-    whole = not any(s.unknown for s in found.sources)
+    unsure = temperatures_untested(fitted.unit, fitted.calibration)
+    whole = not unsure and not any(s.unknown for s in found.sources)
     uncertain = dict(zip((AT_T0, OVER_RANGE), found.length_g, strict=True))
     by_place = _by_place(fitted, errors_g, checks=None)
     for where, limit_g in _places(fitted.unit, fitted.calibration.range_degc).items():

@@ -81,7 +81,8 @@ class Verdict:
     ----------
     result : str
         "passed"; "passed at the dwells" or "passed at the poses", where something was not tested;
-        "not shown", where the uncertainty reaches beyond a limit; "not checked", where readings
+        "not shown", where the uncertainty reaches beyond a limit, or a result contradicts what is
+        known beforehand; "not checked", where readings
         could not contradict the constants at all; "refused", and nothing is delivered.
     refusal : RefusedError or None
         Why it may not be delivered: place, found, expected, remedy.
@@ -93,6 +94,8 @@ class Verdict:
         Rms error of the chosen functions on readings that their fit did not use.
     note : str
         How a held-out error was estimated, where it is not that of the delivered curves; or "".
+    contradicts : tuple of str
+        What is known beforehand and contradicts the result, in words.
     """
 
     result: str
@@ -101,6 +104,7 @@ class Verdict:
     not_tested: tuple[str, ...]
     held_out_g: float | None
     note: str = ""
+    contradicts: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -126,8 +130,11 @@ class Verdict:
         reached = ", ".join(
             f"{t.largest_g * 1e3:.3g} mg {t.where} (limit {t.limit_g * 1e3:g} mg)" for t in found
         )
-        head = "not shown to be within the limits: error and uncertainty (95 %) reach"
-        return "; ".join([f"{head} {reached}", *self.not_tested])
+        reasons = [*self.contradicts]
+        if found:
+            reasons.append(f"error and uncertainty (95 %) reach {reached}")
+        head = f"not shown to be within the limits: {reasons[0]}"
+        return "; ".join([head, *reasons[1:], *self.not_tested])
 
     @property
     def heads(self) -> tuple[str, ...]:

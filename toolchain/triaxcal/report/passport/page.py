@@ -84,12 +84,15 @@ def passport_html(p: Passport) -> bytes:
     return environment().get_template("pages/passport.html.j2").render(context).encode()
 
 
+_NOT_SHOWN = ("the uncertainty reaches beyond a limit", "the scale contradicts the readings' unit")
+
+
 def _badge(verdict: Verdict) -> dict[str, Any]:
     """The verdict in large letters, and what it leaves open."""
     why = "; ".join(verdict.not_tested) or "see below"
     result, small = {
         PASSED: (PASSED, "within the limits, uncertainty included"),
-        NOT_SHOWN: ("not shown to pass", "the uncertainty reaches beyond a limit"),
+        NOT_SHOWN: ("not shown to pass", _NOT_SHOWN[bool(verdict.contradicts)]),
         NOT_CHECKED: (NOT_CHECKED, "as many constants as poses"),
     }.get(verdict.result, (verdict.result, why))
     return {"good": verdict.shown, "result": result.upper(), "small": small}
