@@ -34,6 +34,9 @@ class Change:
     count: int = 1
 
 
+_EACH = 2**29
+"""Each of the coefficients above c_0, where all of them decide."""
+
 Limit = tuple[str, list[Change]]
 """A name and what is changed."""
 
@@ -81,17 +84,30 @@ class Limits:
                 yield f"first_code {first}", [Change(at, first), *gains]
 
     def _coefficients(self) -> Iterator[Limit]:
-        """A function at its bound and one beyond; the rest of its row is nil."""
+        """A function at its bound and one beyond, by one coefficient or by all of them."""
         layout, order = self.layout, self.layout.order
         s = layout.segments - 1
         for f, k, sign in ((0, 0, 1), (6, min(1, order), -1), (11, 0, -1)):
             room = INT32_MAX - _floors_above(order, k)
-            for value in (room, room + 1):
+            for value in (room, room + 1)[k:]:
                 yield (
                     f"c_{k} of function {f}",
                     [
                         Change(layout.coefficient(s, f - f % 4, 0), 0, self.nil),
                         Change(layout.coefficient(s, f, k), sign * value),
+                    ],
+                )
+        if order:
+            above = 0
+            for k in range(order, 0, -1):
+                above = _EACH + (0 if k == order else above // 2 + 1)
+            for value in (INT32_MAX - 1 - above // 2, INT32_MAX - above // 2):
+                yield (
+                    f"c_0 of function 9 beneath others {value}",
+                    [
+                        Change(layout.coefficient(s, 8, 0), 0, self.nil),
+                        Change(layout.coefficient(s, 9, 1), _EACH, order),
+                        Change(layout.coefficient(s, 9, 0), -value),
                     ],
                 )
         yield "INT32_MIN", [Change(layout.coefficient(s, 5, order), INT32_MIN)]
@@ -102,7 +118,9 @@ class Limits:
         if layout.inverse:
             return
         floors = sum_of_floors(layout.order)
-        for row, excess in itertools.product(range(3), (-1, 0)):
+        # With dT/dt an image of that term has row 1 at its limit.
+        rows = (0, 2) if layout.rate else range(3)
+        for row, excess in itertools.product(rows, (-1, 0)):
             left = layout.row_limit + excess - 5 * floors
             if layout.rate:
                 left -= 2 * (abs(self.words[layout.rate_word(RATE_WORDS + row)]) // 2 + 1)
@@ -137,10 +155,10 @@ class Limits:
         if not layout.rate:
             return
         low, high, gain = (layout.rate_word(k) for k in (RATE_MIN, RATE_MAX, RATE_GAIN))
-        for first, last in ((1, 1), (-1, -1), (-INT32_MAX, 0), (INT32_MIN, 0), (0, INT32_MAX)):
-            changes = [Change(low, first), Change(high, last), Change(gain, 1)]
-            yield f"rates {first} to {last}", changes
-        yield "rate gain 0", [Change(gain, 0)]
+        for at, value in ((low, 0), (low, 1), (high, 0), (high, -1), (gain, 0)):
+            yield f"word {at} of the rate {value}", [Change(at, value)]
+        for name, words in itertools.islice(rate_ties(layout, self.plan.shape), 0, 4, 2):
+            yield name, _runs(words)
         left = (layout.row_limit - 1 - 5 * sum_of_floors(layout.order) - 2**31) // 2
         for offset in (left, left + 1):
             yield (
@@ -151,8 +169,9 @@ class Limits:
                     Change(layout.rate_word(RATE_WORDS + 1), 2**31 - 2),
                 ],
             )
-        for name, words in itertools.islice(rate_ties(layout, self.plan.shape), 0, 4, 2):
-            yield name, _runs(words)
+        for first, last in ((INT32_MIN, 0), (0, INT32_MAX), (-INT32_MAX, 0)):
+            changes = [Change(low, first), Change(high, last), Change(gain, 1)]
+            yield f"rates {first} to {last}", changes
 
     def _inverses(self) -> Iterator[Limit]:
         shape, layout = self.plan.shape, self.layout
