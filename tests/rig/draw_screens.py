@@ -10,17 +10,18 @@ import sys
 import tempfile
 from pathlib import Path
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.screen import Screen
 from rig_cases import rig_of, short_setup
 
 from triaxcal.rig.engine import Engine
 from triaxcal.rig.events import View
 from triaxcal.rig.runner import Robot
-from triaxcal.rig.screen import BusView, screen
+from triaxcal.rig.screen import About, BusView, Faults, faults_page, help_page, screen
 from triaxcal.rig.view import view
 
-BUS = BusView("can0", 211.0, 26000.0, 0, 1_000_000)
+BUS = BusView("can0", 211.0, 0.026, 0)
+ABOUT = About("AT-SIM-BENCH", "AT-SIM-BENCH-001", "003", "16:42")
 SLIP = "TP1: slip of 144 micro-g on x at 8 s, retake"
 
 
@@ -52,12 +53,18 @@ def exceptions(folder: Path) -> dict[str, View]:
     return {"slip": view(slipped.session), "offer": view(offered.session)}
 
 
-def svg(seen: View, alarms: tuple[str, ...], width: int, height: int) -> str:
+def svg(
+    seen: View,
+    alarms: tuple[str, ...],
+    width: int,
+    height: int,
+    page: RenderableType | None = None,
+) -> str:
     console = Console(
         width=width, height=height, record=True, file=io.StringIO(), force_terminal=True,
         color_system="truecolor",
     )  # fmt: skip
-    console.print(Screen(screen(seen, BUS, alarms)))
+    console.print(Screen(screen(seen, BUS, alarms, ABOUT, page)))
     text = console.export_svg(title=f"triaxcal rig run, {width}x{height}")
     # Fonts of this machine in place of one from the network; blanks are meant.
     text = text.replace("Fira Code", "DejaVu Sans Mono")
@@ -68,10 +75,16 @@ def main(target: Path) -> None:
     target.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         states = phases(Path(folder)) | exceptions(Path(folder))
-    for width, height in ((80, 24), (120, 40)):
+    faults = Faults()
+    faults.add("14:02:11", [SLIP, "can0: no frames; is the rig on, the plug in, the bus up?"])
+    pages = {"help": help_page(), "faults": faults_page(faults, 8)}
+    for width, height in ((80, 24), (120, 40), (40, 12)):
         for name, seen in states.items():
             alarms = (SLIP,) if name == "slip" else ()
             (target / f"{name}-{width}.svg").write_text(svg(seen, alarms, width, height))
+        for name, page in pages.items():
+            text = svg(states["average"], (), width, height, page)
+            (target / f"{name}-{width}.svg").write_text(text)
 
 
 if __name__ == "__main__":

@@ -3,26 +3,45 @@
 from __future__ import annotations
 
 import io
+import re
+import time
+from dataclasses import replace
+from itertools import combinations
 
 import pytest
 from rich.console import Console
+from rich.style import Style
 from rig_cases import rig_of, short_setup
 
+from triaxcal.cli.rig_live import Operator, clock_of_end
 from triaxcal.rig.bigtext import big
 from triaxcal.rig.engine import Engine
+from triaxcal.rig.events import Agree, Redo
 from triaxcal.rig.runner import Robot
-from triaxcal.rig.screen import BusView, plain_status, screen
+from triaxcal.rig.screen import (
+    _ALARM,
+    _COLOURS,
+    HELP,
+    About,
+    BusView,
+    Faults,
+    faults_page,
+    help_page,
+    plain_status,
+    screen,
+)
 from triaxcal.rig.view import view
 
 PHASES = {"reference", "temperature", "turn", "still", "settle", "average", "guard", "done"}
-BUS = BusView("can0", 211.0, 26000.0, 3, 1_000_000)
+BUS = BusView("can0", 211.0, 0.026, 3)
+ABOUT = About("AT-7", "SN-0815", "003", "16:42")
 
 
-def drawn(seen, alarms, width, height):
+def drawn(seen, alarms, width, height, page=None):
     """Lines of the screen, as a terminal of this size gets them."""
     out = io.StringIO()
     console = Console(file=out, width=width, height=height, force_terminal=False)
-    console.print(screen(seen, BUS, alarms))
+    console.print(screen(seen, BUS, alarms, ABOUT, page))
     return [line.rstrip() for line in out.getvalue().splitlines()]
 
 
@@ -59,6 +78,83 @@ def test_it_fits_and_tells(states, phase, width, height):
         assert "dropped by the kernel 3" in text
         assert not alarms or "slip of 38 micro-g" in text
     assert seen.headline in plain_status(seen)
+
+
+@pytest.mark.parametrize(("width", "height"), [(40, 12), (60, 8), (30, 20), (20, 10)])
+@pytest.mark.parametrize("phase", sorted(PHASES))
+def test_a_small_terminal_keeps_the_order_and_the_alarm(states, phase, width, height):
+    seen = states[phase]
+    lines = drawn(seen, ("first", "TP1: slip of 38 micro-g on x"), width, height)
+    assert len(lines) <= height - 1
+    text = " ".join(" ".join(line.split()) for line in lines)
+    assert "ALARM: TP1: slip of 38 micro-g on x (and 1 more: f)" in text
+    assert seen.headline in text
+
+
+def test_unit_serial_session_and_end_are_shown(states):
+    text = "\n".join(drawn(states["average"], (), 80, 24))
+    assert "AT-7   serial SN-0815   session 003" in text
+    assert re.search(r"time left about \d+ min, ends 16:42", text)
+    assert "load 3 %" in text
+    assert "q stop" in text
+    console = Console(file=io.StringIO(), width=80, height=24)
+    console.print(screen(states["average"], replace(BUS, load=None), (), ABOUT))
+    assert "load not known, no bit rate" in console.file.getvalue()
+
+
+def test_pages_take_the_place_of_the_readings(states):
+    faults = Faults()
+    assert "No faults so far" in "\n".join(
+        drawn(states["turn"], (), 80, 24, faults_page(faults, 9))
+    )
+    for i in range(300):
+        faults.add(f"10:00:{i % 60:02d}", [f"fault {i // 2}"])
+    text = "\n".join(drawn(states["turn"], (), 80, 24, faults_page(faults, 9)))
+    assert [int(n) for n in re.findall(r"fault (\d+)", text)] == list(range(149, 140, -1))
+    text = "\n".join(drawn(states["turn"], ("slip",), 80, 24, help_page()))
+    assert "mean, g" not in text
+    assert "ALARM: slip" in text
+    for key, _ in HELP:
+        assert re.search(rf"^ +{re.escape(key)}  ", text, re.MULTILINE)
+
+
+def test_colours_differ_for_the_colour_blind():
+    """Backgrounds, by the luminance and the blue-yellow axis, which every common kind keeps."""
+    found = {}
+    for name, style in {"alarm": _ALARM, **_COLOURS}.items():
+        colour = Style.parse(style).bgcolor
+        assert colour is not None
+        r, g, b = (v / 255 for v in colour.get_truecolor())
+        found[(round(0.2126 * r + 0.7152 * g + 0.0722 * b, 3), round(b - (r + g) / 2, 3))] = name
+    assert len(found) == 5  # do, leave, wait, done, alarm
+    for one, other in combinations(found, 2):
+        assert abs(one[0] - other[0]) > 0.15 or abs(one[1] - other[1]) > 0.3, (one, other)
+
+
+class _Typed:
+    def __init__(self, *keys):
+        self.left = list(keys)
+
+    def pressed(self):
+        return self.left.pop(0) if self.left else ""
+
+
+def test_keys_say_what_the_operator_wants():
+    operator = Operator(_Typed("y", "1", "c", "6", "c3", "4x", "?", "", "?f", "h"))
+    words = [operator.words() for _ in range(6)]
+    assert words == [[Agree()], [Redo("TP1")], [], [Redo("CP6")], [Redo("CP3")], [Redo("TP4")]]
+    pages = []
+    for _ in range(4):
+        assert operator.words() == []
+        pages.append(operator.page)
+    assert pages == ["help", "help", "faults", "help"]
+
+
+def test_the_end_has_its_day_where_it_is_another_one():
+    noon = time.mktime((2026, 1, 30, 12, 0, 0, 0, 0, -1))
+    assert clock_of_end(noon, 3600.0) == "13:00"
+    assert clock_of_end(noon, 86400.0) == time.strftime("%a 12:00", time.localtime(noon + 86400))
+    assert clock_of_end(noon, None) == "-"
 
 
 @pytest.mark.parametrize(("width", "height", "scale"), [(80, 24, 1), (120, 40, 2)])

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
-import os
-import re
-import select
 import sys
 import time
 from collections import deque
@@ -15,12 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import click
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.live import Live
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.cli.keys import Keys
 from triaxcal.cli.rig_hands import hands_of
-from triaxcal.model.positions import TEST_POSITIONS
+from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.rig import recording, replay, runner, store
 from triaxcal.rig.canbus import Bus, messages_of
 from triaxcal.rig.engine import Setup
@@ -28,58 +25,59 @@ from triaxcal.rig.events import Agree, Command, Redo
 from triaxcal.rig.forecast import duration
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.rawlog import LogState
-from triaxcal.rig.screen import BusView, plain_status, screen
+from triaxcal.rig.screen import (
+    About,
+    BusView,
+    Faults,
+    faults_page,
+    help_page,
+    plain_status,
+    screen,
+)
 from triaxcal.rig.simulator import SimulatedRig
 from triaxcal.rig.socketcan import SocketSource
 from triaxcal.rig.source import Source
 from triaxcal.rig.view import view
 
 _REFRESH_S = 0.25
+_ABOVE_PAGE = 15
+"""Lines of the screen that a page leaves to the rest."""
 _ALARM_S = 10.0
-_BITRATE = 1_000_000
-_KEY_CODE = re.compile(rb"\x1b(\[[0-9;]*[A-Za-z~]|O.)?")
-"""An arrow or function key; there are digits in it."""
+_PAGES = {"?": "help", "h": "help", "f": "faults"}
 
 
 class _Stop(Exception):  # noqa: N818  not an error
     """The operator wants to stop."""
 
 
-class _Keys:
-    """Keys of the operator: single ones on a terminal, none elsewhere."""
+class Operator:
+    """What the operator says by keys, and the page that is asked for.
 
-    def __init__(self, plain: bool) -> None:
-        has_keys = importlib.util.find_spec("termios") is not None  # not on Windows
-        self._on = not plain and has_keys and sys.stdin.isatty()
+    Attributes
+    ----------
+    page : str
+        "", "help" or "faults".
+    """
 
-    @contextlib.contextmanager
-    def listening(self) -> Iterator[None]:
-        if not self._on:
-            yield
-            return
-        import termios  # noqa: PLC0415
-        import tty  # noqa: PLC0415
-
-        file = sys.stdin.fileno()
-        before = termios.tcgetattr(file)
-        tty.setcbreak(file)
-        try:
-            yield
-        finally:
-            termios.tcsetattr(file, termios.TCSADRAIN, before)
+    def __init__(self, keys: Keys) -> None:
+        self._keys = keys
+        self._of_checks = False
+        self.page = ""
 
     def words(self) -> list[Command]:
+        """Commands since last asked."""
         words: list[Command] = []
-        while self._on and select.select([sys.stdin], [], [], 0)[0]:
-            typed = os.read(sys.stdin.fileno(), 64)
-            self._on = bool(typed)
-            for key in _KEY_CODE.sub(b"", typed).decode("ascii", "ignore"):
-                if key == "q":
-                    raise _Stop
-                if key == "y":
-                    words.append(Agree())
-                elif f"TP{key}" in TEST_POSITIONS:
-                    words.append(Redo(f"TP{key}"))
+        for key in self._keys.pressed():
+            position = f"{'C' if self._of_checks else 'T'}P{key}"
+            self._of_checks = key == "c"
+            if key == "q":
+                raise _Stop
+            if key == "y":
+                words.append(Agree())
+            elif key in _PAGES:
+                self.page = "" if self.page == _PAGES[key] else _PAGES[key]
+            elif position in TEST_POSITIONS or position in CHECK_POSITIONS:
+                words.append(Redo(position))
         return words
 
 
@@ -117,16 +115,17 @@ def _guided(
             "dwells kept"
         )
         click.echo(session.last_event)
-    keys = _Keys(plain)
+    keys = Keys(not plain)
+    operator = Operator(keys)
     with keys.listening():
-        ticks = runner.live(taken, source, keys.words, hands)
+        ticks = runner.live(taken, source, operator.words, hands)
         left_s = hands.left_s(taken.engine.session) if hands else None
         if left_s:
             click.echo(f"predicted: about {duration(left_s)}")
         if plain:
             _plainly(ticks, taken)
         else:
-            _on_screen(ticks, taken, source, hands)
+            _on_screen(ticks, taken, source, hands, operator)
     taken.log.flush(sync=True)
     return taken.log.state  # reads the log: while it is open
 
@@ -173,27 +172,63 @@ def _on_screen(
     taken: recording.Recording,
     source: Source,
     hands: runner.Hands | None,
+    operator: Operator,
 ) -> None:
     alarms: deque[tuple[float, str]] = deque(maxlen=8)
+    faults = Faults()
     shown = 0.0
     with Live(console=Console(), screen=True, auto_refresh=False) as picture:
         for tick in ticks:
             now = time.monotonic()
             said = [e.text for e in tick.events if e.kind in {"refused", "trouble", "left"}]
             alarms.extend((now, text) for text in (*said, *tick.notes, *tick.done))
+            faults.add(time.strftime("%H:%M:%S"), (*said, *tick.notes))
             if now - shown < _REFRESH_S:
                 continue
             shown = now
             while alarms and now - alarms[0][0] > _ALARM_S:
                 alarms.popleft()
-            dropped = source.dropped if isinstance(source, SocketSource) else 0
-            bus = BusView(source.name, tick.frames_per_s, tick.bits_per_s, dropped, _BITRATE)
-            texts = tuple(text for _, text in alarms)
             shown_view = view(taken.engine.session)
             left_s = hands.left_s(taken.engine.session) if hands else None
             if left_s is not None:
                 shown_view = replace(shown_view, left_s=left_s)
-            picture.update(screen(shown_view, bus, texts), refresh=True)
+            picture.update(
+                screen(
+                    shown_view,
+                    _bus_view(source, tick),
+                    tuple(text for _, text in alarms),
+                    _about(taken, shown_view.left_s),
+                    _page(operator.page, faults, picture.console),
+                ),
+                refresh=True,
+            )
+
+
+def _bus_view(source: Source, tick: runner.Tick) -> BusView:
+    dropped = source.dropped if isinstance(source, SocketSource) else 0
+    rates = source.rates
+    load = rates.load(tick.bits_per_s, tick.fast_bits_per_s) if rates is not None else None
+    return BusView(source.name, tick.frames_per_s, load, dropped)
+
+
+def _about(taken: recording.Recording, left_s: float | None) -> About:
+    unit = taken.engine.session.unit
+    return About(unit.name, unit.serial, taken.folder.name, clock_of_end(time.time(), left_s))
+
+
+def clock_of_end(now_s: float, left_s: float | None) -> str:
+    """Clock time so many seconds later, with the day where it is another one."""
+    if left_s is None:
+        return "-"
+    now, end = time.localtime(now_s), time.localtime(now_s + left_s)
+    same_day = now[:3] == end[:3]
+    return time.strftime("%H:%M" if same_day else "%a %H:%M", end)
+
+
+def _page(name: str, faults: Faults, console: Console) -> RenderableType | None:
+    if name == "faults":
+        return faults_page(faults, max(3, console.size.height - _ABOVE_PAGE))
+    return help_page() if name == "help" else None
 
 
 def simulate_on(

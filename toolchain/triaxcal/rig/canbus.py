@@ -9,6 +9,7 @@ import can
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.rig.busload import BitRates
 from triaxcal.rig.frames import (
     BRS,
     EFF_FLAG,
@@ -26,6 +27,10 @@ from triaxcal.rig.source import PACE_S, WAIT_S, Watched
 
 Bus = can.BusABC
 """A bus of python-can, which this room alone imports."""
+
+
+_SIMULATED = BitRates(1_000_000, 8_000_000)
+"""What the simulated rig's times are made for."""
 
 
 class BusSource(Watched):
@@ -70,6 +75,7 @@ class SimulatedSource:
 
     def __init__(self, rig: SimulatedRig, name: str = "virtual") -> None:
         self.name = name
+        self.rates: BitRates | None = _SIMULATED
         self.rig = rig
         options: dict[str, Any] = {"interface": "virtual", "preserve_timestamps": True}
         self._out = can.Bus(channel=f"triaxcal-{id(self)}", **options)

@@ -95,6 +95,20 @@ def open_bus(name: str, fd: bool) -> can.BusABC:
         raise _refusal(name, said, error) from error
 
 
+def settings_of(name: str) -> dict[str, str]:
+    """What name and configuration files of python-can say of a bus, as text."""
+    said = bus_name(name)
+    given = {"interface": said.interface, "channel": said.channel, **said.options}
+    try:
+        found = can.util.load_config(
+            config={key: value for key, value in given.items() if value},
+            context=said.section or None,
+        )
+    except (can.CanError, ValueError):
+        return dict(said.options)
+    return {str(key): str(value) for key, value in found.items()}
+
+
 def _refusal(name: str, said: BusName, error: Exception) -> RefusedError:
     if not said.interface:
         section = f"[{said.section or 'default'}]"

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
+from triaxcal.rig.busload import bits_of
 from triaxcal.rig.events import Command, Event
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.recording import Recording
@@ -18,8 +17,6 @@ from triaxcal.rig.simulator import SimulatedRig
 from triaxcal.rig.source import Source
 
 _RATE_WINDOW_S = 2.0
-_CLASSIC_OVERHEAD_BITS = 47 + 12
-"""Of an 11-bit frame, and a mean of stuff bits for eight bytes."""
 _NOT_DECODED_S = 3.0
 
 
@@ -35,8 +32,8 @@ class Tick:
         What the hands did.
     frames_per_s : float
         By the frames' own times.
-    bits_per_s : float
-        Load of the bus, without its gaps.
+    bits_per_s, fast_bits_per_s : float
+        At the nominal bit rate, and at that of the data of CAN FD.
     """
 
     events: tuple[Event, ...]
@@ -44,6 +41,7 @@ class Tick:
     done: tuple[str, ...]
     frames_per_s: float
     bits_per_s: float
+    fast_bits_per_s: float
 
 
 class Hands(Protocol):
@@ -113,35 +111,33 @@ def live(
                 done = hands.notes()
                 for text in done:
                     recording.note(text, now_ns)
-        rate, bits = meter.add(frames)
+        rates = meter.add(frames)
         notes = [*source.notes(), *meter.notes(session)]
-        yield Tick(tuple(events), tuple(notes), tuple(done), rate, bits)
+        yield Tick(tuple(events), tuple(notes), tuple(done), *rates)
 
 
 class _Meter:
     """Frames and bits a second over the last two seconds; frames that make no samples."""
 
     def __init__(self) -> None:
-        self._parts: deque[tuple[int, int, int]] = deque()
+        self._parts: deque[tuple[int, int, float, float]] = deque()
         self._block_at = time.monotonic()
         self._index: int | None = None
         self._frames = 0
         self._told = False
 
-    def add(self, frames: Frames) -> tuple[float, float]:
+    def add(self, frames: Frames) -> tuple[float, float, float]:
         if len(frames):
-            bits = int(np.sum(frames.length, dtype=np.int64)) * 8
-            bits += len(frames) * _CLASSIC_OVERHEAD_BITS
-            self._parts.append((int(frames.t_ns[-1]), len(frames), bits))
+            self._parts.append((int(frames.t_ns[-1]), len(frames), *bits_of(frames)))
             self._frames += len(frames)
         while self._parts and self._parts[-1][0] - self._parts[0][0] > _RATE_WINDOW_S * 1e9:
             self._parts.popleft()
         if len(self._parts) < 2:
-            return 0.0, 0.0
+            return 0.0, 0.0, 0.0
         seconds = max((self._parts[-1][0] - self._parts[0][0]) / 1e9, 1e-3)
         # The first part's frames came before its time stamp.
-        later = list(self._parts)[1:]
-        return sum(p[1] for p in later) / seconds, sum(p[2] for p in later) / seconds
+        counts, bits, fast = zip(*(part[1:] for part in list(self._parts)[1:]), strict=True)
+        return sum(counts) / seconds, sum(bits) / seconds, sum(fast) / seconds
 
     def notes(self, session: Session) -> list[str]:
         """One line when frames come that are not the rig's."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
-from rich.console import Console, ConsoleOptions, Group, RenderResult
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.padding import Padding
 from rich.progress_bar import ProgressBar
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -15,32 +18,84 @@ from triaxcal.rig.bigtext import big
 from triaxcal.rig.events import View
 from triaxcal.rig.orientation import described
 
+_ALARM = "bright_white on #a53e00"
+_DO, _LEAVE = "black on #f0e442", "bright_white on #0072b2"
 _COLOURS = {
-    "turn": "black on bright_yellow",
-    "still": "black on bright_yellow",
-    "settle": "bright_white on blue",
-    "average": "bright_white on blue",
-    "guard": "bright_white on blue",
-    "reference": "bright_white on blue",
-    "temperature": "black on cyan",
-    "done": "black on bright_green",
+    "turn": _DO,
+    "still": _DO,
+    "settle": _LEAVE,
+    "average": _LEAVE,
+    "guard": _LEAVE,
+    "reference": _LEAVE,
+    "temperature": "black on #56b4e9",
+    "done": "black on #cccccc",
 }
-_MARKS = {"done": ("[x]", "green"), "now": ("[>]", "bold"), "redo": ("[r]", "yellow"),
+"""Colours that the colour-blind tell apart (Okabe and Ito 2008); words say the same."""
+_MARKS = {"done": ("[x]", "dim"), "now": ("[>]", "bold reverse"), "redo": ("[r]", "bold"),
           "open": ("[ ]", "")}  # fmt: skip
 _TALL = 30
 """Lines of a terminal that has room for big letters of twice the size."""
-_KEYS = " y take what was found    1-6 take TP1-TP6 again    q stop (then: rig resume)"
+_KEYS = " y take what was found  1-6 TP again  c 1-6 CP again  f faults  ? help  q stop"
+_FAULTS = 200
+HELP = (
+    ("y", "take the position that was found, out of the plan's order"),
+    ("1 to 6", "measure TP1 to TP6 of this temperature again; the new dwell replaces the old one"),
+    ("c, 1 to 6", "the same of the check positions CP1 to CP6"),
+    ("f", "list what was refused and what went wrong; f again goes back"),
+    ("?", "this page; ? again goes back"),
+    ("q", "stop; `triaxcal rig resume` goes on, accepted dwells are kept"),
+)
+"""Keys of the operator, and what they do."""
 
 
 @dataclass(frozen=True)
 class BusView:
-    """State of the connection: channel, frames and bits a second, frames the kernel dropped."""
+    """State of the connection.
+
+    Attributes
+    ----------
+    channel : str
+    frames_per_s : float
+    load : float or None
+        Part of the time that the bus is busy, 0 to 1; None where its bit rate is not known.
+    dropped : int
+        Frames that the kernel dropped.
+    """
 
     channel: str
     frames_per_s: float
-    bits_per_s: float
+    load: float | None
     dropped: int
-    bitrate: int
+
+
+@dataclass(frozen=True)
+class About:
+    """What the session is about: unit, serial number, its folder's name, clock time of the end."""
+
+    unit: str
+    serial: str
+    session: str
+    ends: str
+
+
+@dataclass
+class Faults:
+    """What was refused and what went wrong, with its clock time.
+
+    Attributes
+    ----------
+    listed : deque of (str, str)
+        Clock time and text, the last ones of the session.
+    """
+
+    listed: deque[tuple[str, str]] = field(default_factory=lambda: deque(maxlen=_FAULTS))
+
+    def add(self, clock: str, texts: Iterable[str]) -> None:
+        """List some more; the same again takes the place of the one before."""
+        for text in texts:
+            if self.listed and self.listed[-1][1] == text:
+                self.listed.pop()
+            self.listed.append((clock, text))
 
 
 @dataclass(frozen=True)
@@ -53,6 +108,9 @@ class BigText:
         """Lines in the middle; rich would centre each line separately."""
         tall = console.size.height >= _TALL
         lines = big(self.text, options.max_width, 2 if tall else 1)
+        if len(lines[0]) > options.max_width:  # half an order would be a wrong one
+            yield Text(self.text, "bold", justify="center")
+            return
         margin = " " * ((options.max_width - len(lines[0])) // 2)
         for line in lines:
             yield Text(margin + line, no_wrap=True, overflow="crop")
@@ -60,22 +118,97 @@ class BigText:
             yield Text()
 
 
-def screen(view: View, bus: BusView, alarms: tuple[str, ...]) -> Group:
-    """Everything the operator sees, for 80 columns and 24 lines or more."""
+@dataclass(frozen=True)
+class _Fitted:
+    """Parts from top to bottom; where the terminal is too small, the least important go first."""
+
+    parts: tuple[tuple[int, RenderableType], ...]
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Those parts that there is room for; a lower number is more important."""
+        drawn = [
+            console.render_lines(part, options.update(height=None), pad=False)
+            for _, part in self.parts
+        ]
+        shown = list(range(len(self.parts)))
+        while sum(len(drawn[i]) for i in shown) > console.size.height - 1 and len(shown) > 1:
+            shown.remove(max(shown, key=lambda i: self.parts[i][0]))
+        for line in (line for i in shown for line in drawn[i]):
+            yield from line
+            yield Segment.line()
+
+
+def screen(
+    view: View,
+    bus: BusView,
+    alarms: tuple[str, ...],
+    about: About,
+    page: RenderableType | None = None,
+) -> _Fitted:
+    """Everything the operator sees, for 80 columns and 24 lines or more.
+
+    Parameters
+    ----------
+    alarms : tuple of str
+        What is wrong now, the newest last.
+    page : renderable, optional
+        `help_page` or `faults_page`, in place of the readings.
+    """
     done, whole = view.progress
-    style = "bright_white on red" if alarms else _COLOURS[view.phase]
+    style = _ALARM if alarms else _COLOURS[view.phase]
     headline = Text(view.headline, style="bold", justify="center")
-    top = Padding(Group(BigText(view.order), headline), (1, 2), style=style)
     bar = ProgressBar(
         total=max(whole, 1), completed=done, complete_style="bold", finished_style="bold"
     )
-    message = Text(
-        " " + (alarms[-1] if alarms else view.last_event), overflow="ellipsis", no_wrap=False
+    more = f" (and {len(alarms) - 1} more: f)" if len(alarms) > 1 else ""
+    said = f" ALARM: {alarms[-1]}{more}" if alarms else f" {view.last_event}"
+    message = Text(said, style="bold" if alarms else "")
+    readings: tuple[tuple[int, RenderableType], ...] = (
+        (6, _axes(view)),
+        (5, _status(view, bus, about)),
     )
-    message.stylize("bold red" if alarms else "")
-    return Group(
-        top, bar, _checklist(view), _axes(view), _status(view, bus), message, Text(_KEYS, "dim")
+    if page is not None:
+        readings = ((5, page),)
+    return _Fitted(
+        (
+            (4, _title(about)),
+            (2, Padding(BigText(view.order), (1, 2, 0, 2), style=style)),
+            (0, Padding(headline, (0, 2), style=style)),
+            (7, bar),
+            (1, message),
+            (3, _checklist(view)),
+            *readings,
+            (8, Text(_KEYS, "dim", no_wrap=True, overflow="ellipsis")),
+        )
     )
+
+
+def help_page() -> RenderableType:
+    """What the keys do."""
+    table = Table(box=None, padding=(0, 1), title=" Keys", title_justify="left")
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    for key, what in HELP:
+        table.add_row(key, what)
+    return table
+
+
+def faults_page(faults: Faults, lines: int) -> RenderableType:
+    """The last faults, the newest first."""
+    last = list(reversed(faults.listed))[:lines]
+    if not last:
+        return Text(" No faults so far.")
+    table = Table(box=None, padding=(0, 1), title=" Faults, the newest first", title_justify="left")
+    table.add_column(no_wrap=True)
+    table.add_column(no_wrap=True, overflow="ellipsis")
+    for clock, text in last:
+        table.add_row(clock, text)
+    return table
+
+
+def _title(about: About) -> Text:
+    line = f" {about.unit}   serial {about.serial}   session {about.session}"
+    return Text(line, style="bold", no_wrap=True, overflow="ellipsis")
 
 
 def plain_status(view: View) -> str:
@@ -86,7 +219,7 @@ def plain_status(view: View) -> str:
 
 def _checklist(view: View) -> Text:
     target = f"{view.target_degc:g} degC" if view.target_degc is not None else "done"
-    line = Text(f"\n Step {min(view.step + 1, view.steps)}/{view.steps}, {target}:", style="bold")
+    line = Text(f" Step {min(view.step + 1, view.steps)}/{view.steps}, {target}:", style="bold")
     for position, state in view.checklist:
         mark, style = _MARKS[state]
         line.append(f"  {mark} {position}", style=style)
@@ -110,17 +243,16 @@ def _axes(view: View) -> Table:
     return table
 
 
-def _status(view: View, bus: BusView) -> Text:
+def _status(view: View, bus: BusView, about: About) -> Text:
     temp = f"{view.temp_degc:.2f} degC" if view.temp_degc is not None else "-"
     slope = view.temp_slope_k_per_min
     trend = f"{slope:+.3f} K/min" if slope is not None else "slope: not yet"
-    left = "-" if view.left_s is None else f"{view.left_s / 60:.0f} min"
-    load = 100.0 * bus.bits_per_s / bus.bitrate
-    lost = view.lost + bus.dropped
+    left = "-" if view.left_s is None else f"{view.left_s / 60:.0f} min, ends {about.ends}"
+    load = "not known, no bit rate" if bus.load is None else f"{100.0 * bus.load:.0f} %"
     line = Text(f"\n T {temp}, {trend}    time left about {left}\n", style="bold")
     line.append(
-        f" {bus.channel}: {bus.frames_per_s:.0f} frames/s, load {load:.0f} %\n"
-        f" lost samples {view.lost}, dropped by the kernel {bus.dropped}, bad CRC {view.bad_crc}\n",
-        style="yellow" if lost or view.bad_crc else "",
+        f" {bus.channel}: {bus.frames_per_s:.0f} frames/s, load {load}\n"
+        f" lost samples {view.lost}, dropped by the kernel {bus.dropped}, bad CRC {view.bad_crc}",
+        style="bold" if view.lost or bus.dropped or view.bad_crc else "",
     )
     return line

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 from triaxcal.base.registry import Registry
 
 if TYPE_CHECKING:
+    from triaxcal.rig.busload import BitRates
     from triaxcal.rig.frames import Frames
     from triaxcal.rig.simulator import SimulatedRig
 
@@ -27,9 +28,12 @@ class Source(Protocol):
     ----------
     name : str
         Channel, for the log and for messages.
+    rates : BitRates or None
+        Bit rates of the bus, where they are known.
     """
 
     name: str
+    rates: BitRates | None
 
     def read(self) -> Frames:
         """Frames that have come; waits a little when there are none."""
@@ -46,6 +50,7 @@ class Watched:
 
     def __init__(self, name: str) -> None:
         self.name = name
+        self.rates: BitRates | None = None
         self._notes: list[str] = []
         self._heard = time.monotonic()
         self._silent = self._down = False

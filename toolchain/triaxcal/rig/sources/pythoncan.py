@@ -6,10 +6,13 @@ from triaxcal.rig.source import Source, SourceKind, Wanted
 
 
 def _open(wanted: Wanted) -> Source:
+    from triaxcal.rig.busload import rates_of_options  # noqa: PLC0415
     from triaxcal.rig.canbus import BusSource  # noqa: PLC0415
-    from triaxcal.rig.openbus import open_bus  # noqa: PLC0415
+    from triaxcal.rig.openbus import open_bus, settings_of  # noqa: PLC0415
 
-    return BusSource(open_bus(wanted.bus, wanted.fd), wanted.bus)
+    source = BusSource(open_bus(wanted.bus, wanted.fd), wanted.bus)
+    source.rates = rates_of_options(settings_of(wanted.bus))
+    return source
 
 
 ENTRY = SourceKind(

@@ -9,6 +9,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.rig.source import SourceKind, Wanted
 
 if TYPE_CHECKING:
+    from triaxcal.rig.busload import BitRates
     from triaxcal.rig.frames import Frames
 
 _PREFIX = "replay:"
@@ -21,6 +22,7 @@ class LogSource:
         from triaxcal.rig.logfile import Left, read_frames  # noqa: PLC0415
 
         self.name = str(path)
+        self.rates: BitRates | None = None
         self._parts = read_frames(path)
         self._new = Left
         self._left = Left()

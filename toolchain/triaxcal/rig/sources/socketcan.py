@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import socket
+
+from triaxcal.base.errors import RefusedError
 from triaxcal.rig.source import Source, SourceKind, Wanted
 
 
@@ -10,10 +13,19 @@ def _device(bus: str) -> str:
 
 
 def _open(wanted: Wanted) -> Source:
+    from triaxcal.rig.busload import rates_of_device  # noqa: PLC0415
     from triaxcal.rig.socketcan import SocketSource, can_socket  # noqa: PLC0415
 
     device = _device(wanted.bus)
-    return SocketSource(device, lambda: can_socket(device, wanted.fd))
+    if not hasattr(socket, "AF_CAN"):
+        raise RefusedError(
+            f"--bus {wanted.bus}",
+            "this system has no SocketCAN",
+            expected="an interface of python-can, as pcan:PCAN_USBBUS1",
+        )
+    source = SocketSource(device, lambda: can_socket(device, wanted.fd))
+    source.rates = rates_of_device(device)
+    return source
 
 
 ENTRY = SourceKind(
