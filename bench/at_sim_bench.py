@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.plan import read_plan
+from triaxcal.rig.rigfile import read_description
 from triaxcal.unit.description import read_unit
 
 REPO = Path(__file__).resolve().parents[1]
@@ -19,4 +19,5 @@ def setup_at(rate_hz: int, folder: Path) -> Setup:
     plan = folder / "plan.toml"
     text = (REPO / "rig" / "plans" / "five-temperatures.toml").read_text(encoding="utf-8")
     plan.write_text(text.replace("rate_hz = 100", f"rate_hz = {rate_hz}"), encoding="utf-8")
-    return Setup(bench, unit, read_plan(plan, unit), read_dbc(default_dbc()))
+    session = read_plan(plan, unit)
+    return Setup(bench, unit, session, read_description(session.rig))

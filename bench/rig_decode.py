@@ -16,11 +16,14 @@ from pathlib import Path
 import can
 from at_sim_bench import setup_at
 
+from triaxcal.rig.busfile import read_bus_file
 from triaxcal.rig.candump import format_frames, parse
-from triaxcal.rig.dbc import default_dbc, load_database, read_dbc
+from triaxcal.rig.dbc import default_dbc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.replay import replay
+from triaxcal.rig.rigfile import read_description
 from triaxcal.rig.samples import SampleDecoder
+from triaxcal.rig.shippedrigs import find_description
 from triaxcal.rig.simulator import RigSettings, SimulatedRig
 from triaxcal.simulation.truth import read_truth
 
@@ -33,7 +36,7 @@ CHUNK = 4 << 20
 def make_log(path: Path, setup: Setup) -> None:
     """A rig at 1 kHz, at rest in its first position."""
     truth, _ = read_truth(setup.folder)
-    rig = SimulatedRig(setup.unit, truth, setup.plan, setup.dbc, RigSettings())
+    rig = SimulatedRig(setup.unit, truth, setup.plan, setup.rig, RigSettings())
     count = 0
     with path.open("wb") as file:
         while count < FRAMES:
@@ -66,7 +69,7 @@ def timed(function) -> tuple[float, float]:
 
 
 def ours(path: Path) -> int:
-    decoder = SampleDecoder(read_dbc(default_dbc()), "classic", RATE)
+    decoder = SampleDecoder(read_description(find_description("tilter")), RATE)
     count = 0
     with ThreadPoolExecutor(2) as pool:
         for parsed in pool.map(parse, chunks(path)):
@@ -81,7 +84,7 @@ def replayed(setup: Setup, path: Path) -> int:
 
 
 def python_can_and_cantools(path: Path) -> int:
-    database, count = load_database(default_dbc()), 0
+    database, count = read_bus_file(default_dbc()).database, 0
     with can.CanutilsLogReader(str(path)) as reader:
         for message in reader:
             database.decode_message(message.arbitration_id, message.data)
@@ -92,7 +95,7 @@ def python_can_and_cantools(path: Path) -> int:
 
 
 def decode_message_only(path: Path) -> float:
-    database, count = load_database(default_dbc()), 0
+    database, count = read_bus_file(default_dbc()).database, 0
     with can.CanutilsLogReader(str(path)) as reader:
         messages = [m for _, m in zip(range(PEER), reader, strict=False)]
     start = cpu_s()

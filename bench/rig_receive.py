@@ -17,7 +17,8 @@ from pathlib import Path
 from at_sim_bench import setup_at
 from can.interfaces.socketcan.socketcan import capture_message
 
-from triaxcal.rig.dbc import default_dbc, load_database
+from triaxcal.rig.busfile import read_bus_file
+from triaxcal.rig.dbc import default_dbc
 from triaxcal.rig.recording import Recording
 from triaxcal.rig.simulator import RigSettings, SimulatedRig
 from triaxcal.rig.socketcan import SocketSource, packed
@@ -72,7 +73,7 @@ def ours(feed):
 
 def python_can_and_cantools(link):
     """What python-can's socketcan bus does for a frame, on this socket, and cantools' decoding."""
-    database = load_database(default_dbc())
+    database = read_bus_file(default_dbc()).database
     link.setsockopt(socket.SOL_SOCKET, 35, 1)  # SO_TIMESTAMPNS
 
     def take():
@@ -89,7 +90,7 @@ def main() -> None:
         folder = Path(name)
         about = setup_at(RATE, folder)
         truth, _ = read_truth(about.folder)
-        rig = SimulatedRig(about.unit, truth, about.plan, about.dbc, RigSettings())
+        rig = SimulatedRig(about.unit, truth, about.plan, about.rig, RigSettings())
         seconds = [rig.advance() for _ in range(SECONDS)]
         taken = Recording(about, folder / "001", "bench0")
 

@@ -49,6 +49,8 @@ SHIPPED = {
     "units/AT-CHERNIAK/tables.toml": "tables",
     "rig/plans/five-temperatures.toml": "rig",
     "rig/design.toml": "design",
+    "rig/descriptions/tilter/rig.toml": "rig-description",
+    "rig/descriptions/tilter-fd/rig.toml": "rig-description",
 }
 
 
@@ -74,7 +76,7 @@ def faults(kind: str, text: str) -> list[str]:
 def uncommented(file: FileKeys) -> str:
     """A starter whose every key stands."""
     names = "|".join(key.name for table in file.tables for key in table.keys)
-    return re.sub(rf"(?m)^# (?=\[\w+\]$|({names}) = )", "", starter_text(file))
+    return re.sub(rf"(?m)^# (?=\[[\w.]+\]$|({names}) = )", "", starter_text(file))
 
 
 @pytest.mark.parametrize("kind", FILES)
@@ -82,7 +84,7 @@ def test_the_reference_names_every_key_with_its_documentation(kind: str) -> None
     file = FILES[kind]()
     page = reference_markdown(file)
     for table in file.tables:
-        assert f"`[{table.name}]`" in page or not table.name
+        assert f"`[{table.header}]`" in page or not table.name
         for key in table.keys:
             (row,) = [
                 row
@@ -102,6 +104,7 @@ def test_every_example_is_of_its_kind(kind: str) -> None:
     document = tomllib.loads(text, parse_float=Decimal)
     for table in file.tables:
         found = document[table.name] if table.name else document
+        found = found[table.each] if table.each else found
         for key in table.keys:
             key.kind.parse(found[key.name])
     assert faults(kind, text) == []
@@ -147,6 +150,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "tilter": read_unit,
     "recording": read_unit,
     "imu": read_dynamic,
+    "rig-description": lambda folder: FILES["rig-description"]().read(folder / "rig.toml"),
     "rig": lambda folder: read_plan(folder / "plan.toml", read_unit(REPO / "units/AT-SIM")),
     "design": lambda folder: read_problem(folder / "problem.toml"),
     "truth": read_truth,

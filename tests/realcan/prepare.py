@@ -19,10 +19,10 @@ from triaxcal.codegen.identity import with_identity
 from triaxcal.codegen.image import image_bytes
 from triaxcal.delivery.unit import Delivery, deliver
 from triaxcal.device import link  # noqa: F401  what is missing is noticed here, not in the guest
-from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import BATCH, vectors
 from triaxcal.rig.plan import read_plan
+from triaxcal.rig.rigfile import read_description
 from triaxcal.unit.description import read_unit
 
 SAMPLES = 5000
@@ -34,7 +34,7 @@ def main(target: Path) -> None:
     unit = read_unit(folder)
     plan = read_plan(REPO / "rig" / "plans" / "five-temperatures.toml", unit)
     delivery = deliver(folder)
-    build_node(target, delivery.files, Setup(folder, unit, plan, read_dbc(default_dbc())))
+    build_node(target, delivery.files, Setup(folder, unit, plan, read_description(plan.rig)))
     limits = (delivery.plan.temp_min_code, delivery.plan.temp_max_code)
     temps, raw = vectors(SAMPLES, limits, 11)
     each = np.repeat(temps, BATCH)[:SAMPLES]

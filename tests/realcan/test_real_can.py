@@ -15,6 +15,9 @@ from triaxcal.rig import socketcan
 from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.fil import exchange
 from triaxcal.rig.frames import Frames, concatenate
+from triaxcal.rig.plan import LAYOUTS
+from triaxcal.rig.rigfile import read_description
+from triaxcal.rig.shippedrigs import find_description
 from triaxcal.rig.simframes import FrameMaker
 from triaxcal.rig.source import Wanted, kind_of
 
@@ -30,7 +33,7 @@ def opened(device: str, fd: bool = False) -> socketcan.SocketSource:
 
 
 def some_frames(seconds=2, layout="classic", rate=100):
-    maker = FrameMaker(read_dbc(default_dbc()), layout, rate, 0)
+    maker = FrameMaker(read_description(find_description(LAYOUTS[layout])), rate, 0)
     rng = np.random.default_rng(1)
     parts = []
     for second in range(seconds):

@@ -8,7 +8,7 @@ import socket
 import threading
 from pathlib import Path
 
-from rig_cases import BENCH, SHORT_PLAN, bench_unit, dbc
+from rig_cases import BENCH, SHORT_PLAN, bench_unit, description
 
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.plan import SessionPlan, read_plan
@@ -26,7 +26,8 @@ def plan_with(folder: Path, tables: str, temps: str = "[20, 25]") -> SessionPlan
 
 def setup_with(folder: Path, tables: str, temps: str = "[20, 25]") -> Setup:
     """Setup of the short plan with tables of the equipment."""
-    return Setup(BENCH, bench_unit(), plan_with(folder, tables, temps), dbc())
+    plan = plan_with(folder, tables, temps)
+    return Setup(BENCH, bench_unit(), plan, description(plan.rig))
 
 
 def free_port() -> int:

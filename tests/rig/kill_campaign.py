@@ -106,7 +106,7 @@ def session_killed(top, seed):
     for name in ("unit.toml", "truth.toml"):
         (unit / name).write_bytes((BENCH / name).read_bytes())
     setup = short_setup(folder, temps="[20]")
-    setup = Setup(unit, setup.unit, setup.plan, setup.dbc)
+    setup = Setup(unit, setup.unit, setup.plan, setup.rig)
     session = folder / "001"
 
     def play(rig_seed):

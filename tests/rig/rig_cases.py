@@ -8,6 +8,7 @@ from pathlib import Path
 from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.plan import read_plan
+from triaxcal.rig.rigfile import read_description
 from triaxcal.rig.runner import Robot
 from triaxcal.rig.simorders import read_fault
 from triaxcal.rig.simulator import RigSettings, SimulatedRig
@@ -45,12 +46,18 @@ def short_setup(
     path = folder / "short.toml"
     path.write_text(SHORT_PLAN.format(rate=rate, layout=layout, temps=temps, take=take))
     unit = bench_unit()
-    return Setup(BENCH, unit, read_plan(path, unit), dbc())
+    plan = read_plan(path, unit)
+    return Setup(BENCH, unit, plan, description(plan.rig))
 
 
 @cache
 def bench_unit():
     return read_unit(BENCH)
+
+
+@cache
+def description(path):
+    return read_description(path)
 
 
 @cache
@@ -62,7 +69,7 @@ def rig_of(setup: Setup, *orders: str, **settings) -> SimulatedRig:
     truth, _ = read_truth(BENCH)
     faults = tuple(read_fault(order) for order in orders)
     return SimulatedRig(
-        setup.unit, truth, setup.plan, setup.dbc, RigSettings(**{**FAST, **settings}), faults
+        setup.unit, truth, setup.plan, setup.rig, RigSettings(**{**FAST, **settings}), faults
     )
 
 

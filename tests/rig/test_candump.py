@@ -10,7 +10,6 @@ from rig_cases import rig_of, short_setup
 from triaxcal.rig.canbus import frames_of, messages_of
 from triaxcal.rig.candump import format_frames, parse, read_log
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG, Frames, concatenate, widened
-from triaxcal.rig.samples import SampleDecoder
 
 
 def mixed(seed=1, count=400):
@@ -124,7 +123,7 @@ def test_a_log_cut_anywhere_gives_the_samples_before_the_cut(tmp_path, step):
 
 def decoded(setup, text):
     """Codes of the samples of a log."""
-    decoder = SampleDecoder(setup.dbc, setup.plan.layout, setup.plan.rate_hz)
+    decoder = setup.decoder()
     return decoder.feed(parse(text).frames).codes
 
 

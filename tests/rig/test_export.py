@@ -18,7 +18,6 @@ from triaxcal.rig.candump import format_frames
 from triaxcal.rig.dbc import default_dbc
 from triaxcal.rig.export import WRITERS, export_log
 from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, Frames, widened
-from triaxcal.rig.samples import SampleDecoder
 
 WITHOUT = "not installed: .venv/bin/pip install -c constraints.txt -e '.[export]'"
 """Not among the developers' tools: python-can imports asammdf, and that pandas, at every start."""
@@ -102,7 +101,7 @@ def test_mf4_is_bus_logging_that_a_dbc_gives_meaning(tmp_path):
     with asammdf.MDF(path) as file:
         decoded = file.extract_bus_logging({"CAN": [(str(default_dbc()), 0)]})
         found = [decoded.get(f"Accel{axis}").samples for axis in "XYZ"]
-    codes = SampleDecoder(setup.dbc, "classic", 100).feed(frames).codes
+    codes = setup.decoder().feed(frames).codes
     np.testing.assert_array_equal(np.stack(found, axis=1), codes)
 
 

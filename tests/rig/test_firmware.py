@@ -15,9 +15,9 @@ from triaxcal.codegen.compiler import compile_library
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.delivery.unit import deliver
 from triaxcal.rig.dbc import REQUIRED
-from triaxcal.rig.e2e import frame_crc
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import exchange, packing_source, vectors
+from triaxcal.rig.protection import PROTECTIONS
 from triaxcal.unit.description import read_unit
 
 FIRMWARE = REPO / "rig" / "firmware"
@@ -43,8 +43,9 @@ def test_crcs_in_c_are_those_in_python(tmp_path):
         data = rng.integers(0, 256, (200, layout.size), dtype=np.uint8)
         bits = layout.signals["Crc"].length
         crc = library.rig_crc8 if bits == 8 else library.rig_crc32
+        expected = PROTECTIONS["tilter"].crc(layout.use.guard, data)
         found = [crc(layout.frame_id, row.tobytes(), ctypes.c_size_t(layout.size)) for row in data]
-        assert found == frame_crc(layout.frame_id, data, bits).tolist(), name
+        assert found == expected.tolist(), name
 
 
 def test_the_packing_source_has_no_date_in_it():
@@ -94,7 +95,7 @@ def wide_unit(tmp_path_factory):
 
 def wide_setup(folder, unit_folder, layout):
     setup = short_setup(folder, layout=layout)
-    return Setup(unit_folder, read_unit(unit_folder), setup.plan, setup.dbc)
+    return Setup(unit_folder, read_unit(unit_folder), setup.plan, setup.rig)
 
 
 def test_codes_of_more_than_24_bits_go_over_can_fd(tmp_path, wide_unit):
@@ -103,7 +104,9 @@ def test_codes_of_more_than_24_bits_go_over_can_fd(tmp_path, wide_unit):
 
 
 def test_codes_of_more_than_24_bits_do_not_fit_classic_frames(tmp_path, wide_unit):
-    with pytest.raises(RefusedError, match=r'bits: found 28; expected at most 24.*layout = "fd"'):
+    with pytest.raises(
+        RefusedError, match=r'bits: found 28; expected at most 24.*rig = "tilter-fd"'
+    ):
         firmware_in_the_loop(wide_setup(tmp_path, wide_unit, "classic"), 10, None, 4)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rig_cases import BENCH, REPO, bench_unit, dbc, play
+from rig_cases import BENCH, REPO, bench_unit, description, play
 from scipy.stats import chi2
 
 from triaxcal.fitting.tilter.calibrate import calibrate
@@ -29,15 +29,15 @@ FAULTS = (
 def test_the_constants_of_a_session_with_faults(tmp_path, seed):
     unit = bench_unit()
     plan = read_plan(REPO / "rig" / "plans" / "five-temperatures.toml", unit)
-    setup = Setup(BENCH, unit, plan, dbc())
+    setup = Setup(BENCH, unit, plan, description(plan.rig))
     truth, _ = read_truth(BENCH)
     faults = tuple(read_fault(order) for order in FAULTS)
-    rig = SimulatedRig(unit, truth, plan, dbc(), RigSettings(seed=seed), faults)
+    rig = SimulatedRig(unit, truth, plan, setup.rig, RigSettings(seed=seed), faults)
     engine = Engine(setup, "test")
     events = play(rig, engine.feed, engine.session, limit_s=20_000)
     assert sum(e.kind == "refused" for e in events) >= 3
     log = {"lines": 0, "bytes": 0, "sha256": ""}
-    write_records(tmp_path, engine.session, setup.dbc.sha256, log)
+    write_records(tmp_path, engine.session, setup.rig, log)
     found = calibrate(unit, read_measurements(tmp_path / "measurements.csv", unit))
     assert len(found.points) == 5
     for point in found.points:

@@ -31,7 +31,6 @@ from triaxcal.rig.journal import read_journal
 from triaxcal.rig.openbus import open_bus
 from triaxcal.rig.recording import JOURNAL_FILE, Recording
 from triaxcal.rig.runner import live
-from triaxcal.rig.samples import SampleDecoder
 
 ENTRY = "from triaxcal.cli.entry import entry; entry()"
 CHANNELS = count(1)
@@ -135,8 +134,8 @@ def test_a_recorded_bus_is_the_simulated_one(tmp_path):
     assert parsed.bad_lines == 0
     alone = rig_of(setup)
     sent = [alone.advance() for _ in range(2)]
-    codes = [SampleDecoder(setup.dbc, "classic", 100).feed(f).codes for f in (parsed.frames,)]
-    decoder = SampleDecoder(setup.dbc, "classic", 100)
+    codes = [setup.decoder().feed(f).codes for f in (parsed.frames,)]
+    decoder = setup.decoder()
     expected = np.concatenate([decoder.feed(frames).codes for frames in sent])
     # The recorder may have come to the channel some frames late, never lost one in between.
     assert len(codes[0]) > 100

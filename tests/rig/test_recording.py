@@ -45,16 +45,16 @@ def test_a_replay_gives_the_same_bytes(recorded, tmp_path):
     live, again = tmp_path / "live", tmp_path / "again"
     live.mkdir()
     again.mkdir()
-    write_records(live, taken.engine.session, setup.dbc.sha256, taken.log.state)
+    write_records(live, taken.engine.session, setup.rig, taken.log.state)
     played = replay(setup, folder / LOG_FILE, folder / JOURNAL_FILE)
-    write_records(again, played.engine.session, setup.dbc.sha256, played.log)
+    write_records(again, played.engine.session, setup.rig, played.log)
     for name in ("measurements.csv", "measurements.json"):
         assert (live / name).read_bytes() == (again / name).read_bytes()
 
 
 def test_the_fit_gets_u_as_the_variance_of_the_mean(recorded, tmp_path):
     setup, _, taken = recorded
-    write_records(tmp_path, taken.engine.session, setup.dbc.sha256, taken.log.state)
+    write_records(tmp_path, taken.engine.session, setup.rig, taken.log.state)
     read = read_measurements(tmp_path / "measurements.csv", setup.unit)
     for row, dwell in zip(read.dwells, taken.engine.session.accepted.values(), strict=True):
         u_v = np.array(dwell.u_code) * setup.unit.adc.volts_per_code
@@ -209,7 +209,7 @@ def test_a_flipped_payload_in_a_log_without_journal_changes_no_mean(recorded, tm
 def test_a_log_of_another_unit_is_refused(recorded):
     setup, folder, _ = recorded
     unit = type(setup.unit)(**{**_fields(setup.unit), "serial": "OTHER-7"})
-    other = type(setup)(setup.folder, unit, setup.plan, setup.dbc)
+    other = type(setup)(setup.folder, unit, setup.plan, setup.rig)
     with pytest.raises(RefusedError, match=r"serial: found AT-SIM-BENCH-001; expected OTHER-7"):
         replay(other, folder / LOG_FILE, folder / JOURNAL_FILE)
     with pytest.raises(RefusedError, match=r'serial number .*AT-SIM-BENCH-001.*expected "OTHER-7"'):

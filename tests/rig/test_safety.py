@@ -283,11 +283,11 @@ def test_records_that_are_there_are_kept_with_their_date(unfinished, tmp_path):
     mine = tmp_path / "measurements.csv"
     mine.write_text("months of work\n")
     os.utime(mine, (1_700_000_000, 1_700_000_000))
-    done = write_records(tmp_path, session, "dbc", state)
+    done = write_records(tmp_path, session, setup.rig, state)
     assert [p.name for p in done.kept] == ["measurements.20231114T221320Z.csv"]
     assert done.kept[0].read_text() == "months of work\n"
-    assert write_records(tmp_path, session, "dbc", state).kept == ()
-    second = write_records(tmp_path, session, "dbc", {**state, "sha256": "2"})
+    assert write_records(tmp_path, session, setup.rig, state).kept == ()
+    second = write_records(tmp_path, session, setup.rig, {**state, "sha256": "2"})
     assert [p.suffix for p in second.kept] == [".csv", ".json"]
     assert "log SHA-256 1" in second.kept[0].read_text()
     assert "log SHA-256 2" in mine.read_text()

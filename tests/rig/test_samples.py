@@ -8,7 +8,7 @@ from rig_cases import rig_of, short_setup
 
 from triaxcal.rig.blocks import BlockBuilder
 from triaxcal.rig.frames import concatenate
-from triaxcal.rig.samples import BAD_CRC, DUPLICATE, ORPHAN, SampleDecoder
+from triaxcal.rig.samples import BAD_CRC, DUPLICATE, ORPHAN
 
 
 def frames_of_seconds(setup, seconds, *orders):
@@ -17,7 +17,7 @@ def frames_of_seconds(setup, seconds, *orders):
 
 
 def decoder(setup):
-    return SampleDecoder(setup.dbc, setup.plan.layout, setup.plan.rate_hz)
+    return setup.decoder()
 
 
 @pytest.mark.parametrize("layout", ["classic", "fd"])

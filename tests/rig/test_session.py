@@ -102,7 +102,7 @@ def test_a_chamber_that_cycles_is_waited_for_when_its_period_is_stated(tmp_path)
     engine = Engine(setup, "test")
     events = advance(engine, rig_of(setup, **cycle), 150)
     assert texts(events, "equilibrium") == []
-    again = Setup(setup.folder, setup.unit, read_plan(stated, setup.unit), setup.dbc)
+    again = Setup(setup.folder, setup.unit, read_plan(stated, setup.unit), setup.rig)
     events = advance(Engine(again, "test"), rig_of(again, **cycle), 150)
     assert len(texts(events, "equilibrium")) == 1
 

@@ -190,18 +190,32 @@ class TableKeys:
     ----------
     optional : bool
         The table may be absent; its required keys are required only where it is given.
+    each : str
+        What the tables of this kind are named after, "MESSAGE" where the file has one
+        [name.MESSAGE] for each message, any number of them; "" for a single table.
     """
 
     name: str
     doc: str
     keys: tuple[Key[Any], ...]
     optional: bool = False
+    each: str = ""
 
     @classmethod
     def of(cls, record: type[Any], optional: bool = False) -> TableKeys:
-        """Table of a dataclass of keys, whose docstring begins with "[name]: what it is."."""
+        """Table of a dataclass of keys, whose docstring begins with "[name]: what it is.".
+
+        "[name.EACH]: what it is." makes a table for each of something.
+        """
         name, _, doc = (record.__doc__ or "").partition("\n")[0].partition("]: ")
-        return cls(name[1:], doc[:1].upper() + doc[1:], keys_of(record), optional)
+        name, _, each = name[1:].partition(".")
+        made = doc[:1].upper() + doc[1:]
+        return cls(name, made, keys_of(record), optional or bool(each), each)
+
+    @property
+    def header(self) -> str:
+        """Name as it stands in brackets in the file, an example where there are several."""
+        return f"{self.name}.{self.each}" if self.each else self.name
 
     def but(self, *others: Key[Any], **changes: Mapping[str, Any]) -> TableKeys:
         """Same table with more keys, or with attributes of its keys changed, by name of the key."""
@@ -237,6 +251,8 @@ class FileKeys:
     def read(self, path: Path) -> Mapping[str, Values]:
         """Checked tables of a file by name; absent ones are empty.
 
+        Of tables for each of something, those that the file has: "message.X" for [message.X].
+
         Raises
         ------
         RefusedError
@@ -254,32 +270,45 @@ class FileKeys:
         names = {table.name for table in self.tables}
         top = {name: value for name, value in document.items() if name not in names}
         given: dict[str, Mapping[str, object]] = {}
+        kinds: dict[str, TableKeys] = {}
         for table in self.tables:
             values = document.get(table.name, {}) if table.name else top
             if not isinstance(values, dict):
-                raise file.refuse(table.name, f"a table [{table.name}]")
-            given[table.name] = values
-        self._refuse_wrong_keys(source, given, document)
+                raise file.refuse(table.name, f"a table [{table.header}]")
+            if not table.each:
+                given[table.name], kinds[table.name] = values, table
+                continue
+            for name, inner in values.items():
+                if not isinstance(inner, dict):
+                    outer = Values(source, table.name, values)
+                    raise outer.refuse(name, f"a table [{table.header}]")
+                full = f"{table.name}.{name}"
+                given[full], kinds[full] = inner, table
+        self._refuse_wrong_keys(source, given, kinds, document)
         return {
             name: Values(source, name, given[name], {k.name: k for k in table.keys})
-            for name, table in zip(given, self.tables, strict=True)
+            for name, table in kinds.items()
         }
 
     def _refuse_wrong_keys(
-        self, source: str, given: Mapping[str, Mapping[str, object]], document: Mapping[str, object]
+        self,
+        source: str,
+        given: Mapping[str, Mapping[str, object]],
+        kinds: Mapping[str, TableKeys],
+        document: Mapping[str, object],
     ) -> None:
         missing, unexpected = [], []
-        for table in self.tables:
-            lacking = [k.name for k in table.keys if k.required and k.name not in given[table.name]]
+        for place, table in kinds.items():
+            lacking = [k.name for k in table.keys if k.required and k.name not in given[place]]
             if table.optional and table.name not in document:
                 lacking = []
-            without = f" (or leave [{table.name}] out)" if table.optional and lacking else ""
-            missing += [key_name(table.name, name) for name in lacking]
+            without = f" (or leave [{place}] out)" if table.optional and lacking else ""
+            missing += [key_name(place, name) for name in lacking]
             missing[-1:] = [last + without for last in missing[-1:]]
             known = {k.name for k in table.keys}
             unexpected += [
-                key_name(table.name, name) + self._near(table, name)
-                for name in given[table.name]
+                key_name(place, name) + self._near(table, name)
+                for name in given[place]
                 if name not in known
             ]
         found = {"missing": missing, "unknown": unexpected}
@@ -290,7 +319,13 @@ class FileKeys:
         """Hint for an unknown key: the table where it belongs, or a near miss in its own."""
         for other in self.tables:
             if other.name != table.name and any(k.name == name for k in other.keys):
-                place = f"[{other.name}]" if other.name else "the top of the file"
+                place = f"[{other.header}]" if other.name else "the top of the file"
                 return f" (it belongs to {place})"
         tables = [] if table.name else [t.name for t in self.tables if t.name]
         return did_you_mean(name, [k.name for k in table.keys] + tables)
+
+
+def each_of(tables: Mapping[str, Values], name: str) -> dict[str, Values]:
+    """Tables [name.X] of a file by X."""
+    start = f"{name}."
+    return {n.removeprefix(start): v for n, v in tables.items() if n.startswith(start)}

@@ -27,6 +27,8 @@ from triaxcal.cli.rig_options import (
 if TYPE_CHECKING:
     from triaxcal.rig.engine import Setup
 
+_SAID = {True: "good ", False: "WRONG", None: "note "}
+
 
 @click.group(
     context_settings=HELP,
@@ -148,7 +150,7 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
             remedy="go on with `triaxcal rig resume`",
         )
     show_written(
-        store.write_records(into or log.parent, played.engine.session, setup.dbc.sha256, played.log)
+        store.write_records(into or log.parent, played.engine.session, setup.rig, played.log)
     )
 
 
@@ -189,8 +191,8 @@ def check(setup: Setup, bus: BusChoice, seconds: float) -> None:
     finally:
         source.close()
     for finding in found:
-        click.echo(f"{'good ' if finding.good else 'WRONG'}  {finding.text}")
-    wrong = sum(not finding.good for finding in found)
+        click.echo(f"{_SAID[finding.good]}  {finding.text}")
+    wrong = sum(finding.good is False for finding in found)
     if wrong:
         raise RefusedError(bus.name, f"{wrong} of {len(found)} checks failed", remedy="see above")
 
@@ -235,7 +237,7 @@ def simulate(setup: Setup, bus: BusChoice, seconds: float | None, hold: int) -> 
     from triaxcal.rig.openbus import open_bus  # noqa: PLC0415
 
     name = bus.name if ":" in bus.name else f"socketcan:{bus.name}"
-    sender = open_bus(name, setup.plan.layout == "fd")
+    sender = open_bus(name, setup.rig.fd)
     simulate_on(sender, simulated(setup, bus), setup.plan, seconds, hold)
 
 

@@ -15,8 +15,17 @@ from triaxcal.codegen.compiler import FLAGS, find_compiler
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.codegen.shim import write_shim
 from triaxcal.delivery.unit import deliver
+from triaxcal.rig.dbc import read_dbc
 from triaxcal.rig.engine import Setup
-from triaxcal.rig.fil import CODE_BITS, NODE_SOURCES, Agreement, exchange, packing_source, vectors
+from triaxcal.rig.fil import (
+    CODE_BITS,
+    NODE_SOURCES,
+    Agreement,
+    exchange,
+    layout_of,
+    packing_source,
+    vectors,
+)
 from triaxcal.rig.socketcan import can_socket, open_refusal
 
 
@@ -29,13 +38,13 @@ def firmware_in_the_loop(setup: Setup, samples: int, bus: str | None, seed: int)
         When the unit is refused, its codes do not fit the frames, a tool is missing, or an
         answer differs.
     """
-    layout, bits = setup.plan.layout, setup.unit.adc.bits
+    layout, bits = layout_of(setup.rig), setup.unit.adc.bits
     if bits > CODE_BITS[layout]:
         raise RefusedError(
             f"{setup.unit.name}, [adc] bits",
             f"found {bits}",
             expected=f"at most {CODE_BITS[layout]}, the codes of RIG_XY and RIG_Z",
-            remedy='a plan with layout = "fd" has 32 bits',
+            remedy='a plan with rig = "tilter-fd" has 32 bits',
         )
     delivery = deliver(setup.folder)
     plan = delivery.plan
@@ -43,7 +52,9 @@ def firmware_in_the_loop(setup: Setup, samples: int, bus: str | None, seed: int)
     with tempfile.TemporaryDirectory() as folder:
         node = build_node(Path(folder), delivery.files, setup)
         with node_on(node, bus, fd=layout == "fd") as link:
-            return exchange(link, setup.dbc, temps, raw, python_routine(plan), layout)
+            return exchange(
+                link, read_dbc(setup.rig.bus_file), temps, raw, python_routine(plan), layout
+            )
 
 
 def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
@@ -56,7 +67,7 @@ def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
     """
     for name, content in files.items():
         (folder / name).write_bytes(content)
-    for name, text in packing_source(setup.dbc).items():
+    for name, text in packing_source(read_dbc(setup.rig.bus_file)).items():
         (folder / name).write_text(text, encoding="utf-8")
     ours = shipped("rig") / "firmware"
     program = folder / "rig_node"

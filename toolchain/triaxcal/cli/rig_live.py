@@ -37,6 +37,7 @@ from triaxcal.rig.screen import (
 from triaxcal.rig.simulator import SimulatedRig
 from triaxcal.rig.socketcan import SocketSource
 from triaxcal.rig.source import Source
+from triaxcal.rig.undetected import undetected
 from triaxcal.rig.view import view
 
 _REFRESH_S = 0.25
@@ -115,6 +116,9 @@ def _guided(
             "dwells kept"
         )
         click.echo(session.last_event)
+    rig = taken.engine.setup.rig
+    for text in (*rig.warnings, *undetected(rig)):
+        click.echo(f"note: {text}", err=True)
     keys = Keys(not plain)
     operator = Operator(keys)
     with keys.listening():
@@ -141,7 +145,7 @@ def _write(setup: Setup, taken: recording.Recording, log: LogState) -> None:
                 str(path), "gives other dwells than the journal", remedy="report this session"
             )
         session, log = played.engine.session, played.log
-    show_written(store.write_records(setup.folder, session, setup.dbc.sha256, log))
+    show_written(store.write_records(setup.folder, session, setup.rig, log))
     click.echo(f"next: make calib-header UNIT={setup.unit.name}")
 
 

@@ -56,7 +56,7 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
         click.option(
             "--dbc",
             type=click.Path(path_type=Path),
-            help="DBC file of the frames; tilter.dbc by default.",
+            help="Bus description in place of the one that the rig description names.",
         ),
     )
 
@@ -111,14 +111,17 @@ SECONDS = click.option("--seconds", type=float, help="Stop after this time; by d
 
 def _setup(folder: Path, plan: Path | None, dbc: Path | None) -> Setup:
     from triaxcal.base.shipped import shipped  # noqa: PLC0415
-    from triaxcal.rig.dbc import default_dbc, read_dbc  # noqa: PLC0415
     from triaxcal.rig.engine import Setup  # noqa: PLC0415
     from triaxcal.rig.plan import read_plan  # noqa: PLC0415
+    from triaxcal.rig.rigfile import read_description  # noqa: PLC0415
     from triaxcal.unit.description import read_unit  # noqa: PLC0415
 
     description = read_unit(folder)
     session_plan = read_plan(plan or shipped("rig") / "plans" / _DEFAULT_PLAN, description)
-    return Setup(folder, description, session_plan, read_dbc(dbc or default_dbc()))
+    rig = read_description(session_plan.rig, dbc)
+    setup = Setup(folder, description, session_plan, rig)
+    setup.refuse_unfit()
+    return setup
 
 
 def open_source(setup: Setup, bus: BusChoice) -> Source:
@@ -132,7 +135,7 @@ def open_source(setup: Setup, bus: BusChoice) -> Source:
     kind = kind_of(bus.name)
     if bus.faults and not kind.simulated:
         raise RefusedError("--fault", f"given with --bus {bus.name}", expected="--bus virtual")
-    return kind.open(Wanted(bus.name, setup.plan.layout == "fd", lambda: simulated(setup, bus)))
+    return kind.open(Wanted(bus.name, setup.rig.fd, lambda: simulated(setup, bus)))
 
 
 def simulated(setup: Setup, bus: BusChoice) -> Any:
@@ -150,4 +153,4 @@ def simulated(setup: Setup, bus: BusChoice) -> Any:
         )
     truth, _ = read_truth(setup.folder)
     settings, faults = RigSettings(seed=bus.seed), tuple(map(read_fault, bus.faults))
-    return SimulatedRig(setup.unit, truth, setup.plan, setup.dbc, settings, faults)
+    return SimulatedRig(setup.unit, truth, setup.plan, setup.rig, settings, faults)

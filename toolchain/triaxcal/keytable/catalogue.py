@@ -9,6 +9,7 @@ from triaxcal.base.keys import FileKeys
 from triaxcal.design.problem import PROBLEM
 from triaxcal.dynamic.description import imu_file
 from triaxcal.rig.plan import session_plan_file
+from triaxcal.rig.rigkeys import rig_file
 from triaxcal.simulation.imu_unit import IMU_TRUTH
 from triaxcal.simulation.published import TABLES
 from triaxcal.simulation.truth import TRUTH
@@ -20,6 +21,7 @@ FILES: Mapping[str, Callable[[], FileKeys]] = MappingProxyType(
         "recording": recording_file,
         "imu": imu_file,
         "rig": session_plan_file,
+        "rig-description": rig_file,
         "design": lambda: PROBLEM,
         "truth": lambda: TRUTH,
         "imu-truth": lambda: IMU_TRUTH,

@@ -15,7 +15,7 @@ def json_schema(file: FileKeys) -> dict[str, Any]:
     """
     top, *tables = file.tables
     schema = _table(top)
-    schema["properties"] |= {table.name: _table(table) for table in tables}
+    schema["properties"] |= {table.name: _tables(table) for table in tables}
     schema["required"] += [
         table.name
         for table in tables
@@ -26,6 +26,13 @@ def json_schema(file: FileKeys) -> dict[str, Any]:
         "title": f"{file.name}: {file.title[0].lower()}{file.title[1:]}",
         **schema,
     }
+
+
+def _tables(table: TableKeys) -> dict[str, Any]:
+    """Schema of a table, or of one for each of something."""
+    if not table.each:
+        return _table(table)
+    return {"type": "object", "additionalProperties": _table(table)}
 
 
 def _table(table: TableKeys) -> dict[str, Any]:

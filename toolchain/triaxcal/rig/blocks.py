@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.rig.frames import ID_MASK
-from triaxcal.rig.samples import BAD_CRC, DUPLICATE, ORPHAN, Samples
+from triaxcal.rig.frames import ERR_FLAG, ID_MASK
+from triaxcal.rig.samples import BAD_CRC, DUPLICATE, INVALID, LOST_FRAME, ORPHAN, Samples
 
 _COLUMNS = ("number", "t_ns", "codes", "status", "jump")
 
@@ -21,6 +22,8 @@ class Trouble:
     bad_crc: int = 0
     orphans: int = 0
     duplicates: int = 0
+    invalid: int = 0
+    lost_frames: int = 0
     error_frames: int = 0
     error_bits: int = 0
 
@@ -29,6 +32,8 @@ class Trouble:
             self.bad_crc + other.bad_crc,
             self.orphans + other.orphans,
             self.duplicates + other.duplicates,
+            self.invalid + other.invalid,
+            self.lost_frames + other.lost_frames,
             self.error_frames + other.error_frames,
             self.error_bits | other.error_bits,
         )
@@ -46,8 +51,8 @@ class Block:
         Arrival of its first sample.
     count, lost : int
         Samples that came and that did not.
-    total : tuple of three int
-        Sums of the codes; x, y, z.
+    total : tuple of three int or float
+        Sums of the codes; x, y, z. Exact of integers, rounded once of floats.
     variance : tuple of three float
         Variance of the codes about their mean, code^2.
     clipped : int
@@ -66,7 +71,7 @@ class Block:
     t_ns: int
     count: int
     lost: int
-    total: tuple[int, int, int]
+    total: tuple[float, float, float]
     variance: tuple[float, float, float]
     clipped: int
     stuck: tuple[bool, bool, bool]
@@ -94,8 +99,9 @@ class BlockBuilder:
         self._rate_hz = rate_hz
         self._ends = code_ends
         self._open: dict[str, IntArray] | None = None
-        self._temps: tuple[IntArray, IntArray] = (np.zeros(0, np.int64), np.zeros(0, np.int64))
-        self._trouble: tuple[IntArray, IntArray] = self._temps
+        nothing = np.zeros(0, np.int64)
+        self._temps: tuple[IntArray, np.ndarray] = (nothing, nothing)
+        self._trouble: tuple[IntArray, IntArray] = (nothing, nothing)
 
     def feed(self, samples: Samples) -> list[Block]:
         """Blocks that these samples complete."""
@@ -151,14 +157,23 @@ class BlockBuilder:
             stuck=(x[2], y[2], z[2]),
             jumps=int(rows["jump"].sum()),
             status=int(np.bitwise_or.reduce(rows["status"])),
-            temp_code=int(temps.sum()) / len(temps) if len(temps) else None,
+            temp_code=_sum(temps) / len(temps) if len(temps) else None,
             trouble=_trouble(trouble),
         )
 
 
-def _exact(codes: IntArray) -> tuple[int, float, bool]:
-    """Sum and variance of codes (n,), and whether they are all one; by exact integers."""
+def _sum(numbers: np.ndarray) -> float:
+    """Sum, exact of integers and rounded once of floats, in whatever order they come."""
+    return math.fsum(numbers) if numbers.dtype.kind == "f" else int(numbers.sum())
+
+
+def _exact(codes: np.ndarray) -> tuple[float, float, bool]:
+    """Sum and variance of codes (n,), and whether they are all one; by exact integers or sums."""
     count = len(codes)
+    if codes.dtype.kind == "f":
+        total = math.fsum(codes)
+        squares = math.fsum((codes - total / count) ** 2)
+        return total, squares / max(count - 1, 1), count > 1 and bool((codes == codes[0]).all())
     first = int(codes[0])
     away = codes - first
     total = int(away.sum())
@@ -173,11 +188,13 @@ def _exact(codes: IntArray) -> tuple[int, float, bool]:
 def _trouble(kinds: IntArray) -> Trouble:
     if not len(kinds):
         return Trouble()
-    errors = kinds[kinds > DUPLICATE]
+    errors = kinds[kinds >= ERR_FLAG]
     return Trouble(
         bad_crc=int((kinds == BAD_CRC).sum()),
         orphans=int((kinds == ORPHAN).sum()),
         duplicates=int((kinds == DUPLICATE).sum()),
+        invalid=int((kinds == INVALID).sum()),
+        lost_frames=int((kinds == LOST_FRAME).sum()),
         error_frames=len(errors),
         error_bits=int(np.bitwise_or.reduce(errors)) & ID_MASK if len(errors) else 0,
     )

@@ -24,13 +24,14 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from triaxcal.model.types import IntArray
-from triaxcal.rig.candump_lines import FD_LENGTHS, frames_of_lines, shown_line
+from triaxcal.rig.candump_lines import frames_of_lines, shown_line
 from triaxcal.rig.frames import (
     BRS,
     DLC_SHIFT,
     EFF_FLAG,
     ERR_FLAG,
     ESI,
+    FD_LENGTHS,
     ID_MASK,
     RTR_FLAG,
     SENT,

@@ -24,6 +24,7 @@ from triaxcal.rig.frames import (
     EFF_FLAG,
     ERR_FLAG,
     ESI,
+    FD_LENGTHS,
     ID_MASK,
     RTR_FLAG,
     SENT,
@@ -31,7 +32,6 @@ from triaxcal.rig.frames import (
     empty,
 )
 
-FD_LENGTHS = frozenset((*range(9), 12, 16, 20, 24, 32, 48, 64))
 _LAST_NS = 2**63 - 1
 _STAMP = rb"""
     (?:\((?:(?P<date>\d{4}-\d\d-\d\d)[ ](?P<time>\d\d:\d\d:\d\d)|(?P<whole>\d{0,10}))

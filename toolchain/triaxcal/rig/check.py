@@ -10,10 +10,11 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import AXES
 from triaxcal.rig.engine import Engine, Setup
-from triaxcal.rig.frames import Frames, concatenate
+from triaxcal.rig.frames import ID_MASK, Frames, concatenate
 from triaxcal.rig.orientation import described, recognised
-from triaxcal.rig.samples import BAD_CRC, DUPLICATE, ORPHAN, SampleDecoder, Samples
+from triaxcal.rig.samples import BAD_CRC, DUPLICATE, INVALID, LOST_FRAME, ORPHAN, Samples
 from triaxcal.rig.source import Source
+from triaxcal.rig.undetected import undetected
 
 _RATE_TOLERANCE = 0.02
 """Of the plan's rate; a few seconds' count is exact to a sample or two."""
@@ -23,9 +24,9 @@ _NOISE_MAX_MICRO_G = 2000.0
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at: good or not, and what was found."""
+    """One thing looked at: good or not, or None for what is said only, and what was found."""
 
-    good: bool
+    good: bool | None
     text: str
 
 
@@ -46,14 +47,16 @@ def collect(source: Source, seconds: float) -> Frames:
 def findings(setup: Setup, frames: Frames, where: str, notes: list[str]) -> list[Finding]:
     """What the frames of a few seconds show."""
     found = [Finding(False, note) for note in notes]
+    found += [Finding(None, text) for text in (*setup.rig.warnings, *undetected(setup.rig))]
     if not len(frames):
         return [*found, Finding(False, f"{where}: no frames at all")]
     plan = setup.plan
-    samples = SampleDecoder(setup.dbc, plan.layout, plan.rate_hz).feed(frames)
+    samples = setup.decoder().feed(frames)
     found += _bus(setup, frames, samples)
-    found.append(_identity(setup, frames, where, samples))
+    if setup.rig.serial is not None or setup.rig.rate is not None:
+        found.append(_identity(setup, frames, where, samples))
     if len(samples.number) < plan.rate_hz:
-        text = f"{len(frames)} frames, {len(samples.number)} samples: wrong DBC, layout or rig"
+        text = f"{len(frames)} frames, {len(samples.number)} samples: wrong description or rig"
         return [*found, Finding(False, text)]
     return found + _samples(setup, samples)
 
@@ -65,24 +68,35 @@ def _bus(setup: Setup, frames: Frames, samples: Samples) -> list[Finding]:
         ("frames with a wrong CRC or length", int((kinds == BAD_CRC).sum())),
         ("frames without their partner", int((kinds == ORPHAN).sum())),
         ("samples sent twice", int((kinds == DUPLICATE).sum())),
+        ("values that are no numbers", int((kinds == INVALID).sum())),
+        ("frames lost by counters of other messages", int((kinds == LOST_FRAME).sum())),
         ("error frames", errors),
         ("jumps of the counters (two nodes with one ID?)", int(samples.jump.sum())),
     )
-    known = {m.frame_id for m in setup.dbc.messages.values()}
-    strange = sorted({int(i) for i in np.unique(frames.can_id[~frames.is_error])} - known)
+    ids = np.unique(frames.can_id[~frames.is_error])
+    mine = [use.layout.mine(ids) for use in setup.rig.messages.values()]
+    strange = [int(i) & ID_MASK for i in ids[~np.logical_or.reduce(mine)]]
     found = [Finding(count == 0, f"{count} {name}") for name, count in counts]
-    ids = ", ".join(f"0x{i:X}" for i in strange[:8])
-    return [*found, Finding(True, f"IDs that are not the rig's: {ids or 'none'}")]
+    names = ", ".join(f"0x{i:X}" for i in strange[:8])
+    return [*found, Finding(True, f"IDs that are not the rig's: {names or 'none'}")]
 
 
 def _identity(setup: Setup, frames: Frames, where: str, samples: Samples) -> Finding:
-    if not samples.identity:
-        return Finding(False, "the rig has not sent its serial number (RIG_IDENT)")
+    rig = setup.rig
+    for what, said, name in (
+        (rig.serial, samples.serials, "serial number"),
+        (rig.rate, samples.rates, "rate"),
+    ):
+        if what is not None and not said:
+            return Finding(False, f"the rig has not sent its {name} ({what.message})")
     try:
         Engine(setup, where).feed(frames)
     except RefusedError as refusal:
         return Finding(False, str(refusal))
-    return Finding(True, f'serial number "{setup.unit.serial}", {setup.plan.rate_hz} Hz')
+    serial = (
+        f'serial number "{setup.unit.serial}"' if rig.serial is not None else "no serial number"
+    )
+    return Finding(True, f"{serial}, {setup.plan.rate_hz} Hz")
 
 
 def _samples(setup: Setup, samples: Samples) -> list[Finding]:
@@ -90,10 +104,10 @@ def _samples(setup: Setup, samples: Samples) -> list[Finding]:
     seconds = (int(samples.t_ns[-1]) - int(samples.t_ns[0])) / 1e9
     rate = (len(samples.number) - 1) / max(seconds, 1e-9)
     lost = int(samples.number[-1] - samples.number[0]) + 1 - len(samples.number)
-    scale = plan.micro_g_per_code(setup.unit)
+    scale = setup.nominal.micro_g_per_code
     # Differences of neighbours: a drift does not enter.
     sd = np.sqrt(np.mean(np.diff(samples.codes, axis=0) ** 2, axis=0) / 2.0) * np.abs(scale)
-    seen = recognised(samples.codes.mean(axis=0), scale)
+    seen = recognised(samples.codes.mean(axis=0) - setup.nominal.zero_code, scale)
     noise = ", ".join(f"{axis} {v:.0f}" for axis, v in zip(AXES, sd, strict=True))
     codes = samples.temp_code
     temp = setup.unit.temperature_sensor.degc(float(codes.mean())) if len(codes) else None

@@ -4,30 +4,66 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import shown
 from triaxcal.rig.blocks import BlockBuilder
-from triaxcal.rig.dbc import RigDbc
+from triaxcal.rig.description import RigDescription
 from triaxcal.rig.events import Command, Event
 from triaxcal.rig.frames import Frames
+from triaxcal.rig.identity import sent_serial, sent_words, serial_of
+from triaxcal.rig.nominal import Coding, Nominal, coding_of, nominal_of, refuse_unfit
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.samples import SampleDecoder
 from triaxcal.rig.session import Session
-from triaxcal.rig.simulator import serial_crc
 from triaxcal.unit.description import UnitDescription, read_unit
 from triaxcal.unit.folder import list_units
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What a session is about: the unit, its folder, the plan and the frames."""
+    """What a session is about: the unit, its folder, the plan and what the rig sends."""
 
     folder: Path
     unit: UnitDescription
     plan: SessionPlan
-    dbc: RigDbc
+    rig: RigDescription
+
+    @cached_property
+    def nominal(self) -> Nominal:
+        """Nominal meaning of the unit's codes.
+
+        Raises
+        ------
+        RefusedError
+            Where nothing states it, or plan and bus description contradict each other.
+        """
+        return nominal_of(self.rig, self.unit, self.plan)
+
+    @cached_property
+    def coding(self) -> Coding:
+        """How the rig's values become codes of the unit."""
+        return coding_of(self.rig, self.unit)
+
+    def decoder(self) -> SampleDecoder:
+        """New decoder of the unit's frames."""
+        return SampleDecoder(self.rig, self.plan.rate_hz, self.coding)
+
+    def refuse_unfit(self) -> None:
+        """Refuse what cannot make a session.
+
+        Raises
+        ------
+        RefusedError
+            As `nominal.refuse_unfit` and `nominal`; where the unit's serial number has no number
+            and the rig sends one.
+        """
+        refuse_unfit(self.rig, self.unit)
+        assert self.nominal is not None
+        if self.rig.serial is not None:
+            serial_of(self.rig.serial_is, self.unit)
 
 
 class Engine:
@@ -44,12 +80,12 @@ class Engine:
     def __init__(self, setup: Setup, where: str, history: tuple[Event, ...] = ()) -> None:
         self.setup = setup
         self.where = where
-        self.session = Session(setup.plan, setup.unit, history)
+        self.session = Session(setup.plan, setup.unit, setup.nominal, history)
         self._start()
 
     def _start(self) -> None:
         plan, adc = self.setup.plan, self.setup.unit.adc
-        self._decoder = SampleDecoder(self.setup.dbc, plan.layout, plan.rate_hz)
+        self._decoder = self.setup.decoder()
         self._blocks = BlockBuilder(plan.rate_hz, (adc.code_min, adc.code_max))
 
     def resume(self, durable: int) -> None:
@@ -70,40 +106,45 @@ class Engine:
             When the rig says another serial number or rate than the unit and the plan.
         """
         samples = self._decoder.feed(frames)
-        for identity in sorted(samples.identity):
-            self._check_identity(*identity)
+        self._check_identity(samples.serials, samples.rates)
         return [e for b in self._blocks.feed(samples) for e in self.session.on_block(b)]
 
     def command(self, command: Command, t_ns: int) -> list[Event]:
         """Decisions after a word of the operator."""
         return self.session.on_command(command, t_ns)
 
-    def _check_identity(self, serial: int, rate_hz: int) -> None:
-        unit, plan = self.setup.unit, self.setup.plan
-        if serial != serial_crc(unit.serial):
-            other = _unit_of_serial(self.setup.folder, serial)
-            raise RefusedError(
-                f"{self.where}, RIG_IDENT",
-                f"serial number {other} (CRC-32 0x{serial:08X})",
-                expected=f'"{unit.serial}" (0x{serial_crc(unit.serial):08X}) of {unit.name}',
-                remedy="mount that unit, or name the one that is mounted",
-            )
-        if rate_hz != plan.rate_hz:
-            raise RefusedError(
-                f"{self.where}, RIG_IDENT",
-                f"{rate_hz} samples a second",
-                expected=f"{plan.rate_hz}, rate_hz of {plan.source}",
-                remedy="correct the plan or the rig",
-            )
+    def _check_identity(self, serials: frozenset[int], rates: frozenset[int]) -> None:
+        unit, plan, rig = self.setup.unit, self.setup.plan, self.setup.rig
+        kind = rig.serial_is
+        for serial in sorted(serials):
+            mine = serial_of(kind, unit)
+            if serial != mine and rig.serial is not None:
+                other = _unit_of_serial(self.setup.folder, kind, serial)
+                raise RefusedError(
+                    f"{self.where}, {rig.serial.message}",
+                    f"serial number {other} ({sent_words(kind, serial)})",
+                    expected=f'"{unit.serial}" ({sent_words(kind, mine)}) of {unit.name}',
+                    remedy="mount that unit, or name the one that is mounted",
+                )
+        for rate in sorted(rates):
+            signal = rig.rate and rig.rate.signal
+            rate_hz = rate * signal.scale + signal.offset if signal else rate
+            if rate_hz != plan.rate_hz and rig.rate is not None:
+                raise RefusedError(
+                    f"{self.where}, {rig.rate.message}",
+                    f"{rate_hz:g} samples a second",
+                    expected=f"{plan.rate_hz}, rate_hz of {plan.source}",
+                    remedy="correct the plan or the rig",
+                )
 
 
-def _unit_of_serial(folder: Path, serial: int) -> str:
+def _unit_of_serial(folder: Path, kind: str, serial: int) -> str:
     """Serial number of another unit beside this one, or "unknown"."""
     for name in list_units(folder.absolute().parent):
         try:
             other = read_unit(folder.absolute().parent / name)
         except RefusedError:
             continue
-        if serial_crc(other.serial) == serial:
+        if sent_serial(kind, other.serial) == serial:
             return f"{shown(other.serial)} of {name}"
     return "unknown"

@@ -18,6 +18,7 @@ from triaxcal.rig.frames import (
     BRS,
     DLC_SHIFT,
     ESI,
+    FD_LENGTHS,
     ID_MASK,
     SENT,
     BoolArray,
@@ -25,8 +26,6 @@ from triaxcal.rig.frames import (
     Frames,
     widened,
 )
-
-_FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 
 def missing(package: str, suffix: str) -> RefusedError:
@@ -122,7 +121,7 @@ def _records(frames: Frames, group: str) -> Any:
         "DLC": np.where(
             frames.marks >> DLC_SHIFT,
             frames.marks >> DLC_SHIFT,
-            np.searchsorted(_FD_LENGTHS, frames.length),
+            np.searchsorted(FD_LENGTHS, frames.length),
         ),
         "DataLength": frames.length,
         "DataBytes": widened(frames.data, 64),

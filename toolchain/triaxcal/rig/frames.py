@@ -40,6 +40,8 @@ ERROR_BITS = {
     0x0000_0100: "controller restarted",
 }
 """Classes of error frames, linux/can/error.h."""
+FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+"""Payloads that a CAN FD frame may have, bytes."""
 BUS_OFF = 0x40
 RESTARTED = 0x100
 

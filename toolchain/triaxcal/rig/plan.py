@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-
-import numpy as np
+from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import DESCRIPTION, FORMAT, FileKeys, TableKeys, Values, setting
-from triaxcal.base.kinds import FLAG, number, rising, three, whole, word
+from triaxcal.base.kinds import FLAG, line, number, rising, three, whole, word
 from triaxcal.base.tomltable import read_toml
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.thermal.shape import GROUP_GAP_DEGC, PLAUSIBLE_DEGC
-from triaxcal.model.types import FloatArray
 from triaxcal.rig.equipment import Equipment, equipment_tables, read_equipment
+from triaxcal.rig.shippedrigs import find_description
 from triaxcal.unit.description import UnitDescription
+
+LAYOUTS: Mapping[str, str] = MappingProxyType({"classic": "tilter", "fd": "tilter-fd"})
+"""Rig descriptions of plans that name a layout of the tilter's frames."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +124,11 @@ class SessionPlan:
 
     Attributes
     ----------
-    volts_per_g : tuple of three floats
-        Nominal scale with its sign; to recognise positions and to state micro-g.
+    rig : Path
+        The rig description, rig.toml.
+    volts_per_g : tuple of three floats, or None
+        Nominal scale with its sign; to recognise positions and to state micro-g. None is that of
+        unit.toml or of the bus description.
     take_out_of_order : bool
         A position found out of order is taken without asking.
     sha256 : str
@@ -133,17 +139,13 @@ class SessionPlan:
     source: str
     sha256: str
     rate_hz: int
-    layout: str
-    volts_per_g: tuple[float, float, float]
+    rig: Path
+    volts_per_g: tuple[float, float, float] | None
     take_out_of_order: bool
     steps: tuple[Step, ...]
     stillness: Stillness
     thermal: Thermal
     equipment: Equipment
-
-    def micro_g_per_code(self, unit: UnitDescription) -> FloatArray:
-        """Nominal micro-g of one code, signed, shape (3,)."""
-        return 1e6 * unit.adc.volts_per_code / np.array(self.volts_per_g)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,21 +156,28 @@ class _Rig:
     ----------
     rate_hz
         Readings a second of each axis.
+    rig
+        What the unit sends: the name of a description that came with triaxcal, or the path of a
+        rig.toml.
     layout
-        Layout of the frames on the bus.
+        In place of rig, the frames of the tilter: "classic" is rig = "tilter", "fd" is "tilter-fd".
     volts_per_g
-        Nominal scale of x, y, z with its sign.
+        Nominal scale of x, y, z with its sign; required where neither unit.toml ([sensor]) nor the
+        bus description states it.
     """
 
     rate_hz: int = setting(whole(10, 10_000), unit="Hz", example="100")
-    layout: str = setting(word(("classic", "fd")), "classic")
-    volts_per_g: tuple[float, float, float] = setting(
+    rig: str | None = setting(line(), None, words='"tilter"', example='"tilter"')
+    layout: str | None = setting(word(tuple(LAYOUTS)), None, words="by rig", example='"classic"')
+    volts_per_g: tuple[float, float, float] | None = setting(
         three(
             number(-100.0, 100.0),
             "three signed numbers, 0.0001 to 100 V/g in size",
             lambda v: abs(v) >= 1e-4,
         ),
-        unit="V/g",
+        None,
+        "V/g",
+        words="that of unit.toml or of the bus description",
         example="[0.5, 0.5, 0.5]",
     )
 
@@ -212,6 +221,7 @@ def session_plan_file() -> FileKeys:
             TableKeys.of(Thermal),
             *equipment_tables(),
         ),
+        first=("volts_per_g",),
     )
 
 
@@ -240,7 +250,7 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
         source=str(path),
         sha256=_hash_of(path),
         rate_hz=rig.rate_hz,
-        layout=rig.layout,
+        rig=_rig_file(tables["rig"], rig, path.parent),
         volts_per_g=rig.volts_per_g,
         take_out_of_order=steps.take_out_of_order,
         steps=_steps(tables["steps"], steps, unit, equipment),
@@ -248,6 +258,15 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
         thermal=thermal,
         equipment=equipment,
     )
+
+
+def _rig_file(values: Values, keys: _Rig, folder: Path) -> Path:
+    """The rig.toml that a plan names."""
+    if keys.rig is None:
+        return find_description(LAYOUTS[keys.layout or "classic"])
+    if keys.layout is not None:
+        raise values.refuse("layout", "rig alone: it says what the frames are", "leave layout out")
+    return find_description(keys.rig, folder)
 
 
 def _refuse_merged(values: Values, temps_degc: tuple[float, ...], thermal: Thermal) -> None:

@@ -19,11 +19,13 @@ from triaxcal.rig.lock import Lock
 from triaxcal.rig.rawlog import LogState, RawLog
 from triaxcal.rig.reasons import Reason
 from triaxcal.rig.stillness import Reference
+from triaxcal.rig.undetected import undetected
 
 FORMAT = 1
 LOG_FILE = "frames.log"
 JOURNAL_FILE = "session.journal"
 LOCK_FILE = "session.lock"
+_MAY_DIFFER = frozenset({"triaxcal", "plan", "unit", "rig", "undetected"})
 _DECIDE_NS = 80_000_000
 """Frames wait so long for the decoder, which costs the same for ten as for a hundred; they are in
 the log meanwhile. Decisions do not depend on how frames are cut."""
@@ -174,7 +176,10 @@ def header(setup: Setup) -> dict[str, Any]:
         "serial": setup.unit.serial,
         "plan": setup.plan.source,
         "plan_sha256": setup.plan.sha256,
-        "dbc_sha256": setup.dbc.sha256,
+        "dbc_sha256": setup.rig.bus_sha256,
+        "rig": setup.rig.name,
+        "rig_sha256": setup.rig.sha256,
+        "undetected": list(undetected(setup.rig)),
     }
 
 
@@ -187,12 +192,13 @@ def refuse_other_session(path: Path, record: Record, setup: Setup) -> None:
         Naming what differs.
     """
     for key, value in header(setup).items():
-        if key not in {"triaxcal", "plan", "unit"} and record.get(key) != value:
+        # A journal of before the rig descriptions has no word of them.
+        if key not in _MAY_DIFFER and record.get(key, value) != value:
             raise RefusedError(
                 f"{path}, {key}",
                 f"found {record.get(key)}",
                 expected=f"{value}",
-                remedy="use the unit, plan and DBC that the session was started with",
+                remedy="use the unit, plan and rig description that the session was started with",
             )
 
 

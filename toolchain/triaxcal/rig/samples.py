@@ -1,25 +1,29 @@
-"""Samples out of frames: checked, paired, numbered, so that every loss is counted.
+"""Samples out of frames: checked, joined, numbered, so that every loss is counted.
 
-The samples do not depend on how the frames were cut into batches.
+Which frames and signals they are is the rig description's matter alone (`triaxcal.rig.description`
+has the seam). The samples do not depend on how the frames were cut into batches.
 
-A sample's number grows by the sequence counter's step. The counter alone misses the loss of a
-whole turn (256 samples of the classic layout), so the turns are taken from the time of arrival,
-and the rig's own microseconds must then agree, or the sample is marked as a jump.
+A sample's number grows by the counter's step. The counter alone misses the loss of a whole turn
+(256 samples of the tilter's classic frames), so the turns are taken from the time of arrival, and
+the unit's own clock must then agree, or the sample is marked as a jump (`triaxcal.rig.numbering`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from triaxcal.model.types import IntArray
-from triaxcal.rig.dbc import RigDbc
-from triaxcal.rig.frames import BoolArray, Frames, concatenate
-
-CLOCK_ERROR = 200e-6
-"""How far the rig's clock and ours may differ, twice what a poor quartz does."""
-_AXES = ("AccelX", "AccelY", "AccelZ")
+from triaxcal.rig.description import MessageUse, RigDescription
+from triaxcal.rig.frames import BoolArray, Frames
+from triaxcal.rig.join import AgeJoin, CounterJoin, Joined, NoJoin, Part
+from triaxcal.rig.layout import Condition
+from triaxcal.rig.nominal import AS_SENT, Coding
+from triaxcal.rig.numbering import Clocks, Numbering
+from triaxcal.rig.recorded import Recorded, SignalUnit
+from triaxcal.rig.rows import Rows, available, rows_of, status_of
 
 
 @dataclass(frozen=True)
@@ -32,16 +36,16 @@ class Samples:
         0, 1, 2, ... since the first; a number left out is a lost sample.
     t_ns : int64 array, shape (n,)
         Time of arrival.
-    codes : int64 array, shape (n, 3)
-        Raw codes, axis order x, y, z.
+    codes : int64 or float64 array, shape (n, 3)
+        What is recorded, axis order x, y, z: raw integers, or values in codes of unit.toml.
     status : int64 array, shape (n,)
-        Status byte of the rig.
+        Bits in which the status differs from a good one.
     jump : bool array, shape (n,)
-        Sequence and the rig's time do not fit the sample before.
-    temp_number, temp_code : int64 arrays, shape (m,)
+        Counter and the unit's time do not fit the sample before.
+    temp_number, temp_code : arrays, shape (m,)
         Codes of the thermometer, each with the number of the sample before it.
-    identity : set of (serial CRC, rate in Hz)
-        What the rig said of itself.
+    serials, rates : sets of int
+        What the rig said of itself: serial number as it is sent, rate in Hz.
     trouble_number, trouble : int64 arrays, shape (k,)
         What went wrong, by the constants below or an error frame's ID with its flag, each with
         the number of the sample before it (-1: before the first).
@@ -49,101 +53,134 @@ class Samples:
 
     number: IntArray
     t_ns: IntArray
-    codes: IntArray
+    codes: np.ndarray
     status: IntArray
     jump: BoolArray
     temp_number: IntArray
-    temp_code: IntArray
-    identity: frozenset[tuple[int, int]]
+    temp_code: np.ndarray
+    serials: frozenset[int]
+    rates: frozenset[int]
     trouble_number: IntArray
     trouble: IntArray
 
 
-BAD_CRC, ORPHAN, DUPLICATE = 1, 2, 3
-"""A frame with a wrong CRC or length; one without its partner; a sample sent twice."""
+BAD_CRC, ORPHAN, DUPLICATE, INVALID, LOST_FRAME = 1, 2, 3, 4, 5
+"""A frame with a wrong CRC, length or kind; one without its partner; a sample sent twice; a value
+that is no number or not available; a frame lost of a message whose counter numbers no samples."""
+_MOST_LOST = 255
+"""Frames counted for one step of a counter: after a restart it means nothing."""
 
 
 @dataclass(frozen=True)
-class _Raw:
-    """Samples of a batch before they are numbered; `place` is where among its frames."""
+class _PartPlan:
+    """What to take from the frames of one part."""
 
-    place: IntArray
-    t_ns: IntArray
-    sequence: IntArray
-    time_us: IntArray
-    codes: IntArray
-    status: IntArray
-    temp_place: IntArray
-    temp_code: IntArray
-    identity: frozenset[tuple[int, int]]
-    bad_place: IntArray
-    orphan_place: IntArray
-
-
-@dataclass(frozen=True)
-class _Last:
-    """What the numbering remembers of the sample before."""
-
-    number: int
-    t_ns: int
-    sequence: int
-    time_us: int
+    use: MessageUse
+    conditions: tuple[Condition, ...]
+    axes: tuple[int, ...]
 
 
 class SampleDecoder:
-    """Turns frames of one rig into samples, remembering what a batch leaves open.
+    """Turns frames of one unit into samples, remembering what a batch leaves open.
 
     Parameters
     ----------
-    layout : str
-        "classic" or "fd".
     rate_hz : int
         Samples a second.
+    coding : Coding
+        How values become codes of unit.toml; by default they stay values.
     """
 
-    def __init__(self, dbc: RigDbc, layout: str, rate_hz: int) -> None:
-        self._rate_hz = rate_hz
-        self._fd = layout == "fd"
-        self._messages = dbc.messages
-        main = dbc.messages["RIG_FD" if self._fd else "RIG_Z"]
-        self._sequence_turn = 1 << main.signals["Sequence"].length
-        self._time_turn = 1 << main.signals["TimeUs"].length
-        self._open: Frames | None = None
-        self._last: _Last | None = None
+    def __init__(self, rig: RigDescription, rate_hz: int, coding: Coding = AS_SENT) -> None:
+        self._rig = rig
+        self._coding = coding
+        self._parts = _parts(rig)
+        self._seen = 0
+        lead = self._lead
+        numbers = self._parts[lead].use.counter is not None and (
+            rig.join == "counter"
+            or not (self._parts[lead].conditions or self._parts[lead].use.only)
+        )
+        self._counted = (
+            {p.use.name for p in self._parts if rig.join == "counter"}
+            or ({self._parts[lead].use.name} if numbers else set())
+        )  # fmt: skip
+        self._join: CounterJoin | AgeJoin | NoJoin = NoJoin()
+        if rig.join == "counter":
+            self._join = CounterJoin(len(self._parts))
+        elif rig.join:
+            self._join = AgeJoin(lead, rig.age_s)
+        clock = rig.sample_time
+        self._numbering = Numbering(
+            Clocks(
+                rate_hz,
+                self._parts[lead].use.counter_modulus if numbers else 0,
+                clock.turn if clock else 0,
+                clock.tick_us if clock else 1.0,
+            )
+        )
+        self._counters: dict[str, int] = {}
+
+    @property
+    def _lead(self) -> int:
+        """Part whose frame makes the sample."""
+        here = [i for i, p in enumerate(self._parts) if p.use.name == self._rig.sample_at]
+        return next((i for i in here if 2 in self._parts[i].axes), here[-1])
 
     def feed(self, frames: Frames) -> Samples:
         """Samples that these frames complete."""
-        if self._open is not None:
-            frames = concatenate([self._open, frames])
-            self._open = None
-        raw = self._raw_fd(frames) if self._fd else self._raw_classic(frames)
-        before = -1 if self._last is None else self._last.number
-        number, duplicate, jump = self._number(raw)
+        rig, seen = self._rig, self._seen
+        self._seen += len(frames)
+        found = {name: rows_of(use, frames, seen) for name, use in rig.messages.items()}
+        rows = {name: good for name, (good, _) in found.items()}
+        joined = self._join.feed([self._part(plan, rows[plan.use.name]) for plan in self._parts])
+        invalid = _invalid(joined)
+        if invalid is not None:
+            fit = np.flatnonzero(~invalid)
+            parts = [part.take(fit) for part in joined.parts]
+            dropped, orphans = joined.place[invalid], joined.orphans
+            joined = Joined(parts, joined.place[fit], joined.t_ns[fit], orphans)
+        else:
+            dropped = joined.place[:0]
+        before = self._numbering.last
+        sequence = _first_of(part.sequence for part in joined.parts)
+        time = _first_of(part.time for part in joined.parts)
+        zero = np.zeros(len(joined.place), np.int64)
+        number, duplicate, jump = self._numbering.number(
+            joined.t_ns, zero if sequence is None else sequence, zero if time is None else time
+        )
         numbers = np.concatenate([number, [before]])
 
         def number_before(place: IntArray) -> IntArray:
-            return numbers[np.searchsorted(raw.place, place, side="right") - 1]
+            return numbers[np.searchsorted(joined.place, place, side="right") - 1]
 
-        error_at = np.flatnonzero(frames.is_error)
-        temp_number = number_before(raw.temp_place)
+        temp_place, temp_code, no_temp = self._temperatures(rows)
+        temp_number = number_before(temp_place)
         known = temp_number >= 0
-        new = ~duplicate
+        error_at = np.flatnonzero(frames.is_error)
         kinds = (
-            (number_before(raw.bad_place), BAD_CRC),
-            (number_before(raw.orphan_place), ORPHAN),
+            *((number_before(bad), BAD_CRC) for _, bad in found.values() if len(bad)),
+            (number_before(joined.orphans), ORPHAN),
             (number[duplicate], DUPLICATE),
+            (number_before(np.concatenate([dropped, no_temp])), INVALID),
+            (number_before(self._lost(rows)), LOST_FRAME),
         )
+        new = ~duplicate
+        codes, status = _codes(joined.parts, self._parts), _status(joined.parts, zero)
+        if not new.all():
+            number, codes, status, jump = number[new], codes[new], status[new], jump[new]
         return Samples(
-            number=number[new],
-            t_ns=raw.t_ns[new],
-            codes=raw.codes[new],
-            status=raw.status[new],
-            jump=jump[new],
+            number=number,
+            t_ns=joined.t_ns[new],
+            codes=codes,
+            status=status,
+            jump=jump,
             temp_number=temp_number[known],
-            temp_code=raw.temp_code[known],
-            identity=raw.identity,
+            temp_code=temp_code[known],
+            serials=self._said(rows, rig.serial),
+            rates=self._said(rows, rig.rate),
             trouble_number=np.concatenate(
-                [*(numbers for numbers, _ in kinds), number_before(error_at)]
+                [*(numbers for numbers, _ in kinds), number_before(error_at + seen)]
             ),
             trouble=np.concatenate(
                 [
@@ -153,117 +190,134 @@ class SampleDecoder:
             ),
         )
 
-    def _valid(self, frames: Frames, name: str) -> tuple[IntArray, IntArray]:
-        """Places of a message's good frames and of its bad ones."""
-        layout = self._messages[name]
-        places = np.flatnonzero(frames.can_id == layout.frame_id)
-        good = layout.valid(frames.take(places))
-        return places[good], places[~good]
-
-    def _raw_classic(self, frames: Frames) -> _Raw:
-        data = frames.data
-        xy, z = self._messages["RIG_XY"], self._messages["RIG_Z"]
-        (xy_at, bad_xy), (z_at, bad_z) = self._valid(frames, "RIG_XY"), self._valid(frames, "RIG_Z")
-        temp_at, bad_temp = self._valid(frames, "RIG_TEMP")
-        ident_at, bad_ident = self._valid(frames, "RIG_IDENT")
-        first, second, orphan = self._pair(frames, xy_at, z_at)
-        codes = (
-            xy.raw("AccelX", data[first]),
-            xy.raw("AccelY", data[first]),
-            z.raw("AccelZ", data[second]),
+    def _part(self, plan: _PartPlan, rows: Rows) -> Part:
+        """Columns of one part."""
+        use = plan.use
+        rows = rows.where(plan.conditions)
+        clock = self._rig.sample_time
+        axes, good = [], None
+        for axis in plan.axes:
+            numbers, there = self._number(use, self._rig.axes[axis], rows, axis)
+            axes.append(numbers)
+            if there is not None:
+                good = there if good is None else good & there
+        mine = clock is not None and (clock.signal.message, clock.signal.conditions) == (
+            use.name,
+            plan.conditions,
         )
-        ident = self._messages["RIG_IDENT"]
-        return _Raw(
-            place=second,
-            t_ns=frames.t_ns[second],
-            sequence=z.raw("Sequence", data[second]),
-            time_us=z.raw("TimeUs", data[second]),
-            codes=np.stack(codes, axis=1),
-            status=z.raw("Status", data[second]),
-            temp_place=temp_at,
-            temp_code=self._messages["RIG_TEMP"].raw("TempCode", data[temp_at]),
-            identity=_pairs(
-                ident.raw("SerialCrc", data[ident_at]), ident.raw("RateHz", data[ident_at])
-            ),
-            bad_place=np.concatenate([bad_xy, bad_z, bad_temp, bad_ident]),
-            orphan_place=orphan,
+        return Part(
+            place=rows.place,
+            t_ns=rows.t_ns,
+            sequence=use.counter.raw(rows.data)
+            if use.name in self._counted and use.counter
+            else None,
+            time=clock.signal.signal.raw(rows.data) if clock is not None and mine else None,
+            status=status_of(use, rows.data),
+            axes=tuple(axes),
+            good=good,
         )
 
-    def _pair(
-        self, frames: Frames, xy_at: IntArray, z_at: IntArray
-    ) -> tuple[IntArray, IntArray, IntArray]:
-        """Places of RIG_XY and RIG_Z that belong together, and of those alone.
+    def _number(
+        self, use: MessageUse, what: Recorded, rows: Rows, axis: int
+    ) -> tuple[np.ndarray, BoolArray | None]:
+        """What is recorded of an axis, and which of it are numbers."""
+        signal = what.signal
+        if not what.as_value:
+            raw = signal.raw(rows.data).view(np.int64)
+            return raw, available(use, signal, raw)
+        there = available(use, signal, signal.number(rows.data))
+        return signal.value(rows.data) * self._coding.axes[axis], there
 
-        A RIG_XY at the very end stays open for the next batch.
-        """
-        places = np.concatenate([xy_at, z_at])
-        order = np.argsort(places)
-        places = places[order]
-        is_z = order >= len(xy_at)
-        sequence = np.concatenate(
-            [
-                self._messages["RIG_XY"].raw("Sequence", frames.data[xy_at]),
-                self._messages["RIG_Z"].raw("Sequence", frames.data[z_at]),
-            ]
-        )[order]
-        paired = np.flatnonzero(~is_z[:-1] & is_z[1:] & (sequence[:-1] == sequence[1:]))
-        alone = np.ones(len(places), np.bool_)
-        alone[paired] = alone[paired + 1] = False
-        if len(places) and not is_z[-1]:
-            self._open = frames.take(places[-1:])
-            alone[-1] = False
-        return places[paired], places[paired + 1], places[alone]
+    def _temperatures(self, rows: Mapping[str, Rows]) -> tuple[IntArray, np.ndarray, IntArray]:
+        """Places and codes of the thermometer, and places of those that are none."""
+        what = self._rig.temperature
+        if what is None:
+            nothing = np.zeros(0, np.int64)
+            return nothing, nothing, nothing
+        use = self._rig.messages[what.message]
+        mine = rows[what.message].where(what.conditions)
+        signal = what.signal
+        if what.as_value:
+            good = available(use, signal, signal.number(mine.data))
+            factor, shift = self._coding.temperature
+            codes: np.ndarray = signal.value(mine.data) * factor + shift
+        else:
+            codes = signal.raw(mine.data).view(np.int64)
+            good = available(use, signal, codes)
+        status = None if what.message in self._rig.axis_messages else status_of(use, mine.data)
+        if status is not None and status.any():
+            good = (status == 0) if good is None else good & (status == 0)
+        if good is None:
+            return mine.place, codes, mine.place[:0]
+        return mine.place[good], codes[good], mine.place[~good]
 
-    def _raw_fd(self, frames: Frames) -> _Raw:
-        places, bad = self._valid(frames, "RIG_FD")
-        message = self._messages["RIG_FD"]
-        data = frames.data[places]
-        return _Raw(
-            place=places,
-            t_ns=frames.t_ns[places],
-            sequence=message.raw("Sequence", data),
-            time_us=message.raw("TimeUs", data),
-            codes=np.stack([message.raw(axis, data) for axis in _AXES], axis=1),
-            status=message.raw("Status", data),
-            temp_place=places,
-            temp_code=message.raw("TempCode", data),
-            identity=_pairs(message.raw("SerialCrc", data), message.raw("RateHz", data)),
-            bad_place=bad,
-            orphan_place=np.zeros(0, np.int64),
-        )
+    def _said(self, rows: Mapping[str, Rows], what: SignalUnit | None) -> frozenset[int]:
+        """Different values of an integer; it rarely changes, so most batches have one."""
+        if what is None:
+            return frozenset()
+        mine = rows[what.message].where(what.conditions)
+        if not len(mine):
+            return frozenset()
+        raw = what.signal.raw(mine.data)
+        if raw[0] == raw[-1] and (raw == raw[0]).all():
+            return frozenset((int(raw[0]),))
+        return frozenset(np.unique(raw).tolist())
 
-    def _number(self, raw: _Raw) -> tuple[IntArray, BoolArray, BoolArray]:
-        """Numbers of the samples; which are sent twice; which do not fit the one before."""
-        if not len(raw.t_ns):
-            nothing = np.zeros(0, np.bool_)
-            return np.zeros(0, np.int64), nothing, nothing
-        last = self._last or _Last(-1, int(raw.t_ns[0]), int(raw.sequence[0]), int(raw.time_us[0]))
-        turn = self._sequence_turn
-        d_sequence = np.diff(raw.sequence, prepend=last.sequence) % turn
-        d_time_us = np.diff(raw.time_us, prepend=last.time_us) % self._time_turn
-        d_host_s = np.diff(raw.t_ns, prepend=last.t_ns) * 1e-9
-        d_host = np.rint(d_host_s * self._rate_hz).astype(np.int64)
-        duplicate = (d_sequence == 0) & (d_time_us == 0) & (d_host < turn // 2)
-        step = d_sequence + turn * np.rint((d_host - d_sequence) / turn).astype(np.int64)
-        period_us = 1e6 / self._rate_hz
-        half = self._time_turn / 2
-        off_us = np.abs((d_time_us - step * period_us + half) % self._time_turn - half)
-        jump = (step <= 0) | (off_us > period_us / 4 + step * period_us * CLOCK_ERROR)
-        step = np.where(jump, np.maximum(d_host, 1), step)
-        if self._last is None:
-            duplicate[0], jump[0], step[0] = False, False, 1
-        step[duplicate] = 0
-        jump &= ~duplicate
-        number: IntArray = last.number + np.cumsum(step)
-        self._last = _Last(
-            int(number[-1]), int(raw.t_ns[-1]), int(raw.sequence[-1]), int(raw.time_us[-1])
-        )
-        return number, duplicate, jump
+    def _lost(self, rows: Mapping[str, Rows]) -> IntArray:
+        """Places after losses of messages whose counters number no samples, once a frame lost."""
+        places = [np.zeros(0, np.int64)]
+        for name, use in self._rig.messages.items():
+            mine = rows[name]
+            if use.counter is None or name in self._counted or not len(mine):
+                continue
+            counter = use.counter.raw(mine.data)
+            before = self._counters.get(name, (int(counter[0]) - 1) % use.counter_modulus)
+            lost = (np.diff(counter, prepend=before) - 1) % use.counter_modulus
+            lost[np.diff(counter, prepend=before) == 0] = 0
+            self._counters[name] = int(counter[-1])
+            if lost.any():
+                places.append(np.repeat(mine.place, np.minimum(lost, _MOST_LOST)))
+        return places[0] if len(places) == 1 else np.sort(np.concatenate(places))
 
 
-def _pairs(a: IntArray, b: IntArray) -> frozenset[tuple[int, int]]:
-    """Different pairs of two columns; they rarely change, so most batches have one."""
-    if not len(a):
-        return frozenset()
-    keys = np.unique(a * (1 << 16) + b)
-    return frozenset((int(key) >> 16, int(key) & 0xFFFF) for key in keys)
+def _parts(rig: RigDescription) -> list[_PartPlan]:
+    """Parts of a sample: what one frame gives of it."""
+    by_frame: dict[tuple[str, tuple[Condition, ...]], list[int]] = {}
+    for i, axis in enumerate(rig.axes):
+        by_frame.setdefault((axis.message, axis.conditions), []).append(i)
+    return [
+        _PartPlan(rig.messages[name], conditions, tuple(axes))
+        for (name, conditions), axes in by_frame.items()
+    ]
+
+
+def _first_of(columns: Iterable[IntArray | None]) -> IntArray | None:
+    return next((column for column in columns if column is not None), None)
+
+
+def _invalid(joined: Joined) -> BoolArray | None:
+    """Which samples lack a number; None where none does."""
+    goods = [part.good for part in joined.parts if part.good is not None]
+    if not goods:
+        return None
+    good: BoolArray = np.logical_and.reduce(goods)
+    return None if good.all() else ~good
+
+
+def _codes(parts: list[Part], plans: list[_PartPlan]) -> np.ndarray:
+    """What is recorded, shape (n, 3)."""
+    by_axis = {
+        axis: column
+        for part, plan in zip(parts, plans, strict=True)
+        for axis, column in zip(plan.axes, part.axes, strict=True)
+    }
+    return np.stack([by_axis[axis] for axis in range(3)], axis=1)
+
+
+def _status(parts: list[Part], zero: IntArray) -> IntArray:
+    """Status of all parts of a sample, or-ed."""
+    said = [part.status for part in parts if part.status is not None]
+    status = said[0] if said else zero
+    for other in said[1:]:
+        status = status | other
+    return status

@@ -1,28 +1,38 @@
-"""Whole columns of signals out of and into payloads, by the layout that a DBC gives."""
+"""Whole columns of signals out of payloads, by the layout that a bus description gives."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.rig.frames import ByteArray
 
 _WORD = 8
 """Bytes of a classic frame."""
+_EXACT_BITS = 53
+_FLOATS = {16: "<f2", 32: "<f4", 64: "<f8"}
+_UNSIGNED = {16: "<u2", 32: "<u4", 64: "<u8"}
+
+Word = npt.NDArray[np.uint64]
 
 
 @dataclass(frozen=True)
 class Signal:
-    """Place and meaning of one signal, as a DBC line SG_ states them.
+    """Place and meaning of one signal, as the bus description states them.
 
     Attributes
     ----------
     start, length : int
-        Bits; `start` in the DBC's own numbering (of a big-endian signal its highest bit).
-    scale, offset : float
-        Value = raw * scale + offset.
+        Bits, 1 to 64; `start` in the DBC's own numbering (of a big-endian signal its highest bit).
+    scale, offset : int or float
+        Value = raw * scale + offset; whole numbers where the description has whole numbers.
+    is_float : bool
+        The bits are an IEEE 754 number (SIG_VALTYPE_) of 16, 32 or 64 bits.
+    unit : str
+        Of the value, as the description has it.
     """
 
     name: str
@@ -30,8 +40,10 @@ class Signal:
     length: int
     little_endian: bool
     signed: bool
-    scale: float = 1.0
-    offset: float = 0.0
+    scale: float = 1
+    offset: float = 0
+    is_float: bool = False
+    unit: str = ""
 
     @property
     def first_byte(self) -> int:
@@ -51,42 +63,75 @@ class Signal:
         before = self.start % 8 if self.little_endian else 7 - self.start % 8
         return (before + self.length + 7) // 8
 
+    @property
+    def is_plain(self) -> bool:
+        """The value is the raw number."""
+        return self.scale == 1 and self.offset == 0
+
+    @property
+    def ends(self) -> tuple[int, int]:
+        """Smallest and largest raw integer."""
+        low = -(1 << (self.length - 1)) if self.signed else 0
+        return low, low + (1 << self.length) - 1
+
     def raw(self, data: ByteArray) -> IntArray:
         """Raw integers of payloads (n, bytes); shape (n,).
 
-        Raises
-        ------
-        ValueError
-            When the signal spans more than 63 bits of payload bytes.
+        Unsigned ones of 64 bits come as uint64, those of a float are its bits.
         """
-        if self.byte_count > 7 and not (self.byte_count == 8 and self._drop == 0 and self.signed):
-            raise ValueError(f"{self.name}: {self.length} bits are more than this decoder takes")
         if data.shape[1] == _WORD and data.flags.c_contiguous:
-            return self._of_words(data)
-        total = np.zeros(len(data), np.int64)
+            words, drop = self._words(data)
+        else:
+            words, drop = self._gathered(data), 0
+        if self.signed and not self.is_float:
+            # Up to the sign bit and back: the arithmetic shift extends the sign.
+            up = words if self.length + drop == 64 else words << np.uint64(64 - self.length - drop)
+            return up.view(np.int64) >> (64 - self.length)
+        if self.length == 64:
+            return words  # type: ignore[return-value]  # 64 bits fit no other
+        raw = (words >> np.uint64(drop)) & np.uint64((1 << self.length) - 1)
+        return raw.view(np.int64)
+
+    def _words(self, data: ByteArray) -> tuple[Word, int]:
+        """Payloads of eight bytes, each as one number, and the bits right of the signal in it."""
+        if self.little_endian:
+            return data.view("<u8")[:, 0], self.start
+        first_bit = self.start // 8 * 8 + 7 - self.start % 8
+        return data.view(">u8")[:, 0].astype(np.uint64), 64 - first_bit - self.length
+
+    def _gathered(self, data: ByteArray) -> Word:
+        """Number made of the signal's bytes, its bits at the right; nine bytes of 64 bits too."""
+        total = np.zeros(len(data), np.uint64)
         for i in range(self.byte_count):
             place = i if self.little_endian else self.byte_count - 1 - i
-            total |= data[:, self.first_byte + i].astype(np.int64) << (8 * place)
-        if self.signed:
-            # Up to the sign bit and back: the arithmetic shift extends the sign.
-            up = 64 - self.length - self._drop
-            return (total << up) >> (64 - self.length)
-        return (total >> self._drop) & ((1 << self.length) - 1)
+            up = 8 * place - self._drop
+            byte = data[:, self.first_byte + i].astype(np.uint64)
+            total |= byte << np.uint64(up) if up >= 0 else byte >> np.uint64(-up)
+        return total
 
-    def _of_words(self, data: ByteArray) -> IntArray:
-        """The same out of payloads of eight bytes, each taken as one number."""
-        if self.little_endian:
-            words, drop = data.view("<i8")[:, 0], self.start
-        else:
-            first_bit = self.start // 8 * 8 + 7 - self.start % 8
-            words, drop = data.view(">i8")[:, 0], 64 - first_bit - self.length
-        if self.signed:
-            return (words.astype(np.int64) << (64 - self.length - drop)) >> (64 - self.length)
-        return (words.astype(np.int64) >> drop) & ((1 << self.length) - 1)
+    def number(self, data: ByteArray) -> IntArray | FloatArray:
+        """Numbers as they are sent, before scale and offset; of a float, float64; shape (n,)."""
+        raw = self.raw(data)
+        if not self.is_float:
+            return raw
+        bits = raw.astype(_UNSIGNED[self.length])
+        return bits.view(_FLOATS[self.length]).astype(np.float64)
 
     def value(self, data: ByteArray) -> FloatArray:
-        """Physical values of payloads (n, bytes); shape (n,)."""
-        return self.raw(data).astype(np.float64) * self.scale + self.offset
+        """Physical values of payloads (n, bytes), float64, shape (n,); nearest to the exact ones.
+
+        The operations, and so the last bits, are those of cantools.
+        """
+        number = self.number(data)
+        if self.is_plain:
+            return number.astype(np.float64)
+        whole = isinstance(self.scale, int) and isinstance(self.offset, int)
+        if self.is_float or not whole:
+            return number.astype(np.float64) * self.scale + self.offset
+        scale, offset = int(self.scale), int(self.offset)
+        if self.length + scale.bit_length() < _EXACT_BITS and offset.bit_length() < _EXACT_BITS:
+            return (number.astype(np.int64) * scale + offset).astype(np.float64)
+        return np.array([float(n * scale + offset) for n in number.tolist()], np.float64)
 
     def put(self, data: ByteArray, raw: IntArray) -> None:
         """Write raw integers (n,) into payloads (n, bytes) whose bits there are zero."""

@@ -1,95 +1,254 @@
-"""Frames of the simulated rig: packed by the DBC, then spoiled to order."""
+"""Frames of the simulated rig: packed through cantools, then spoiled to order."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from triaxcal.model.types import IntArray
-from triaxcal.rig.dbc import FrameLayout, RigDbc
-from triaxcal.rig.frames import BUS_OFF, ERR_FLAG, RESTARTED, Frames, alike, concatenate
+from triaxcal.rig.busfile import read_bus_file
+from triaxcal.rig.description import MessageUse, RigDescription
+from triaxcal.rig.frames import (
+    BUS_OFF,
+    ERR_FLAG,
+    RESTARTED,
+    Frames,
+    alike,
+    concatenate,
+    widened,
+)
+from triaxcal.rig.layout import Condition
+from triaxcal.rig.nominal import AS_SENT, Coding
+from triaxcal.rig.recorded import Recorded, SignalUnit
 from triaxcal.rig.simorders import Fault
+from triaxcal.rig.simpack import Packer
 
-_AFTER_NS = {"RIG_XY": 0, "RIG_Z": 150_000, "RIG_FD": 0, "RIG_TEMP": 300_000, "RIG_IDENT": 450_000}
-"""Delay of each frame after its sample; at 1 Mbit/s a frame takes about 130 us."""
+_APART_NS = 150_000
+"""From frame to frame of a sample; at 1 Mbit/s a frame takes about 130 us."""
+_FLOATS = {16: ("<f2", "<u2"), 32: ("<f4", "<u4"), 64: ("<f8", "<u8")}
+_AXES, _TEMPERATURE, _IDENTITY = range(3)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """One kind of frame: a message, in one case of its multiplexers.
+
+    Attributes
+    ----------
+    often : int
+        With each sample, with each temperature, or once a second.
+    place : int
+        Among the frames of a sample, from 0.
+    of_message : tuple of int
+        Its place among the kinds of the message, and their number.
+    """
+
+    use: MessageUse
+    conditions: tuple[Condition, ...]
+    packer: Packer
+    often: int
+    place: int
+    of_message: tuple[int, int]
 
 
 class FrameMaker:
-    """Packs the samples of one rig, with its counters."""
+    """Packs the samples of one rig, with its counters.
 
-    def __init__(self, dbc: RigDbc, layout: str, rate_hz: int, epoch_ns: int) -> None:
-        self._messages = dbc.messages
-        self._fd = layout == "fd"
+    Parameters
+    ----------
+    coding : Coding
+        How the rig's values become codes.
+    """
+
+    def __init__(
+        self, rig: RigDescription, rate_hz: int, epoch_ns: int, coding: Coding = AS_SENT
+    ) -> None:
+        self._rig = rig
+        self._coding = coding
         self._rate = rate_hz
         self._epoch_ns = epoch_ns
         self._sequence = self._time_us = 0
-        self._temp_sequence = self._ident_sequence = 0
+        self._kinds = _kinds(rig)
+        self._sent = dict.fromkeys(rig.messages, 0)
 
     def restart(self, sequence: int, time_us: int) -> None:
         """Start the counters anew."""
         self._sequence, self._time_us = sequence, time_us
 
-    def frames(
+    def frames(  # noqa: PLR0917
         self,
         codes: IntArray,
         temp_codes: IntArray,
         second: int,
-        serial_crc: int,
+        serial: int,
         status: int = 0,
+        temperature: bool = True,
     ) -> Frames:
-        """Frames of one second: codes (rate, 3), thermometer's codes spread over the second."""
+        """Frames of one second: codes (rate, 3), thermometer's codes spread over the second.
+
+        Parameters
+        ----------
+        serial : int
+            Serial number as the rig sends it.
+        status : int
+            Bits in which the status differs from a good one.
+        temperature : bool
+            Whether frames that have nothing but the temperature are sent.
+        """
         n = len(codes)
         index = np.arange(n, dtype=np.int64)
         period_ns = 10**9 // self._rate
         t_ns = self._epoch_ns + second * 10**9 + index * period_ns
-        sequence, time_us = self._sequence + index, self._time_us + index * (period_ns // 1000)
+        each = n // len(temp_codes)
+        rows = {
+            _AXES: index,
+            _TEMPERATURE: index[::each][: len(temp_codes)],
+            _IDENTITY: index[:1],
+        }
+        temps = temp_codes[np.minimum(index // each, len(temp_codes) - 1)]
+        numbers = self._numbers(codes, temps, serial, self._time_us + index * (period_ns // 1000))
+        parts = []
+        for kind in self._kinds:
+            mine = rows[kind.often]
+            if kind.often == _TEMPERATURE and not temperature:
+                continue
+            parts.append(self._packed(kind, numbers, mine, t_ns, status))
         self._sequence += n
         self._time_us += 10**6
-        each = n // len(temp_codes)
-        zero = np.zeros(n, np.int64)
-        if self._fd:
-            temps = temp_codes[np.minimum(index // each, len(temp_codes) - 1)]
-            values = {"Sequence": sequence, "Status": zero + status, "TimeUs": time_us}
-            values["TempCode"] = temps
-            values |= {f"Accel{axis}": codes[:, i] for i, axis in enumerate("XYZ")}
-            values |= {"SerialCrc": zero + serial_crc, "RateHz": zero + self._rate}
-            return _packed(self._messages["RIG_FD"], values, t_ns)
-        parts = [
-            _packed(
-                self._messages["RIG_XY"],
-                {"Sequence": sequence, "AccelX": codes[:, 0], "AccelY": codes[:, 1]},
-                t_ns,
-            ),
-            _packed(
-                self._messages["RIG_Z"],
-                {
-                    "Sequence": sequence,
-                    "AccelZ": codes[:, 2],
-                    "TimeUs": time_us,
-                    "Status": zero + status,
-                },
-                t_ns,
-            ),
-            self._temperatures(temp_codes, t_ns[::each][: len(temp_codes)]),
-            self._identity(serial_crc, t_ns[:1]),
-        ]
+        for name in self._sent:
+            kinds = [k for k in self._kinds if k.use.name == name]
+            self._sent[name] += sum(len(rows[k.often]) for k in kinds)
         frames = concatenate(parts)
         return frames.take(np.argsort(frames.t_ns, kind="stable"))
 
-    def _temperatures(self, codes: IntArray, t_ns: IntArray) -> Frames:
-        sequence = self._temp_sequence + np.arange(len(codes), dtype=np.int64)
-        self._temp_sequence += len(codes)
-        values = {"Sequence": sequence, "TempCode": codes, "Status": np.zeros(len(codes), np.int64)}
-        return _packed(self._messages["RIG_TEMP"], values, t_ns)
+    def _numbers(
+        self, codes: IntArray, temps: IntArray, serial: int, time_us: IntArray
+    ) -> dict[tuple[str, str], IntArray]:
+        """Raw integers (n,) of the signals of [signals], by message and signal."""
+        rig, zero = self._rig, np.zeros(len(codes), np.int64)
+        found = {
+            _key(axis): _sent(axis, codes[:, i], self._coding.axes[i], 0.0)
+            for i, axis in enumerate(rig.axes)
+        }
+        if rig.temperature is not None:
+            found[_key(rig.temperature)] = _sent(rig.temperature, temps, *self._coding.temperature)
+        if rig.sample_time is not None:
+            clock = rig.sample_time
+            found[_key(clock.signal)] = (time_us / clock.tick_us).astype(np.int64) % clock.turn
+        if rig.serial is not None:
+            found[_key(rig.serial)] = zero + serial
+        if rig.rate is not None:
+            signal = rig.rate.signal
+            found[_key(rig.rate)] = zero + round((self._rate - signal.offset) / signal.scale)
+        return found
 
-    def _identity(self, serial_crc: int, t_ns: IntArray) -> Frames:
-        one = np.ones(1, np.int64)
-        values = {"Sequence": one * self._ident_sequence, "SerialCrc": one * serial_crc}
-        self._ident_sequence += 1
-        return _packed(self._messages["RIG_IDENT"], values | {"RateHz": one * self._rate}, t_ns)
+    def _packed(
+        self,
+        kind: _Kind,
+        numbers: Mapping[tuple[str, str], IntArray],
+        rows: IntArray,
+        t_ns: IntArray,
+        status: int,
+    ) -> Frames:
+        use, layout = kind.use, kind.use.layout
+        zero = np.zeros(len(rows), np.int64)
+        raw = {
+            signal: column[rows]
+            for (message, signal), column in numbers.items()
+            if message == use.name and layout.multiplexed.get(signal, ()) == kind.conditions
+        }
+        raw |= {
+            signal: column[rows]
+            for (message, signal), column in numbers.items()
+            if message == use.name and not layout.multiplexed.get(signal)
+        }
+        if use.counter is not None:
+            raw[use.counter.name] = self._counter(kind, rows) % use.counter_modulus
+        if use.status is not None:
+            raw[use.status.name] = zero + (use.status_good[0] ^ status)
+        for condition in use.only:
+            raw[condition.selector.name] = zero + condition.values[0]
+        data = kind.packer.pack(raw)
+        if use.guard is not None and use.protection is not None:
+            use.protection.fill(use.guard, data)
+            crc = use.protection.crc(use.guard, data)
+            data += kind.packer.pack({use.guard.signal.name: crc}) - kind.packer.pack(
+                {use.guard.signal.name: zero}
+            )
+        data = widened(data, 64 if layout.fd else 8)
+        at = t_ns[rows] + kind.place * _APART_NS
+        return alike(at, layout.can_id, layout.sent_bytes, layout.fd, data)
+
+    def _counter(self, kind: _Kind, rows: IntArray) -> IntArray:
+        """Counter: of the samples where they are joined by it, else of the message's frames."""
+        if kind.often == _AXES and kind.of_message[1] == 1:
+            return self._sequence + rows
+        if kind.often == _AXES and self._rig.join == "counter":
+            return self._sequence + rows
+        at, count = kind.of_message
+        return self._sent[kind.use.name] + np.arange(len(rows)) * count + at
 
 
-def _packed(layout: FrameLayout, values: dict[str, IntArray], t_ns: IntArray) -> Frames:
-    return layout.frames(values, t_ns + _AFTER_NS[layout.name])
+def _key(what: SignalUnit) -> tuple[str, str]:
+    return what.message, what.signal.name
+
+
+def _sent(what: Recorded, codes: IntArray, factor: float, shift: float) -> IntArray:
+    """Raw integers that are sent for codes (n,)."""
+    signal = what.signal
+    if not what.as_value:
+        return codes
+    numbers = np.asarray(((codes - shift) / factor - signal.offset) / signal.scale, np.float64)
+    if not signal.is_float:
+        return np.rint(numbers).astype(np.int64)
+    kind, whole = _FLOATS[signal.length]
+    return numbers.astype(kind).view(whole).astype(np.int64)
+
+
+def _kinds(rig: RigDescription) -> list[_Kind]:
+    """Kinds of frames that carry a signal of [signals]."""
+    often: dict[tuple[str, tuple[Condition, ...]], int] = {}
+    for axis in rig.axes:
+        often.setdefault((axis.message, axis.conditions), _AXES)
+    for what, how in (
+        (rig.temperature, _TEMPERATURE),
+        (rig.serial, _IDENTITY),
+        (rig.rate, _IDENTITY),
+    ):
+        if what is None:
+            continue
+        always = not what.conditions and any(m == what.message for m, _ in often)
+        if not always:
+            often.setdefault((what.message, what.conditions), how)
+    messages = {m.name: m for path in rig.bus_files for m in read_bus_file(path).database.messages}
+    kinds = []
+    for place, ((name, conditions), how) in enumerate(often.items()):
+        use = rig.messages[name]
+        selected = {c.selector.name: c.values[0] for c in conditions}
+        selected = {**_first_cases(use), **selected}
+        same = [key for key in often if key[0] == name]
+        kinds.append(
+            _Kind(
+                use,
+                conditions,
+                Packer(messages[name], selected),
+                how,
+                place,
+                (same.index((name, conditions)), len(same)),
+            )
+        )
+    return kinds
+
+
+def _first_cases(use: MessageUse) -> dict[str, int]:
+    """A legal raw value of each multiplexer of a message."""
+    found: dict[str, int] = {}
+    for conditions in use.layout.multiplexed.values():
+        for condition in conditions:
+            found.setdefault(condition.selector.name, condition.values[0])
+    return found
 
 
 def with_frame_faults(

@@ -7,16 +7,17 @@ the unit's truth.toml. The same seed and the same orders give the same frames.
 from __future__ import annotations
 
 import math
-import zlib
 from dataclasses import dataclass
 
 import numpy as np
 
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.model.types import FloatArray, IntArray
-from triaxcal.rig.dbc import RigDbc
+from triaxcal.rig.description import RigDescription
 from triaxcal.rig.equipment import POSITIONS
 from triaxcal.rig.frames import Frames, concatenate
+from triaxcal.rig.identity import sent_serial
+from triaxcal.rig.nominal import coding_of
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.simframes import FrameMaker, with_frame_faults
 from triaxcal.rig.simorders import Fault
@@ -61,11 +62,6 @@ class RigSettings:
     turn_s: float = 4.0
 
 
-def serial_crc(serial: str) -> int:
-    """CRC-32 of a serial number's text, as the rig sends it."""
-    return zlib.crc32(serial.encode("ascii"))
-
-
 class SimulatedRig:
     """One rig; `advance` gives the frames of the next second."""
 
@@ -74,7 +70,7 @@ class SimulatedRig:
         unit: UnitDescription,
         truth: Truth,
         plan: SessionPlan,
-        dbc: RigDbc,
+        rig: RigDescription,
         settings: RigSettings = RigSettings(),
         faults: tuple[Fault, ...] = (),
     ) -> None:
@@ -94,10 +90,11 @@ class SimulatedRig:
         self._turn_share = 1.0
         self._rested_since = -math.inf
         self._flicker_g = np.zeros((3, len(_FLICKER_TAU_S)))
-        self._maker = FrameMaker(dbc, plan.layout, self._rate, EPOCH_NS)
-        self._second = FrameMaker(dbc, plan.layout, self._rate, EPOCH_NS)
+        self._serial_is = rig.serial_is
+        coding = coding_of(rig, unit)
+        self._maker = FrameMaker(rig, self._rate, EPOCH_NS, coding)
+        self._second = FrameMaker(rig, self._rate, EPOCH_NS, coding)
         self._second.restart(97, 12345)
-        self._temp_id = dbc.messages["RIG_TEMP"].frame_id
 
     @property
     def temp_degc(self) -> float:
@@ -233,19 +230,19 @@ class SimulatedRig:
 
     def _frames(self, codes: IntArray, temp_codes: IntArray, t_s: FloatArray) -> Frames:
         start, end = float(t_s[0]), float(t_s[0]) + 1.0
-        serial = self._unit.serial
+        sent = sent_serial(self._serial_is, self._unit.serial) or 0
         for fault in self._faults:
             if fault.kind == "serial" and start >= fault.at_s:
-                serial += "-X"
+                sent ^= 1
             if fault.kind == "gone" and start <= fault.at_s + fault.length_s < end:
                 self._maker.restart(0, 0)
         now = {f.kind: f for f in self._faults if f.at_s <= start < f.at_s + f.length_s}
         status = int(now["status"].value) if "status" in now else 0
-        frames = self._maker.frames(codes, temp_codes, self.seconds, serial_crc(serial), status)
-        if "notemp" in now:
-            frames = frames.take(frames.can_id != self._temp_id)
+        frames = self._maker.frames(
+            codes, temp_codes, self.seconds, sent, status, temperature="notemp" not in now
+        )
         if "twonodes" in now:
-            other = self._second.frames(codes[::-1], temp_codes, self.seconds, serial_crc(serial))
+            other = self._second.frames(codes[::-1], temp_codes, self.seconds, sent)
             both = concatenate([frames, other])
             frames = both.take(np.argsort(both.t_ns, kind="stable"))
         return with_frame_faults(frames, self._faults, EPOCH_NS, self._rng)

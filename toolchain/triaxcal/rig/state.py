@@ -9,6 +9,7 @@ from typing import Any
 from triaxcal.rig.blocks import Block
 from triaxcal.rig.equilibrium import Thermometer
 from triaxcal.rig.events import DURABLE, AcceptedDwell, Event, Kind
+from triaxcal.rig.nominal import Nominal
 from triaxcal.rig.orientation import recognised
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.reasons import Reason
@@ -51,11 +52,16 @@ class State:
     """
 
     def __init__(
-        self, plan: SessionPlan, unit: UnitDescription, history: Sequence[Event] = ()
+        self,
+        plan: SessionPlan,
+        unit: UnitDescription,
+        nominal: Nominal,
+        history: Sequence[Event] = (),
     ) -> None:
         self.plan = plan
         self.unit = unit
-        self.micro_g_per_code = plan.micro_g_per_code(unit)
+        self.micro_g_per_code = nominal.micro_g_per_code
+        self.zero_code = nominal.zero_code
         self.durable = [event for event in history if event.kind in DURABLE]
         self.lost = self.bad_crc = 0
         self.gaps: list[tuple[int, int]] = []
@@ -124,7 +130,7 @@ class State:
     def look(self, block: Block) -> None:
         """Take the temperature and the position of one more second."""
         self.thermometer.take(block)
-        seen = recognised(block.mean, self.micro_g_per_code)
+        seen = recognised(block.mean - self.zero_code, self.micro_g_per_code)
         if seen is None or seen != self.seen or self.seated_degc is None:
             self.seated_degc = self.temp_degc
         self.seen = seen

@@ -12,9 +12,11 @@ from typing import Any
 from triaxcal.base.durable import replace_file
 from triaxcal.readings.measurements import MEASUREMENTS_FILE
 from triaxcal.readings.measurements_csv import DEVIATIONS, READINGS, measurements_text
+from triaxcal.rig.description import RigDescription
 from triaxcal.rig.events import AcceptedDwell
 from triaxcal.rig.journal import disk_refusal
 from triaxcal.rig.session import Session
+from triaxcal.rig.undetected import undetected
 
 SIDECAR_FILE = "measurements.json"
 FORMAT = 1
@@ -29,7 +31,7 @@ class Written:
 
 
 def write_records(
-    folder: Path, session: Session, dbc_sha256: str, log: dict[str, int | str]
+    folder: Path, session: Session, rig: RigDescription, log: dict[str, int | str]
 ) -> Written:
     """Write measurements.csv and measurements.json into a folder.
 
@@ -56,7 +58,7 @@ def write_records(
                 f"count: batch means of a dwell; sd: of one batch mean; see {SIDECAR_FILE}",
             ),
         ),
-        sidecar: json.dumps(_sidecar(session, dwells, dbc_sha256, log), indent=2, sort_keys=True)
+        sidecar: json.dumps(_sidecar(session, dwells, rig, log), indent=2, sort_keys=True)
         + "\n",
     }
     files = {path: text.encode() for path, text in contents.items()}
@@ -101,7 +103,7 @@ def in_plan_order(session: Session) -> list[AcceptedDwell]:
 
 
 def _sidecar(
-    session: Session, dwells: list[AcceptedDwell], dbc_sha256: str, log: dict[str, int | str]
+    session: Session, dwells: list[AcceptedDwell], rig: RigDescription, log: dict[str, int | str]
 ) -> dict[str, Any]:
     plan = session.plan
     scale = abs(session.micro_g_per_code)
@@ -110,7 +112,11 @@ def _sidecar(
         "unit": session.unit.name,
         "serial": session.unit.serial,
         "plan_sha256": plan.sha256,
-        "dbc_sha256": dbc_sha256,
+        "dbc_sha256": rig.bus_sha256,
+        "rig": rig.name,
+        "rig_sha256": rig.sha256,
+        "recorded": [axis.said for axis in rig.axes],
+        "undetected": list(undetected(rig)),
         "log": log,
         "thresholds": {"stillness": asdict(plan.stillness), "thermal": asdict(plan.thermal)},
         "reference": asdict(session.reference) if session.reference else None,

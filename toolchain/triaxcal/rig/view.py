@@ -128,7 +128,7 @@ def _numbers(
     if not blocks:
         return None, None, None, None
     scale = session.micro_g_per_code
-    means = np.array([b.mean for b in blocks]) * scale
+    means = (np.array([b.mean for b in blocks]) - session.zero_code) * scale
     sd = np.sqrt(np.mean([b.variance for b in blocks], axis=0)) * np.abs(scale)
     slope = u = None
     if len(blocks) >= 3:

@@ -1,0 +1,1 @@
+"""Ways of end-to-end protection, a file each; `triaxcal.rig.protection` has what they share."""
