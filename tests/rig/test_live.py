@@ -242,7 +242,7 @@ def test_check_names_the_ids_of_another_dbc(tmp_path):
     texts = {f.text: f.good for f in findings(setup, frames, "given", [])}
     assert texts["IDs that are not the rig's: 0x140, 0x141, 0x142, 0x143"]
     assert not texts["the rig has not sent its serial number (RIG_IDENT)"]
-    assert not texts["211 frames, 0 samples: wrong DBC, layout or rig"]
+    assert not texts["211 frames, 0 samples: wrong rig description, or another rig"]
 
 
 def test_check_of_silence(tmp_path):

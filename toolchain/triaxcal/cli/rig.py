@@ -133,6 +133,7 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
     from triaxcal.cli.rig_live import show_written  # noqa: PLC0415
     from triaxcal.rig import recording, replay, store  # noqa: PLC0415
 
+    setup.refuse_unfit()
     journal = log.with_name(recording.JOURNAL_FILE)
     evidence = log.name == recording.LOG_FILE and journal.exists()
     played = replay.replay(setup, log, journal if evidence else None)

@@ -119,9 +119,7 @@ def _setup(folder: Path, plan: Path | None, dbc: Path | None) -> Setup:
     description = read_unit(folder)
     session_plan = read_plan(plan or shipped("rig") / "plans" / _DEFAULT_PLAN, description)
     rig = read_description(session_plan.rig, dbc)
-    setup = Setup(folder, description, session_plan, rig)
-    setup.refuse_unfit()
-    return setup
+    return Setup(folder, description, session_plan, rig)
 
 
 def open_source(setup: Setup, bus: BusChoice) -> Source:
@@ -130,12 +128,19 @@ def open_source(setup: Setup, bus: BusChoice) -> Source:
     Raises
     ------
     RefusedError
-        When it cannot be opened, or faults are given for a real bus.
+        When it cannot be opened, faults are given for a real bus, or the rig's signals cannot
+        make a session of the unit.
     """
     kind = kind_of(bus.name)
     if bus.faults and not kind.simulated:
         raise RefusedError("--fault", f"given with --bus {bus.name}", expected="--bus virtual")
-    return kind.open(Wanted(bus.name, setup.rig.fd, lambda: simulated(setup, bus)))
+    source = kind.open(Wanted(bus.name, setup.rig.fd, lambda: simulated(setup, bus)))
+    try:
+        setup.refuse_unfit()
+    except RefusedError:
+        source.close()
+        raise
+    return source
 
 
 def simulated(setup: Setup, bus: BusChoice) -> Any:

@@ -56,7 +56,8 @@ def findings(setup: Setup, frames: Frames, where: str, notes: list[str]) -> list
     if setup.rig.serial is not None or setup.rig.rate is not None:
         found.append(_identity(setup, frames, where, samples))
     if len(samples.number) < plan.rate_hz:
-        text = f"{len(frames)} frames, {len(samples.number)} samples: wrong description or rig"
+        counts = f"{len(frames)} frames, {len(samples.number)} samples"
+        text = f"{counts}: wrong rig description, or another rig"
         return [*found, Finding(False, text)]
     return found + _samples(setup, samples)
 

@@ -21,6 +21,8 @@ from triaxcal.rig.session import Session
 from triaxcal.unit.description import UnitDescription, read_unit
 from triaxcal.unit.folder import list_units
 
+_SENT = {"crc32": "CRC-32 ", "number": ""}
+
 
 @dataclass(frozen=True)
 class Setup:
@@ -122,7 +124,7 @@ class Engine:
                 other = _unit_of_serial(self.setup.folder, kind, serial)
                 raise RefusedError(
                     f"{self.where}, {rig.serial.message}",
-                    f"serial number {other} ({sent_words(kind, serial)})",
+                    f"serial number {other} ({_SENT[kind]}{sent_words(kind, serial)})",
                     expected=f'"{unit.serial}" ({sent_words(kind, mine)}) of {unit.name}',
                     remedy="mount that unit, or name the one that is mounted",
                 )

@@ -51,4 +51,4 @@ def serial_of(kind: str, unit: UnitDescription) -> int:
 
 def sent_words(kind: str, number: int) -> str:
     """A number that a rig sends, as messages name it."""
-    return f"CRC-32 0x{number:08X}" if kind == "crc32" else str(number)
+    return f"0x{number:08X}" if kind == "crc32" else str(number)

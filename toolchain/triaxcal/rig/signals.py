@@ -127,7 +127,8 @@ class Signal:
             return number.astype(np.float64)
         whole = isinstance(self.scale, int) and isinstance(self.offset, int)
         if self.is_float or not whole:
-            return number.astype(np.float64) * self.scale + self.offset
+            with np.errstate(over="ignore", invalid="ignore"):  # what is no number is found later
+                return number.astype(np.float64) * self.scale + self.offset
         scale, offset = int(self.scale), int(self.offset)
         if self.length + scale.bit_length() < _EXACT_BITS and offset.bit_length() < _EXACT_BITS:
             return (number.astype(np.int64) * scale + offset).astype(np.float64)
