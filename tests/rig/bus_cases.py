@@ -29,7 +29,10 @@ def messages(draw, number=1):
         except cantools.database.Error:
             continue  # no room for it
         kept.append(signal)
-        if selector is None and not signal.is_float and signal.length <= 8 and draw(st.booleans()):
+        small = not signal.is_float and signal.length <= 8
+        if selector is None and small and draw(st.booleans()):
+            # cantools compares the value of a multiplexer, other tools its raw number.
+            signal.conversion = BaseConversion.factory()
             signal.is_multiplexer = True
             selector = signal.name
     return Message(

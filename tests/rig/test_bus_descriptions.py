@@ -45,7 +45,7 @@ def agree(folder, message, seed, count):
         values, numbers = signal.value(data), signal.number(data).tolist()
         assert [bits(v) for v in signal.value(wide)] == [bits(v) for v in values]
         for row in range(count):
-            if expected[row] is None:
+            if expected[row] is None or sent[row] is None:
                 continue
             assert there[row] == (name in expected[row]), (signal, data[row].tobytes().hex())
             if there[row]:

@@ -243,7 +243,7 @@ def test_a_lost_header_is_believed_only_when_the_log_proves_it(unfinished, tmp_p
     other_plan = short_setup(tmp_path, temps="[20]", rate=100)
     stillness = replace(other_plan.plan.stillness, average_s=30)
     other = Setup(
-        setup.folder, setup.unit, replace(other_plan.plan, stillness=stillness), setup.dbc
+        setup.folder, setup.unit, replace(other_plan.plan, stillness=stillness), setup.rig
     )
     target = copied(folder, tmp_path / "001", bytes(text))
     with pytest.raises(RefusedError, match=r"its first record is damaged.*`triaxcal rig run`"):

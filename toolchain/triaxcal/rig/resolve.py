@@ -88,6 +88,13 @@ class _Names:
                 f"{layout.size}",
                 remedy=f"correct {self.files}",
             )
+        for condition in layout.multiplexed.get(signal.name, ()):
+            if not condition.selector.is_plain:
+                raise RefusedError(
+                    place,
+                    f"its multiplexer {condition.selector.name} has a factor or an offset",
+                    expected="a plain number: tools differ in what they compare",
+                )
         if layout.name in self._twice:
             raise RefusedError(
                 place, f"{layout.name} stands in {self.files} twice", expected="one message"

@@ -115,7 +115,8 @@ class Signal:
         if not self.is_float:
             return raw
         bits = raw.astype(_UNSIGNED[self.length])
-        return bits.view(_FLOATS[self.length]).astype(np.float64)
+        with np.errstate(invalid="ignore"):  # a signalling NaN
+            return bits.view(_FLOATS[self.length]).astype(np.float64)
 
     def value(self, data: ByteArray) -> FloatArray:
         """Physical values of payloads (n, bytes), float64, shape (n,); nearest to the exact ones.

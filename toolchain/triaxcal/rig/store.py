@@ -58,8 +58,7 @@ def write_records(
                 f"count: batch means of a dwell; sd: of one batch mean; see {SIDECAR_FILE}",
             ),
         ),
-        sidecar: json.dumps(_sidecar(session, dwells, rig, log), indent=2, sort_keys=True)
-        + "\n",
+        sidecar: json.dumps(_sidecar(session, dwells, rig, log), indent=2, sort_keys=True) + "\n",
     }
     files = {path: text.encode() for path, text in contents.items()}
     try:
