@@ -13,6 +13,7 @@ from triaxcal.rig.frames import ByteArray
 _WORD = 8
 """Bytes of a classic frame."""
 _EXACT_BITS = 53
+"""Of a float64."""
 _FLOATS = {16: "<f2", 32: "<f4", 64: "<f8"}
 _UNSIGNED = {16: "<u2", 32: "<u4", 64: "<u8"}
 
@@ -126,14 +127,13 @@ class Signal:
         number = self.number(data)
         if self.is_plain:
             return number.astype(np.float64)
-        whole = isinstance(self.scale, int) and isinstance(self.offset, int)
-        if self.is_float or not whole:
-            with np.errstate(over="ignore", invalid="ignore"):  # what is no number is found later
-                return number.astype(np.float64) * self.scale + self.offset
-        scale, offset = int(self.scale), int(self.offset)
-        if self.length + scale.bit_length() < _EXACT_BITS and offset.bit_length() < _EXACT_BITS:
-            return (number.astype(np.int64) * scale + offset).astype(np.float64)
-        return np.array([float(n * scale + offset) for n in number.tolist()], np.float64)
+        scale, offset = self.scale, self.offset
+        whole = isinstance(scale, int) and not self.is_float
+        if whole and self.length + int(scale).bit_length() > _EXACT_BITS:
+            # Python's integers are exact where products of floats are not.
+            return np.array([float(n * scale + offset) for n in number.tolist()], np.float64)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is no number is found later
+            return number.astype(np.float64) * scale + offset
 
     def put(self, data: ByteArray, raw: IntArray) -> None:
         """Write raw integers (n,) into payloads (n, bytes) whose bits there are zero."""
