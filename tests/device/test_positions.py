@@ -224,7 +224,7 @@ class Placed:
         temp = np.concatenate([t for t, _ in parts])
         raw = np.concatenate([r for _, r in parts])
         accel, status = python_routine(self.bench.delivery.plan)(temp, raw)
-        return Samples(temp, raw, accel, status)
+        return Samples(temp, np.zeros_like(temp), raw, accel, status)
 
     def walk(self, *names: str) -> list[str]:
         unit, plan = self.bench.delivery.unit, self.bench.delivery.plan
@@ -268,7 +268,7 @@ def test_a_bit_that_differs_and_a_status(bench: Bench, monkeypatch: pytest.Monke
     assert text.startswith("a bus, CP1: 1 of 64 samples differ, by 3 LSB at most; sample 7, ")
     cold = np.full(64, bench.delivery.plan.temp_min_code - 1, np.int32)
     answer = python_routine(bench.delivery.plan)(cold, good.raw)
-    flagged = Samples(cold, good.raw, *answer)
+    flagged = Samples(cold, good.rate, good.raw, *answer)
     monkeypatch.setattr(walked, "take_samples", lambda _link, _count: flagged)
     assert "64 of 64 samples have a status other than 0" in refused(lambda: placed.walk("CP1"))
 

@@ -215,11 +215,16 @@ def verify(  # noqa: PLR0917
 
     read_unit(unit)  # refuses an IMU
     delivery = deliver(unit)
-    if delivery.plan.rate is not None:
-        raise RefusedError(str(unit), "a term in dT/dt", expected="none: not verified on a device")
     if positions is None:
         _verify_samples(opener, delivery, samples, gravity_m_per_s2)
         return
+    if delivery.plan.rate is not None:
+        raise RefusedError(
+            f"{unit}, --positions",
+            "a term in dT/dt",
+            expected="a calibration without it: positions are judged at a steady temperature",
+            remedy="verify without --positions: every sample is compared, with its rate",
+        )
     from triaxcal.api.device import require_delivered, verify_at_positions  # noqa: PLC0415
     from triaxcal.report.words.device import device_words  # noqa: PLC0415
 
@@ -256,7 +261,8 @@ def _verify_samples(
         node = require_in_use(link, image, unit.name)
         taken = take_samples(link, samples)
         name = link.name
-    found = compare(taken, python_routine(plan), plan.shape.output_q, gravity_g)
+    routine = python_routine(plan, taken.rate)
+    found = compare(taken, routine, plan.shape.output_q, gravity_g)
     found.refuse_difference(name)
     say(
         f"{name}: verified on device {node.serial}\n"

@@ -136,8 +136,11 @@ def _within_int32(values: set[int]) -> list[int]:
     return sorted(v for v in values if INT32_MIN <= v <= INT32_MAX)
 
 
-def python_routine(plan: Plan) -> Routine:
-    """The integer model as a routine: set_temperature once a code, then gathered."""
+def python_routine(plan: Plan, rates: Int32Array | None = None) -> Routine:
+    """The integer model as a routine: set_temperature once a code, then gathered.
+
+    `rates` (n,) are the dT/dt of the vectors that it is called with; None is that of the campaign.
+    """
     states, _ = set_temperature(plan, plan.temp_codes)
     table = _columns(np.concatenate([states.gain, states.offset[:, :, None]], axis=2))
 
@@ -152,7 +155,8 @@ def python_routine(plan: Plan) -> Routine:
             rows = _gather(table, index[:1] if (index == index[0]).all() else index)
             offset, flags = rows[:, :, 3], np.zeros(len(codes), np.int64)
             if plan.rate is not None:
-                offset, flags = add_rate(plan.rate, offset, rates_of(plan.rate, codes))
+                own = rates_of(plan.rate, codes) if rates is None else rates[block].astype(np.int64)
+                offset, flags = add_rate(plan.rate, offset, own)
             state = State(rows[:, :, :3], offset)
             # Axis by axis in memory, as the integer model works.
             axes = np.ascontiguousarray(raw[block].T, dtype=np.int64).T

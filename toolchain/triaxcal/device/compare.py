@@ -26,8 +26,8 @@ class Samples:
 
     Attributes
     ----------
-    temp : array of int32, shape (n,)
-        Temperature codes.
+    temp, rate : array of int32, shape (n,)
+        Codes of the temperature, and of its rate: 0 without a term in dT/dt.
     raw, accel : array of int32, shape (n, 3)
         Raw codes, and what the node made of them, in 2^-Q g.
     status : array of uint32, shape (n,)
@@ -35,6 +35,7 @@ class Samples:
     """
 
     temp: Int32Array
+    rate: Int32Array
     raw: Int32Array
     accel: Int32Array
     status: npt.NDArray[np.uint32]
@@ -110,10 +111,15 @@ def take_samples(link: Link, count: int) -> Samples:
     table = np.array(rows, np.int64)
     return Samples(
         table[:, 1].astype(np.int32),
+        table[:, 2].astype(np.int32),
         table[:, 3:6].astype(np.int32),
         table[:, 6:9].astype(np.int32),
         table[:, 9].astype(np.uint32),
     )
+
+
+def _rate(samples: Samples, i: int) -> str:
+    return f"rate_code {samples.rate[i]}, " if samples.rate.any() else ""
 
 
 def compare(samples: Samples, routine: Routine, output_q: int, gravity_g: float = 1.0) -> Agreement:
@@ -125,7 +131,8 @@ def compare(samples: Samples, routine: Routine, output_q: int, gravity_g: float 
     if differs.any():
         i = int(differs.argmax())
         first = (
-            f"sample {i}, temp_code {samples.temp[i]}, raw_code {samples.raw[i].tolist()}: "
+            f"sample {i}, temp_code {samples.temp[i]}, {_rate(samples, i)}raw_code "
+            f"{samples.raw[i].tolist()}: "
             f"{samples.accel[i].tolist()} status {samples.status[i]}, "
             f"expected {accel[i].tolist()} status {status[i]}"
         )
