@@ -1,12 +1,16 @@
-"""The command that installs an optional part into the Python that runs."""
+"""Optional packages: which are missing, and the command that installs them."""
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import shlex
 import shutil
 import sys
+from collections.abc import Iterable
 from pathlib import Path
+
+from triaxcal.base.errors import RefusedError
 
 
 def install_command(extra: str) -> str:
@@ -18,3 +22,27 @@ def install_command(extra: str) -> str:
         python = os.path.relpath(python)
         python = python if os.sep in python else f".{os.sep}{python}"
     return f"{shlex.quote(python)} -m pip install 'triaxcal[{extra}]'"
+
+
+def refuse_missing_packages(place: str, packages: Iterable[str], extra: str) -> None:
+    """Refuse where packages of an extra are not installed.
+
+    Parameters
+    ----------
+    place : str
+        What needs them, for the message.
+    packages : iterable of str
+        Names as they are imported.
+
+    Raises
+    ------
+    RefusedError
+        Naming them, and the command that installs them.
+    """
+    missing = [name for name in packages if importlib.util.find_spec(name) is None]
+    if missing:
+        raise RefusedError(
+            place,
+            "missing packages: " + ", ".join(missing),
+            remedy="install them: " + install_command(extra),
+        )

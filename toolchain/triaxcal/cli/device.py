@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 from collections.abc import Callable, Iterator
 from functools import wraps
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from triaxcal.base.errors import RefusedError, refused_by_system
-from triaxcal.base.extras import install_command
+from triaxcal.base.extras import refuse_missing_packages
 from triaxcal.cli.options import DELIVERED, HELP, HexNumber, UnitFolder, example, say
 
 if TYPE_CHECKING:
@@ -65,13 +64,7 @@ def _node_options(command: Callable[..., None]) -> Callable[..., None]:
 
 @contextlib.contextmanager
 def _connected(bus: str, request_id: int, response_id: int) -> Iterator[Link]:
-    missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
-    if missing:
-        raise RefusedError(
-            "triaxcal device",
-            "missing packages: " + ", ".join(missing),
-            remedy="install them: " + install_command("device"),
-        )
+    refuse_missing_packages("triaxcal device", _NEEDED, "device")
     from triaxcal.device.link import Link  # noqa: PLC0415
     from triaxcal.rig.openbus import open_bus  # noqa: PLC0415
 

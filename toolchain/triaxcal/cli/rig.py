@@ -19,7 +19,7 @@ from triaxcal.cli.rig_options import (
     BusChoice,
     bus_options,
     open_source,
-    refuse_missing_packages,
+    refuse_missing_bench,
     session_options,
     simulated,
 )
@@ -251,7 +251,7 @@ def export(log: Path, target: Path) -> None:
     LOG is of any format that `rig replay` reads. TARGET ends in .asc, .blf, .csv, .log, .mf4 or
     .parquet.
     """
-    refuse_missing_packages()
+    refuse_missing_bench()
     from triaxcal.rig.export import export_log  # noqa: PLC0415
 
     shows = sys.stderr.isatty()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.extras import install_command
+from triaxcal.base.extras import refuse_missing_packages
 from triaxcal.cli.options import UnitFolder
 from triaxcal.rig.source import SOURCES, Wanted, kind_of
 
@@ -24,15 +23,9 @@ _DEFAULT_PLAN = "five-temperatures.toml"
 _NEEDED = ("can", "cantools", "rich")
 
 
-def refuse_missing_packages() -> None:
+def refuse_missing_bench() -> None:
     """Refuse where the bench's packages are missing; `--help` works without them."""
-    missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
-    if missing:
-        raise RefusedError(
-            "triaxcal rig",
-            "missing packages: " + ", ".join(missing),
-            remedy="install them: " + install_command("rig"),
-        )
+    refuse_missing_packages("triaxcal rig", _NEEDED, "rig")
 
 
 def _optioned(command: Callable[..., None], *options: Callable[..., Any]) -> Callable[..., None]:
@@ -46,7 +39,7 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def with_setup(unit: Path, plan: Path | None, dbc: Path | None, **others: Any) -> None:
-        refuse_missing_packages()
+        refuse_missing_bench()
         command(setup=_setup(unit, plan, dbc), **others)
 
     return _optioned(

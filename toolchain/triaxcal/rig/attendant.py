@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.extras import refuse_missing_packages
 from triaxcal.rig.chamberhand import ChamberHand
 from triaxcal.rig.equipment import Connection
 from triaxcal.rig.events import Event
 from triaxcal.rig.forecast import Forecast, duration
-from triaxcal.rig.instrument import Instrument, refuse_missing
+from triaxcal.rig.instrument import Instrument
 from triaxcal.rig.link import Link
 from triaxcal.rig.phases import Warming
 from triaxcal.rig.plan import SessionPlan
@@ -144,7 +145,8 @@ def attendant(plan: SessionPlan, clock: Callable[[], float], at_once: bool = Fal
 
 
 def _opened(by: Connection, timeout_s: float) -> tuple[Open, bool]:
-    refuse_missing(by.driver)
+    name = f'driver "{by.driver.name}"'
+    refuse_missing_packages(name, by.driver.packages, "instruments")
     return lambda: by.driver.open(by.settings, timeout_s), by.readable
 
 

@@ -16,7 +16,7 @@ one wrong character is left out; both are counted.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -77,6 +77,10 @@ class Parsed:
     bad_lines: int
     untimed: int = 0
     first_bad: str = ""
+
+
+Parse = Callable[[bytes], Parsed]
+"""Frames of the whole lines of a text."""
 
 
 def format_frames(frames: Frames, channel: str) -> bytes:
@@ -291,13 +295,17 @@ def _payload(text: ByteArray, fd: bool) -> tuple[ByteArray, IntArray]:
     return data, ok
 
 
-def read_log(path: Path, start: int = 0, end: int | None = None) -> Generator[Parsed, None, None]:
+def read_log(
+    path: Path, start: int = 0, end: int | None = None, parse: Parse = parse
+) -> Generator[Parsed, None, None]:
     """Frames of a log, a piece of whole lines at a time; it may be compressed by gzip.
 
     Parameters
     ----------
     start, end : int
         Bytes of the file to read; `end` None is its end.
+    parse : callable
+        Frames of whole lines; those of candump text by default.
 
     Raises
     ------

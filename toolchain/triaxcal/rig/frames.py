@@ -66,6 +66,8 @@ class Frames:
         The marks above; zeros where nothing is said.
     channel : array of bytes, shape (n,)
         Name of the channel, ASCII; empty where it is not known.
+    texts : tuple of n bytes, or None
+        Lines that they were made of, where the source speaks in lines.
     """
 
     t_ns: IntArray
@@ -75,6 +77,7 @@ class Frames:
     data: ByteArray
     marks: ByteArray = field(default_factory=lambda: np.zeros(0, np.uint8))
     channel: NameArray = field(default_factory=lambda: np.zeros(0, "S1"))
+    texts: tuple[bytes, ...] | None = None
 
     def __post_init__(self) -> None:
         """Marks and channels of frames that were made without them."""
@@ -88,7 +91,10 @@ class Frames:
 
     def take(self, index: slice | BoolArray | IntArray) -> Frames:
         """Some of the frames."""
-        return Frames(*(column[index] for column in self.columns))
+        texts = self.texts
+        if texts is not None:
+            texts = tuple(texts[i] for i in np.arange(len(self))[index].tolist())
+        return Frames(*(column[index] for column in self.columns), texts)
 
     @property
     def columns(self) -> tuple[Any, ...]:
@@ -133,7 +139,10 @@ def concatenate(parts: Sequence[Frames]) -> Frames:
         return empty()
     width = max(part.data.shape[1] for part in parts)
     wide = [replace(p, data=widened(p.data, width)) for p in parts]
-    return Frames(*map(np.concatenate, zip(*(p.columns for p in wide), strict=True)))
+    texts = None
+    if any(part.texts is not None for part in parts):
+        texts = tuple(text for part in parts for text in part.texts or ())
+    return Frames(*map(np.concatenate, zip(*(p.columns for p in wide), strict=True)), texts)
 
 
 def widened(data: ByteArray, width: int) -> ByteArray:

@@ -6,14 +6,12 @@ temperatures and positions: the same driver serves a chamber and a positioner.
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.extras import install_command
 from triaxcal.base.keys import Key, keys_of
 from triaxcal.base.registry import Registry
 from triaxcal.base.tomltable import shown
@@ -98,23 +96,6 @@ class Driver:
 
 
 DRIVERS = Registry("instrument driver", "triaxcal.rig.drivers", Driver, ("settings", "open"))
-
-
-def refuse_missing(driver: Driver) -> None:
-    """Refuse a driver whose packages are not installed.
-
-    Raises
-    ------
-    RefusedError
-        Naming them, and the command that installs them.
-    """
-    missing = [name for name in driver.packages if importlib.util.find_spec(name) is None]
-    if missing:
-        raise RefusedError(
-            f'driver "{driver.name}"',
-            "missing packages: " + ", ".join(missing),
-            remedy="install them: " + install_command("instruments"),
-        )
 
 
 def filled(text: str, order: Order) -> str:

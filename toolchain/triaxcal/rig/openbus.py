@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +9,9 @@ import can
 
 from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.base.tomltable import did_you_mean, shown
+from triaxcal.rig.busname import channel_and_options
 
 _CONFIG = "config"
-_OPTION = re.compile(r",(?=[A-Za-z_]\w*=)")
 _FORM = "interface:channel,option=value,... or config:section"
 
 
@@ -39,20 +38,13 @@ class BusName:
 def bus_name(name: str) -> BusName:
     """Interface, channel and options of a bus.
 
-    A comma belongs to the channel where no option follows it, as in "vector:0,1,bitrate=500000".
-
     Raises
     ------
     UsageError
         When python-can has no such interface, or an option is given twice.
     """
     interface, _, rest = name.partition(":")
-    channel, *given = _OPTION.split(rest)
-    if "=" in channel.partition(",")[0] and _OPTION.match("," + channel):
-        channel, given = "", [channel, *given]
-    options = dict(part.split("=", 1) for part in given)
-    if len(options) != len(given):
-        raise UsageError("--bus", f"found {shown(name)}, with an option twice", expected=_FORM)
+    channel, options = channel_and_options(rest, _FORM)
     if interface == _CONFIG:
         return BusName("", "", channel, options)
     if interface not in can.VALID_INTERFACES:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from triaxcal.base.durable import BINARY, sync_data, sync_folder, write_all
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.candump import format_frames
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.journal import disk_refusal
+from triaxcal.rig.linelog import log_text
 
 LogState = dict[str, int | str]
 """Lines, bytes and SHA-256 of a log."""
@@ -22,7 +22,7 @@ _HASH_BYTES = 8 << 20
 
 
 class RawLog:
-    """A candump log open for appending.
+    """A log open for appending: candump text, or the lines of a source that speaks in lines.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class RawLog:
         """
         if not len(frames):
             return
-        text = format_frames(frames, self._channel)
+        text = log_text(frames, self._channel)
         self._waiting.append(text)
         self._waiting_bytes += len(text)
         self.lines += len(frames)

@@ -12,6 +12,7 @@ from triaxcal.base.registry import Registry
 if TYPE_CHECKING:
     from triaxcal.rig.busload import BitRates
     from triaxcal.rig.frames import Frames
+    from triaxcal.rig.lines import LineFormat
     from triaxcal.rig.simulator import SimulatedRig
 
 WAIT_S = 0.05
@@ -85,11 +86,14 @@ class Wanted:
         The plan's frames are CAN FD's.
     rig : callable
         Makes the simulated rig.
+    lines : LineFormat or None
+        Format of lines, where the rig description has one in place of a bus.
     """
 
     bus: str
     fd: bool
     rig: Callable[[], SimulatedRig]
+    lines: LineFormat | None = None
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,8 @@ class SourceKind:
         Kinds of a lower one are asked first.
     simulated : bool
         Faults can be ordered.
+    speaks_lines : bool
+        It gives lines, not frames of a bus.
     """
 
     name: str
@@ -117,6 +123,7 @@ class SourceKind:
     open: Callable[[Wanted], Source]
     rank: int = 100
     simulated: bool = False
+    speaks_lines: bool = False
 
 
 SOURCES = Registry("signal source", "triaxcal.rig.sources", SourceKind, ("takes", "open"))

@@ -46,6 +46,19 @@ class Visa:
         except Exception as error:
             raise self._refusal(text, error) from error
 
+    def read(self) -> str:
+        """Next line that the instrument sends by itself.
+
+        Raises
+        ------
+        RefusedError
+            When none comes in time.
+        """
+        try:
+            return str(self._resource.read())
+        except Exception as error:
+            raise self._refusal("read", error) from error
+
     def query(self, text: str) -> str:
         """Answer to a text.
 
