@@ -6,6 +6,7 @@ import socket
 import sys
 import threading
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -15,7 +16,9 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.cli.init import init
 from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.reference import reference_markdown
+from triaxcal.rig.check import Finding
 from triaxcal.rig.instrument import DRIVERS, Driver, Order, numbers_in
+from triaxcal.rig.instrumentcheck import instrument_findings
 
 OWN = "import sys, pathlib; p = pathlib.Path(sys.argv[1]); "
 
@@ -272,6 +275,11 @@ def test_can_signals_that_are_not_there(tmp_path, change, said):
         ("[chamber]\nrange_degc = [30, 40]", r"safe_degc: found 23 degC; expected a temperature"),
         ("[positioner]\nangles = {TP7 = [0]}", r"angles: found a table; expected a table of pos"),
         ("[positioner]\nangles = {TP1 = [0], TP2 = [0, 1]}", r"angles: found a table; expected"),
+        (
+            ('[positioner]\nangles = {TP1 = [0], TP2 = [0], TP4 = [0], TP5 = [0], TP6 = [0]}\n'
+            'home = "CP1"'),
+            r"\[positioner\] angles: missing; expected angles of TP3, CP1",
+        ),
         ("[unattended]\nattempts = 0", r"\[unattended\] attempts: found 0; expected a whole num"),
     ],
 )  # fmt: skip
@@ -289,7 +297,8 @@ def test_an_address_may_be_corrected_within_a_session(tmp_path):
 
 
 def test_a_positioner_is_told_angles_or_a_number(tmp_path):
-    angles = "[positioner]\nangles = {TP1 = [0, 90], CP2 = [25, -90]}\n"
+    others = ", ".join(f"TP{k} = [0, {30 * k}]" for k in range(2, 7))
+    angles = f"[positioner]\nangles = {{TP1 = [0, 90], CP2 = [25, -90], {others}}}\n"
     positioner = plan_with(tmp_path, angles).equipment.positioner
     assert positioner.order("CP2").numbers == (25.0, -90.0)
     assert positioner.order("CP2").words == {
@@ -302,6 +311,41 @@ def test_a_positioner_is_told_angles_or_a_number(tmp_path):
     assert plain.order("TP4").numbers == (4.0,)
     assert plain.is_at("TP4", (4.0,))
     assert not plain.is_at("TP4", (364.0,))
+
+
+@pytest.mark.parametrize(
+    ("asks", "good", "said"),
+    [
+        ("TEMP?", True, "chamber answers 21.50 degC"),
+        ("KEL?", False, "chamber answers 294.65 degC, outside range_degc -40 to 85: another unit?"),
+        ("STATE?", False, "chamber: STATE?: answered 'RUNNING'; expected a number"),
+    ],
+)
+def test_the_check_asks_the_instruments(tmp_path, asks, good, said):
+    pytest.importorskip("pyvisa_sim")
+    copy = tmp_path / "instruments.yaml"  # another file is another simulation, as it is at first
+    copy.write_text(Path(SIMULATED.removesuffix("@sim")).read_text())
+    tables = SCPI.format(library=f"{copy}@sim", resource="GPIB::8::INSTR").replace("TEMP?", asks)
+    assert instrument_findings(plan_with(tmp_path, tables).equipment) == [Finding(good, said)]
+
+
+def test_the_check_of_what_cannot_be_asked_and_of_a_table(tmp_path):
+    prints = [sys.executable, "-c", "print(30.0)"]
+    tables = f"""
+[chamber]
+driver = "command"
+command = ["none"]
+[positioner]
+driver = "command"
+command = ["none"]
+command_read = {prints}
+angles = {{{", ".join(f"TP{k} = [{k}, 0]" for k in range(1, 7))}}}
+"""
+    assert instrument_findings(plan_with(tmp_path, tables).equipment) == [
+        Finding(True, "chamber cannot be asked: command_read is not given"),
+        Finding(False, "positioner answers 30, not 2"),
+    ]
+    assert instrument_findings(plan_with(tmp_path, "").equipment) == []
 
 
 @dataclass(frozen=True)

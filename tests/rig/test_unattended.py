@@ -10,11 +10,12 @@ from instrument_cases import SIMULATED, setup_with, walk
 from rig_cases import rig_of, short_setup
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.attendant import attendant
+from triaxcal.rig.attendant import Attendant, attendant
 from triaxcal.rig.forecast import duration, settle_s
 from triaxcal.rig.link import Link
 from triaxcal.rig.orientation import UP
-from triaxcal.rig.simhands import SimulatedTable, simulated_attendant
+from triaxcal.rig.runner import Robot
+from triaxcal.rig.simhands import SimulatedChamber, SimulatedTable, simulated_attendant
 
 LEARNED = 61
 """Seconds after which the noise of the short plan is known."""
@@ -212,6 +213,34 @@ def test_what_a_person_must_do_is_refused_at_the_start(tmp_path):
     with pytest.raises(RefusedError, match=r'\[chamber\] driver: found "operator"'):
         attendant(setup_with(tmp_path, tables).plan, lambda: 0.0)
     attendant(setup_with(tmp_path, tables, temps="[20]").plan, lambda: 0.0)
+
+
+def test_beside_a_person_the_chamber_alone_is_set(tmp_path):
+    """A person turns the unit; the bench sets the chamber and does not stop by its own limits."""
+    setup = setup_with(tmp_path, LIMITS.replace("= 300", "= 10") + "attempts = 1\n")
+    rig = rig_of(setup, "slip@84:150", "linkdown@130:1:40")
+    chamber = SimulatedChamber(rig)
+    hands = Attendant(
+        setup.plan, (lambda: chamber, True), None, lambda: float(rig.seconds), at_once=True,
+        alone=False,
+    )  # fmt: skip
+    person = Robot(rig)
+
+    class Both:
+        def act(self, session, events):
+            hands.act(session, events)
+            if not session.done:
+                person.act(session, events)
+                rig.target_degc = told[-1] if told else 20.0
+
+        notes = staticmethod(hands.notes)
+
+    told = []
+    chamber.write = lambda order: told.append(order.words["degc"])
+    _, events, _ = walk(setup, rig, Both())
+    assert sorted(accepted(events)) == ALL
+    assert told == [20.0, 25.0]
+    assert hands.make_safe() == ["chamber: set to the safe 23 degC"]
 
 
 @pytest.mark.long

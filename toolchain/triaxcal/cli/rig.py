@@ -182,8 +182,9 @@ def status(setup: Setup, sessions: Path | None) -> None:
 @bus_options
 @click.option("--seconds", type=click.FloatRange(1.0, 600.0), default=5.0, show_default=True)
 def check(setup: Setup, bus: BusChoice, seconds: float) -> None:
-    """Check bus, DBC, unit, rate, counters and noise."""
+    """Check bus, DBC, unit, rate, counters, noise, chamber and positioner."""
     from triaxcal.rig.check import collect, findings  # noqa: PLC0415
+    from triaxcal.rig.instrumentcheck import instrument_findings  # noqa: PLC0415
 
     source = open_source(setup, bus)
     try:
@@ -191,6 +192,7 @@ def check(setup: Setup, bus: BusChoice, seconds: float) -> None:
         found = findings(setup, frames, source.name, source.notes())
     finally:
         source.close()
+    found += instrument_findings(setup.plan.equipment)
     for finding in found:
         click.echo(f"{_SAID[finding.good]}  {finding.text}")
     wrong = sum(finding.good is False for finding in found)

@@ -21,16 +21,17 @@ from triaxcal.rig.source import Source
 def hands_of(setup: Setup, source: Source, unattended: bool) -> Iterator[Hands | None]:
     """Hands of a session; chamber and positioner are brought to safety however it ends."""
     rig = source.rig if isinstance(source, SimulatedSource) else None
-    if not unattended:
+    equipment = setup.plan.equipment
+    by_hand = equipment.chamber_by.by_hand, equipment.positioner_by.by_hand
+    if not unattended and (rig is not None or all(by_hand)):
         yield Robot(rig) if rig is not None else None
         return
-    by_plan = not setup.plan.equipment.positioner_by.by_hand
-    if rig is not None and not by_plan:
+    if rig is not None and all(by_hand):
         hands = simulated_attendant(setup.plan, rig)
     elif rig is not None:
         hands = attendant(setup.plan, lambda: float(rig.seconds), at_once=True)
     else:
-        hands = attendant(setup.plan, time.monotonic)
+        hands = attendant(setup.plan, time.monotonic, alone=unattended)
     try:
         yield hands
     finally:

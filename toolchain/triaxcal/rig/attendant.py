@@ -22,23 +22,29 @@ Open = Callable[[], Instrument]
 
 
 class Attendant:
-    """Walks a plan without a person.
+    """Sets the chamber and turns the unit, in place of a person or beside one.
 
     Parameters
     ----------
+    chamber, table : pair of callable and bool, or None
+        What opens the instrument, and whether it can be asked; None where a person does it.
     clock : callable
         Seconds from any moment on; those of the readings where the rig is simulated.
     at_once : bool
         Instruments are asked in the loop itself: where the time is simulated.
+    alone : bool
+        No person is there: the run is stopped when it tries or waits too long.
     """
 
     def __init__(
         self,
         plan: SessionPlan,
         chamber: tuple[Open, bool] | None,
-        table: tuple[Open, bool],
+        table: tuple[Open, bool] | None,
         clock: Callable[[], float],
+        *,
         at_once: bool = False,
+        alone: bool = True,
     ) -> None:
         equipment = plan.equipment
         limits = equipment.limits
@@ -46,6 +52,7 @@ class Attendant:
         self._clock = clock
         self._said: list[str] = []
         self._watch = Watch(plan)
+        self._alone = alone
         self.forecast = Forecast(plan, equipment.chamber.safe_degc)
 
         def link(name: str, open_: Open, timeout_s: float, again_s: float) -> Link:
@@ -63,8 +70,10 @@ class Attendant:
         if chamber is not None:
             line = link("chamber", chamber[0], own.timeout_s, own.poll_s)
             self._chamber = ChamberHand(own, line, chamber[1], self._said.append)
-        line = link("positioner", table[0], turns.timeout_s, turns.poll_s)
-        self._table = TableHand(turns, line, table[1], limits.attempts, self._said.append)
+        self._table = None
+        if table is not None:
+            line = link("positioner", table[0], turns.timeout_s, turns.poll_s)
+            self._table = TableHand(turns, line, table[1], limits.attempts, self._said.append)
 
     def act(self, session: Session, events: Sequence[Event]) -> None:
         """Do what the session wants.
@@ -79,8 +88,9 @@ class Attendant:
             self._said.append(f"left: about {duration(self.left_s(session))}")
         if session.done:
             return
-        reason = self._watch.look(now_s, session, events, self._table.arrived_s)
-        if reason:
+        arrived_s = self._table.arrived_s if self._table else None
+        reason = self._watch.look(now_s, session, events, arrived_s)
+        if reason and self._alone:
             raise RefusedError(
                 "unattended run", reason, remedy="what was accepted is kept: `triaxcal rig resume`"
             )
@@ -91,8 +101,8 @@ class Attendant:
             rests = any(event.kind == "equilibrium" for event in events)
             if rests and session.temp_degc is not None:
                 self._chamber.refuse_disagreement(session.temp_degc)
-        if not self._watch.silent(now_s):
-            wanted, away = self._positions(session)
+        if self._table is not None and not self._watch.silent(now_s):
+            wanted, away = self._positions(session, self._table.told)
             self._table.tend(now_s, wanted, away, session.seen)
 
     def left_s(self, session: Session) -> float:
@@ -110,12 +120,12 @@ class Attendant:
         hands = [hand for hand in (self._chamber, self._table) if hand is not None]
         return [hand.make_safe() for hand in hands]
 
-    def _positions(self, session: Session) -> tuple[str, str]:
+    def _positions(self, session: Session, told: str | None) -> tuple[str, str]:
         """Position to go to, and another one to come from."""
         wanted = session.wanted
-        if isinstance(session.phase, Warming) and self._table.told is not None:
+        if isinstance(session.phase, Warming) and told is not None:
             # A position taken up before the temperature has changed would be taken up again.
-            wanted = self._table.told
+            wanted = told
         assert wanted is not None
         others = [p for step in self._plan.steps for p in step.positions if p != wanted]
         if session.reseat is not None and session.reseat.position == wanted:
@@ -123,28 +133,39 @@ class Attendant:
         return wanted, others[0]
 
 
-def attendant(plan: SessionPlan, clock: Callable[[], float], at_once: bool = False) -> Attendant:
+def attendant(
+    plan: SessionPlan,
+    clock: Callable[[], float],
+    *,
+    at_once: bool = False,
+    alone: bool = True,
+) -> Attendant:
     """Attendant that speaks to the instruments of a plan.
 
     Raises
     ------
     RefusedError
-        When the plan leaves to a person what a person must not be needed for, or a package is
-        missing.
+        When the plan leaves to a person what must be done alone, or a package is missing.
     """
     equipment = plan.equipment
-    if equipment.positioner_by.by_hand:
+    chamber_by, table_by = equipment.chamber_by, equipment.positioner_by
+    if alone and table_by.by_hand:
         raise _by_hand(plan, "positioner")
-    if equipment.chamber_by.by_hand and len(plan.steps) > 1:
+    if alone and chamber_by.by_hand and len(plan.steps) > 1:
         raise _by_hand(plan, "chamber")
-    table = _opened(equipment.positioner_by, equipment.positioner.timeout_s)
-    chamber = None
-    if not equipment.chamber_by.by_hand:
-        chamber = _opened(equipment.chamber_by, equipment.chamber.timeout_s)
-    return Attendant(plan, chamber, table, clock, at_once)
+    return Attendant(
+        plan,
+        _opened(chamber_by, equipment.chamber.timeout_s),
+        _opened(table_by, equipment.positioner.timeout_s),
+        clock,
+        at_once=at_once,
+        alone=alone,
+    )
 
 
-def _opened(by: Connection, timeout_s: float) -> tuple[Open, bool]:
+def _opened(by: Connection, timeout_s: float) -> tuple[Open, bool] | None:
+    if by.by_hand:
+        return None
     name = f'driver "{by.driver.name}"'
     refuse_missing_packages(name, by.driver.packages, "instruments")
     return lambda: by.driver.open(by.settings, timeout_s), by.readable

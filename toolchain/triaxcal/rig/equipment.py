@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,7 @@ def _drivers() -> Kind[str]:
 
 @dataclass(frozen=True, kw_only=True)
 class Chamber:
-    """[chamber]: the chamber, for `rig run --unattended`.
+    """[chamber]: the chamber, where an instrument sets it.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ def _angles() -> Kind[Mapping[str, tuple[float, ...]]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Positioner:
-    """[positioner]: the table that turns the unit, for `rig run --unattended`.
+    """[positioner]: the table that turns the unit, where an instrument does.
 
     Attributes
     ----------
@@ -261,6 +261,21 @@ def read_equipment(tables: Mapping[str, Values]) -> Equipment:
         _connection(tables["chamber"], chamber.order(chamber.safe_degc)),
         _connection(tables["positioner"], positioner.order(first)),
     )
+
+
+def refuse_without_angles(equipment: Equipment, values: Values, positions: Iterable[str]) -> None:
+    """Refuse positions that a positioner with angles has none for.
+
+    Raises
+    ------
+    RefusedError
+        Naming them.
+    """
+    positioner = equipment.positioner
+    home = (positioner.home,) if positioner.home != "stay" else ()
+    missing = [p for p in dict.fromkeys((*positions, *home)) if p not in positioner.angles]
+    if positioner.angles and missing:
+        raise values.missing("angles", "angles of " + ", ".join(missing))
 
 
 def _connection(values: Values, example: Order) -> Connection:

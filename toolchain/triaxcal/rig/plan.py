@@ -16,7 +16,12 @@ from triaxcal.base.kinds import FLAG, line, number, rising, three, whole, word
 from triaxcal.base.tomltable import read_toml
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.thermal.shape import GROUP_GAP_DEGC, PLAUSIBLE_DEGC
-from triaxcal.rig.equipment import Equipment, equipment_tables, read_equipment
+from triaxcal.rig.equipment import (
+    Equipment,
+    equipment_tables,
+    read_equipment,
+    refuse_without_angles,
+)
 from triaxcal.rig.shippedrigs import find_description
 from triaxcal.unit.description import UnitDescription
 
@@ -246,6 +251,9 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
     equipment = read_equipment(tables)
     thermal = tables["thermal"].record(Thermal)
     _refuse_merged(tables["steps"], steps.temperatures_degc, thermal)
+    planned = _steps(tables["steps"], steps, unit, equipment)
+    every = (position for step in planned for position in step.positions)
+    refuse_without_angles(equipment, tables["positioner"], every)
     return SessionPlan(
         source=str(path),
         sha256=_hash_of(path),
@@ -253,7 +261,7 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
         rig=_rig_file(tables["rig"], rig, path.parent),
         volts_per_g=rig.volts_per_g,
         take_out_of_order=steps.take_out_of_order,
-        steps=_steps(tables["steps"], steps, unit, equipment),
+        steps=planned,
         stillness=stillness,
         thermal=thermal,
         equipment=equipment,
