@@ -14,7 +14,7 @@ from instrument_cases import SIMULATED
 
 from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.rig.frames import concatenate
-from triaxcal.rig.linelog import log_parser, log_text
+from triaxcal.rig.linelog import log_text, parsed
 from triaxcal.rig.lines import LineFormat, frames_of_lines
 from triaxcal.rig.source import Wanted, kind_of
 
@@ -57,12 +57,20 @@ def test_what_is_no_number_is_nan(field):
 
 
 @pytest.mark.parametrize(
-    ("field", "value"), [("17", 17), ("-3", -3), ("1.5", 2**31 - 1), ("99999999999", 2**31 - 1)]
-)
-def test_integers(field, value):
-    lines = LineFormat(columns=("n", "x", "y", "z"), integers=("n",))
+    ("key", "kind", "field", "value"),
+    [
+        ("integers", "<i4", "17", 17), ("integers", "<i4", " -3", -3),
+        ("integers", "<i4", "2147483648", None), ("integers", "<i4", "1.5", None),
+        ("counters", "<u4", "4294967295", 2**32 - 1), ("counters", "<u4", "-1", None),
+        ("counters", "<u4", "0x1F", None),
+    ],
+)  # fmt: skip
+def test_integers(key, kind, field, value):
+    """A line without its whole numbers is none."""
+    lines = LineFormat(columns=("n", "x", "y", "z"), **{key: ("n",)})
     frames = frames_of_lines(lines, [NS], [f"{field},1,2,3".encode()])
-    assert frames.data[0].view("<i4")[0] == value
+    found = frames.data[0].view(kind)[0] if frames.length[0] else None
+    assert found == value
 
 
 @given(st.lists(st.binary(max_size=40).filter(lambda t: b"\n" not in t), max_size=8))
@@ -70,7 +78,7 @@ def test_the_log_keeps_every_byte_of_a_line(texts):
     frames = frames_of_lines(XYZT, [NS + 1000 * i for i in range(len(texts))], texts)
     log = log_text(frames, "/dev/tty USB0")
     assert log.isascii()
-    found = log_parser(XYZT)(log + b"(1700000000.1234")
+    found = parsed(XYZT, log + b"(1700000000.1234")
     assert found.frames.texts == tuple(texts)
     assert found.frames.t_ns.tolist() == frames.t_ns.tolist()
     np.testing.assert_array_equal(found.frames.data, frames.data)
@@ -79,8 +87,9 @@ def test_the_log_keeps_every_byte_of_a_line(texts):
 
 def test_a_log_with_lines_of_another_form():
     text = b"(1700000000.123456) tty0 1,2,3,4\nnothing\n(17.1) tty0 1\n"
-    found = log_parser(XYZT)(text)
+    found = parsed(XYZT, text)
     assert (len(found.frames), found.lines, found.bad_lines) == (1, 3, 2)
+    assert "nothing" in found.first_bad
     assert found.frames.t_ns.tolist() == [NS]
 
 

@@ -17,7 +17,7 @@ from triaxcal.rig.source import SOURCES, Wanted, kind_of
 
 if TYPE_CHECKING:
     from triaxcal.rig.engine import Setup
-    from triaxcal.rig.source import Source
+    from triaxcal.rig.source import Source, SourceKind
 
 _DEFAULT_PLAN = "five-temperatures.toml"
 _NEEDED = ("can", "cantools", "rich")
@@ -127,13 +127,27 @@ def open_source(setup: Setup, bus: BusChoice) -> Source:
     kind = kind_of(bus.name)
     if bus.faults and not kind.simulated:
         raise RefusedError("--fault", f"given with --bus {bus.name}", expected="--bus virtual")
-    source = kind.open(Wanted(bus.name, setup.rig.fd, lambda: simulated(setup, bus)))
+    _refuse_other_kind(setup, kind)
+    rig = setup.rig
+    source = kind.open(Wanted(bus.name, rig.fd, lambda: simulated(setup, bus), rig.lines))
     try:
         setup.refuse_unfit()
     except RefusedError:
         source.close()
         raise
     return source
+
+
+def _refuse_other_kind(setup: Setup, kind: SourceKind) -> None:
+    """Refuse frames for a rig that sends lines, and the other way round."""
+    lines = setup.rig.lines
+    if not kind.serves(lines):
+        raise RefusedError(
+            f"--bus {kind.label}",
+            f"gives {kind.speaks}",
+            expected=f"what {setup.rig.name} describes: "
+            + ", ".join(k.label for k in SOURCES if k.serves(lines)),
+        )
 
 
 def simulated(setup: Setup, bus: BusChoice) -> Any:

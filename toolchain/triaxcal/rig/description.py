@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from triaxcal.rig.layout import Condition, FrameLayout
+from triaxcal.rig.lines import LineFormat
 from triaxcal.rig.protection import Guard, Protection
 from triaxcal.rig.recorded import Recorded, SignalUnit
 from triaxcal.rig.signals import Signal
@@ -95,6 +96,8 @@ class RigDescription:
         Message whose arrival makes a sample.
     warnings : tuple of str
         What breaks the letter of the bus description's format.
+    lines : LineFormat or None
+        Format of the lines that it sends in place of frames.
     """
 
     name: str
@@ -112,6 +115,7 @@ class RigDescription:
     age_s: float = 0.0
     sample_at: str = ""
     warnings: tuple[str, ...] = field(default=())
+    lines: LineFormat | None = None
 
     @property
     def bus_file(self) -> Path:

@@ -91,10 +91,11 @@ class Frames:
 
     def take(self, index: slice | BoolArray | IntArray) -> Frames:
         """Some of the frames."""
-        texts = self.texts
-        if texts is not None:
-            texts = tuple(texts[i] for i in np.arange(len(self))[index].tolist())
-        return Frames(*(column[index] for column in self.columns), texts)
+        some = Frames(*(column[index] for column in self.columns))
+        if self.texts is None:
+            return some
+        places = np.arange(len(self))[index].tolist()
+        return replace(some, texts=tuple(self.texts[i] for i in places))
 
     @property
     def columns(self) -> tuple[Any, ...]:
@@ -139,10 +140,10 @@ def concatenate(parts: Sequence[Frames]) -> Frames:
         return empty()
     width = max(part.data.shape[1] for part in parts)
     wide = [replace(p, data=widened(p.data, width)) for p in parts]
-    texts = None
-    if any(part.texts is not None for part in parts):
-        texts = tuple(text for part in parts for text in part.texts or ())
-    return Frames(*map(np.concatenate, zip(*(p.columns for p in wide), strict=True)), texts)
+    all_of = Frames(*map(np.concatenate, zip(*(p.columns for p in wide), strict=True)))
+    if all(part.texts is None for part in parts):
+        return all_of
+    return replace(all_of, texts=tuple(text for part in parts for text in part.texts or ()))
 
 
 def widened(data: ByteArray, width: int) -> ByteArray:

@@ -8,11 +8,15 @@ What is not printable, and the backslash, stand as \xHH.
 from __future__ import annotations
 
 import re
+from collections.abc import Generator
 from functools import partial
+from pathlib import Path
 
-from triaxcal.rig.candump import NS_PER_US, Parse, Parsed, format_frames, parse
+from triaxcal.rig.candump import NS_PER_US, Parsed, format_frames, read_log
+from triaxcal.rig.candump_lines import shown_line
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.lines import LineFormat, frames_of_lines
+from triaxcal.rig.logfile import read_frames
 
 _LINE = re.compile(rb"\((\d{10})\.(\d{6})\) \S+ ([ -~]*)")
 _ODD = re.compile(rb"[^ -\[\]-~]")
@@ -31,15 +35,24 @@ def log_text(frames: Frames, channel: str) -> bytes:
     return b"".join(lines)
 
 
-def log_parser(lines: LineFormat | None) -> Parse:
-    """What reads a log: of candump text, or of lines in a format."""
-    return parse if lines is None else partial(_parse_lines, lines)
+def frames_of_log(path: Path, lines: LineFormat | None) -> Generator[Parsed, None, None]:
+    """Frames of the log of a rig: of lines in a format, or of any log of frames.
+
+    Raises
+    ------
+    RefusedError
+        When the file cannot be read, is damaged, or a package is missing.
+    """
+    return read_frames(path) if lines is None else read_log(path, parse=partial(parsed, lines))
 
 
-def _parse_lines(lines: LineFormat, text: bytes) -> Parsed:
+def parsed(lines: LineFormat, text: bytes) -> Parsed:
+    """Frames of the whole lines of a log's text."""
     whole = text[: text.rfind(b"\n") + 1].split(b"\n")[:-1]
     found = [match for match in map(_LINE.fullmatch, whole) if match]
     times = [(int(m[1]) * 10**6 + int(m[2])) * NS_PER_US for m in found]
     texts = [_ESCAPED.sub(lambda odd: bytes([int(odd[1], 16)]), m[3]) for m in found]
     frames = frames_of_lines(lines, times, texts)
-    return Parsed(frames, len(whole), len(whole) - len(found))
+    bad = next((text for text in whole if not _LINE.fullmatch(text)), None)
+    first = "" if bad is None else shown_line(bad)
+    return Parsed(frames, len(whole), len(whole) - len(found), first_bad=first)

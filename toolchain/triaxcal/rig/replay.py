@@ -13,7 +13,9 @@ from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.events import Agree, Event, Redo
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.journal import ReadJournal, Record, read_journal
-from triaxcal.rig.logfile import Left, read_frames
+from triaxcal.rig.linelog import frames_of_log
+from triaxcal.rig.lines import LineFormat
+from triaxcal.rig.logfile import Left
 from triaxcal.rig.rawlog import LogState, changed_log
 from triaxcal.rig.recording import durable_events, known_log, refuse_other_session
 
@@ -87,7 +89,8 @@ def replay_records(setup: Setup, log: Path, records: Sequence[Record]) -> Replay
     words = [r for r in records if r["kind"] in {"command", "resume", "mended"}]
     events: list[Event] = []
     lines, left = 0, Left()
-    for frames in _chunks(log, [int(r["log"]["lines"]) for r in words], left):
+    cuts = [int(r["log"]["lines"]) for r in words]
+    for frames in _chunks(log, setup.rig.lines, cuts, left):
         while words and int(words[0]["log"]["lines"]) == lines:
             events += _say(engine, words.pop(0))
         events += engine.feed(frames)
@@ -110,10 +113,10 @@ def _say(engine: Engine, record: Record) -> list[Event]:
     return engine.command(Agree() if name == "Agree" else Redo(**said), t_ns)
 
 
-def _chunks(log: Path, cuts: list[int], left: Left) -> Iterator[Frames]:
+def _chunks(log: Path, form: LineFormat | None, cuts: list[int], left: Left) -> Iterator[Frames]:
     """Frames of a log, cut after each of these numbers of lines; what is none is counted."""
     done = 0
-    for parsed in read_frames(log):
+    for parsed in frames_of_log(log, form):
         left.add(parsed)
         inner = [c - done for c in cuts if done < c < done + parsed.lines]
         if cuts and parsed.bad_lines and parsed.lines:

@@ -6,9 +6,9 @@ import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.busfile import BusFile, read_bus_file
 from triaxcal.rig.description import MessageUse, RigDescription, SampleTime
 from triaxcal.rig.layout import Condition, FrameLayout
 from triaxcal.rig.protection import PROTECTIONS, Guard
@@ -29,10 +29,29 @@ AXES = ("x", "y", "z")
 _NEAR = 3
 
 
+class Described(Protocol):
+    """What describes messages: a bus description, or the format of lines."""
+
+    @property
+    def path(self) -> Path:
+        """File."""
+
+    @property
+    def sha256(self) -> str:
+        """Of its content."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What breaks the letter of its format."""
+
+    def layouts(self) -> Iterable[FrameLayout]:
+        """Layouts of its messages."""
+
+
 class _Names:
     """Signals of the bus descriptions by their full names."""
 
-    def __init__(self, source: str, files: Sequence[BusFile]) -> None:
+    def __init__(self, source: str, files: Sequence[Described]) -> None:
         self.source = source
         self.layouts: dict[str, FrameLayout] = {}
         self._twice: set[str] = set()
@@ -119,7 +138,7 @@ def resolved(  # noqa: PLR0917
     name: str,
     source: str,
     sha256: str,
-    paths: Sequence[Path],
+    files: Sequence[Described],
     keys: SignalKeys,
     messages: Mapping[str, MessageKeys],
 ) -> RigDescription:
@@ -129,7 +148,7 @@ def resolved(  # noqa: PLR0917
     ----------
     name, source, sha256 : str
         Of the description, of its file for messages, and of its content.
-    paths : sequence of Path
+    files : sequence of Described
         Bus descriptions; the first is the rig's.
 
     Raises
@@ -137,7 +156,6 @@ def resolved(  # noqa: PLR0917
     RefusedError
         As `read_description`.
     """
-    files = [read_bus_file(path) for path in paths]
     names = _Names(source, files)
     axes = _axes(names, keys)
     others = {

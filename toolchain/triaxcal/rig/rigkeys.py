@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from triaxcal.base.keys import DESCRIPTION, FORMAT, FileKeys, TableKeys, setting
 from triaxcal.base.kinds import FLAG, line, listed, number, whole, word
+from triaxcal.rig.lines import LineFormat
 from triaxcal.rig.protection import DATA_ID_MODES, PROTECTIONS
 
 RIG_FILE = "rig.toml"
@@ -23,12 +24,12 @@ class RigKeys:
     Attributes
     ----------
     file
-        Its description, beside this file: DBC, KCD, SYM or ARXML.
+        Its description, beside this file: DBC, KCD, SYM or ARXML. Required without [lines].
     more_files
         More descriptions of the same bus, as of a thermometer of another make.
     """
 
-    file: str = setting(_NAME, example='"imu.dbc"')
+    file: str | None = setting(_NAME, None, example='"imu.dbc"')
     more_files: tuple[str, ...] = setting(listed(_NAME, range(17), "a list of files"), ())
 
 
@@ -163,7 +164,9 @@ def rig_file() -> FileKeys:
         (
             TableKeys("", "", (FORMAT, DESCRIPTION)),
             TableKeys.of(RigKeys),
+            TableKeys.of(LineFormat, optional=True),
             TableKeys.of(SignalKeys),
             TableKeys.of(MessageKeys).but(protection=protection),
         ),
+        first=("file",),
     )

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from triaxcal.rig.lines import LineFormat
     from triaxcal.rig.simulator import SimulatedRig
 
+FRAMES, LINES, EITHER = "frames", "lines", "either"
 WAIT_S = 0.05
 PACE_S = 0.02
 """Between two reads: each costs the same for one frame as for a hundred, and the smallest queue,
@@ -112,8 +113,8 @@ class SourceKind:
         Kinds of a lower one are asked first.
     simulated : bool
         Faults can be ordered.
-    speaks_lines : bool
-        It gives lines, not frames of a bus.
+    speaks : str
+        FRAMES, LINES or EITHER: which rig descriptions it serves.
     """
 
     name: str
@@ -123,7 +124,11 @@ class SourceKind:
     open: Callable[[Wanted], Source]
     rank: int = 100
     simulated: bool = False
-    speaks_lines: bool = False
+    speaks: str = FRAMES
+
+    def serves(self, lines: LineFormat | None) -> bool:
+        """Whether it gives what a rig description needs: lines of a format, or frames."""
+        return self.speaks in {EITHER, FRAMES if lines is None else LINES}
 
 
 SOURCES = Registry("signal source", "triaxcal.rig.sources", SourceKind, ("takes", "open"))

@@ -12,7 +12,7 @@ from triaxcal.base.tomltable import did_you_mean, shown
 from triaxcal.rig.busname import channel_and_options
 from triaxcal.rig.lines import LineFormat
 from triaxcal.rig.linesource import LineSource
-from triaxcal.rig.source import PACE_S, WAIT_S, Source, SourceKind, Wanted
+from triaxcal.rig.source import LINES, PACE_S, WAIT_S, Source, SourceKind, Wanted
 
 _PREFIX = "lines:"
 _FORM = "lines:port,option=value,..."
@@ -115,5 +115,5 @@ ENTRY = SourceKind(
     takes=lambda bus: bus.startswith(_PREFIX),
     open=_open,
     rank=40,
-    speaks_lines=True,
+    speaks=LINES,
 )

@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.source import SourceKind, Wanted
+from triaxcal.rig.source import EITHER, SourceKind, Wanted
 
 if TYPE_CHECKING:
     from triaxcal.rig.busload import BitRates
     from triaxcal.rig.frames import Frames
+    from triaxcal.rig.lines import LineFormat
 
 _PREFIX = "replay:"
 
@@ -18,12 +19,13 @@ _PREFIX = "replay:"
 class LogSource:
     """Source of the frames that a log holds."""
 
-    def __init__(self, path: Path) -> None:
-        from triaxcal.rig.logfile import Left, read_frames  # noqa: PLC0415
+    def __init__(self, path: Path, lines: LineFormat | None = None) -> None:
+        from triaxcal.rig.linelog import frames_of_log  # noqa: PLC0415
+        from triaxcal.rig.logfile import Left  # noqa: PLC0415
 
         self.name = str(path)
         self.rates: BitRates | None = None
-        self._parts = read_frames(path)
+        self._parts = frames_of_log(path, lines)
         self._new = Left
         self._left = Left()
 
@@ -53,7 +55,7 @@ class LogSource:
 
 
 def _open(wanted: Wanted) -> LogSource:
-    return LogSource(Path(wanted.bus.removeprefix(_PREFIX)))
+    return LogSource(Path(wanted.bus.removeprefix(_PREFIX)), wanted.lines)
 
 
 ENTRY = SourceKind(
@@ -63,4 +65,5 @@ ENTRY = SourceKind(
     takes=lambda bus: bus.startswith(_PREFIX),
     open=_open,
     rank=20,
+    speaks=EITHER,
 )

@@ -10,7 +10,7 @@ from triaxcal.base.tomltable import shown
 from triaxcal.rig.busname import channel_and_options
 from triaxcal.rig.lines import LineFormat
 from triaxcal.rig.linesource import LineSource
-from triaxcal.rig.source import Source, SourceKind, Wanted
+from triaxcal.rig.source import LINES, Source, SourceKind, Wanted
 
 _PREFIX = "visa:"
 _FORM = "visa:resource,library=...,timeout=..."
@@ -60,5 +60,5 @@ ENTRY = SourceKind(
     takes=lambda bus: bus.startswith(_PREFIX),
     open=_open,
     rank=50,
-    speaks_lines=True,
+    speaks=LINES,
 )
