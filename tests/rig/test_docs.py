@@ -8,6 +8,7 @@ from rig_cases import REPO
 from triaxcal.cli.rig import rig
 from triaxcal.rig.dbc import REQUIRED
 from triaxcal.rig.plan import read_plan
+from triaxcal.rig.rigfile import read_description
 from triaxcal.rig.simorders import KINDS
 from triaxcal.unit.description import read_unit
 
@@ -31,6 +32,18 @@ def test_the_plans_of_the_unattended_page_are_read(tmp_path):
         plan = read_plan(path, read_unit(REPO / "units/AT-SIM-BENCH"))
         assert plan.equipment.chamber_by.readable
     assert len(tables) == 2
+
+
+def test_the_descriptions_of_the_page_on_lines_are_read(tmp_path):
+    page = (REPO / "docs/how-to/lines.md").read_text(encoding="utf-8")
+    texts = [part.split("```")[0] for part in page.split("```toml\n")[1:]]
+    path = tmp_path / "rig.toml"
+    for text in texts:
+        path.write_text(text, encoding="utf-8")
+        rig = read_description(path)
+        assert rig.lines is not None
+        assert rig.temperature is not None
+    assert len(texts) == 2
 
 
 def test_every_command_is_named():

@@ -140,7 +140,8 @@ def concatenate(parts: Sequence[Frames]) -> Frames:
         return empty()
     width = max(part.data.shape[1] for part in parts)
     wide = [replace(p, data=widened(p.data, width)) for p in parts]
-    all_of = Frames(*map(np.concatenate, zip(*(p.columns for p in wide), strict=True)))
+    columns: list[Any] = [np.concatenate(c) for c in zip(*(p.columns for p in wide), strict=True)]
+    all_of = Frames(*columns)
     if all(part.texts is None for part in parts):
         return all_of
     return replace(all_of, texts=tuple(text for part in parts for text in part.texts or ()))
