@@ -14,6 +14,7 @@ from triaxcal.base.tomltable import shown
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.rig.instrument import DRIVERS, OPERATOR, Driver, Order, filled
+from triaxcal.rig.recorded import TEMPERATURES, folded
 
 POSITIONS = (*TEST_POSITIONS, *CHECK_POSITIONS)
 """Their places, from 1, are what a positioner without angles is told."""
@@ -21,33 +22,22 @@ POSITIONS = (*TEST_POSITIONS, *CHECK_POSITIONS)
 
 @dataclass(frozen=True)
 class TempUnit:
-    """A unit of temperature: value = degc * factor + zero."""
+    """A unit of temperature: degc = value * scale + zero."""
 
     name: str
-    factor: float
+    scale: float
     zero: float
 
     def of_degc(self, degc: float) -> float:
         """Value of a temperature in degC."""
-        return degc * self.factor + self.zero
+        return (degc - self.zero) / self.scale
 
     def degc(self, value: float) -> float:
         """Temperature in degC of a value."""
-        return (value - self.zero) / self.factor
+        return value * self.scale + self.zero
 
 
-TEMP_UNITS = {
-    unit.name: unit
-    for unit in (
-        TempUnit("degC", 1.0, 0.0),
-        TempUnit("K", 1.0, 273.15),
-        TempUnit("degF", 1.8, 32.0),
-    )
-}
-
-
-def _drivers() -> Kind[str]:
-    return word(DRIVERS.names)
+TEMP_UNITS = {name: TempUnit(name, *TEMPERATURES[folded(name)]) for name in ("degC", "K", "degF")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -223,7 +213,7 @@ def equipment_tables() -> tuple[TableKeys, ...]:
     """Tables [chamber], [positioner] and [unattended], with the keys of every driver."""
     driver = Key(
         "driver",
-        _drivers(),
+        word(DRIVERS.names),
         f"How the bench speaks to it. {DRIVERS.explained}",
         OPERATOR,
     )
@@ -280,7 +270,7 @@ def refuse_without_angles(equipment: Equipment, values: Values, positions: Itera
 
 def _connection(values: Values, example: Order) -> Connection:
     """Driver that a table names, with its settings, all of them checked."""
-    name = values[Key("driver", _drivers(), "", OPERATOR)]
+    name = values[Key("driver", word(DRIVERS.names), "", OPERATOR)]
     driver = DRIVERS[name]
     own = {key.name for key in driver.keys}
     others = {key.name: entry for entry in DRIVERS for key in entry.keys if key.name not in own}

@@ -6,22 +6,20 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import DESCRIPTION, FORMAT, FileKeys, TableKeys, Values, setting
-from triaxcal.base.kinds import FLAG, line, number, rising, three, whole, word
+from triaxcal.base.kinds import line, number, three, whole, word
 from triaxcal.base.tomltable import read_toml
-from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
-from triaxcal.model.thermal.shape import GROUP_GAP_DEGC, PLAUSIBLE_DEGC
 from triaxcal.rig.equipment import (
     Equipment,
     equipment_tables,
     read_equipment,
     refuse_without_angles,
 )
+from triaxcal.rig.plansteps import Step, StepKeys, planned_steps, refuse_merged
 from triaxcal.rig.shippedrigs import find_description
 from triaxcal.unit.description import UnitDescription
 
@@ -116,14 +114,6 @@ class Thermal:
 
 
 @dataclass(frozen=True)
-class Step:
-    """Positions to be measured at one temperature."""
-
-    temp_degc: float
-    positions: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class SessionPlan:
     """A plan, validated.
 
@@ -187,32 +177,6 @@ class _Rig:
     )
 
 
-@dataclass(frozen=True)
-class _Steps:
-    """[steps]: what is measured.
-
-    Attributes
-    ----------
-    temperatures_degc
-        Temperatures at which TP1 to TP6 are measured.
-    check_temperatures_degc
-        Temperatures at which CP1 to CP6 are measured.
-    direction
-        Order of the temperatures.
-    take_out_of_order
-        A position found out of order is taken without asking.
-    """
-
-    temperatures_degc: tuple[float, ...] = setting(
-        rising(*PLAUSIBLE_DEGC, 1, 64), unit="degC", example="[-20, 20, 60]"
-    )
-    check_temperatures_degc: tuple[float, ...] = setting(
-        rising(*PLAUSIBLE_DEGC, 1, 64), (), "degC", words="none", example="[20]"
-    )
-    direction: str = setting(word(("up", "down")), "up")
-    take_out_of_order: bool = setting(FLAG, False)
-
-
 def session_plan_file() -> FileKeys:
     """Keys of a plan; those of registered drivers are among them."""
     return FileKeys(
@@ -221,7 +185,7 @@ def session_plan_file() -> FileKeys:
         (
             TableKeys("", "", (FORMAT, DESCRIPTION)),
             TableKeys.of(_Rig),
-            TableKeys.of(_Steps),
+            TableKeys.of(StepKeys),
             TableKeys.of(Stillness),
             TableKeys.of(Thermal),
             *equipment_tables(),
@@ -240,7 +204,7 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
         unit's range.
     """
     tables = session_plan_file().read(path)
-    rig, steps = tables["rig"].record(_Rig), tables["steps"].record(_Steps)
+    rig, steps = tables["rig"].record(_Rig), tables["steps"].record(StepKeys)
     stillness = tables["stillness"].record(Stillness)
     if stillness.average_s % stillness.batches:
         raise RefusedError(
@@ -250,8 +214,8 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
         )
     equipment = read_equipment(tables)
     thermal = tables["thermal"].record(Thermal)
-    _refuse_merged(tables["steps"], steps.temperatures_degc, thermal)
-    planned = _steps(tables["steps"], steps, unit, equipment)
+    refuse_merged(tables["steps"], steps.temperatures_degc, thermal.tolerance_k)
+    planned = planned_steps(tables["steps"], steps, unit, equipment)
     every = (position for step in planned for position in step.positions)
     refuse_without_angles(equipment, tables["positioner"], every)
     return SessionPlan(
@@ -277,21 +241,6 @@ def _rig_file(values: Values, keys: _Rig, folder: Path) -> Path:
     return find_description(keys.rig, folder)
 
 
-def _refuse_merged(values: Values, temps_degc: tuple[float, ...], thermal: Thermal) -> None:
-    """Refuse temperatures that the fit may take for one: each may be missed by `tolerance_k`."""
-    least = GROUP_GAP_DEGC + 2.0 * thermal.tolerance_k
-    for low, high in pairwise(temps_degc):
-        if high - low <= least:
-            raise RefusedError(
-                values.where("temperatures_degc"),
-                f"found {low:g} and {high:g} degC",
-                expected=f"more than {least:g} K between them: the fit takes readings within "
-                f"{GROUP_GAP_DEGC:g} K for one temperature, and tolerance_k permits "
-                f"{thermal.tolerance_k:g} K on either side",
-                remedy="leave one out, or state a smaller [thermal] tolerance_k",
-            )
-
-
 def _hash_of(path: Path) -> str:
     """SHA-256 of a plan's file, or of the tables that decide where it has others."""
     document = read_toml(path)
@@ -300,30 +249,3 @@ def _hash_of(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     decides = {name: table for name, table in document.items() if name not in equipment}
     return hashlib.sha256(json.dumps(decides, sort_keys=True, default=str).encode()).hexdigest()
-
-
-def _steps(
-    values: Values, steps: _Steps, unit: UnitDescription, equipment: Equipment
-) -> tuple[Step, ...]:
-    ranges = []
-    if unit.range_degc:
-        ranges.append(("the unit's range", unit.range_degc, f"range_degc in {unit.source}"))
-    if not equipment.chamber_by.by_hand:
-        low_high = equipment.chamber.range_degc
-        ranges.append(("the chamber's range", low_high, "range_degc in [chamber]"))
-    at: dict[float, tuple[str, ...]] = {}
-    for name, temps, positions in (
-        ("temperatures_degc", steps.temperatures_degc, tuple(TEST_POSITIONS)),
-        ("check_temperatures_degc", steps.check_temperatures_degc, CHECK_POSITIONS),
-    ):
-        for temp in temps:
-            for whose, (low, high), where in ranges:
-                if not low <= temp <= high:
-                    raise RefusedError(
-                        values.where(name),
-                        f"found {temp:g} degC",
-                        expected=f"temperatures of {whose}, {low:g} to {high:g} degC",
-                        remedy=f"correct the plan, or {where}",
-                    )
-            at[temp] = at.get(temp, ()) + positions
-    return tuple(Step(temp, at[temp]) for temp in sorted(at, reverse=steps.direction == "down"))
