@@ -9,7 +9,6 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from random import Random
 
 import numpy as np
 import pytest
@@ -30,6 +29,8 @@ pytestmark = pytest.mark.skipif(not WORK, reason="`make test-can` runs these on 
 INTERRUPTED = int(os.environ.get("TRIAXCAL_CAN_INTERRUPTED", "100"))
 """Downloads; fewer in the guest, where each takes seconds."""
 FLASH_BYTES = 4096
+FIRST_FRAMES, FRAMES = 8, 500
+"""Of a download, with the reading before and most of that behind it; the store is at about 370."""
 BOUND_S = 0.5
 """Until the node has bound its socket; what it misses is repeated."""
 
@@ -132,18 +133,19 @@ def test_frames_are_lost_and_come_twice(
 
 
 def test_interrupted_downloads(vcan: str, node: Node) -> None:
-    """The cable or the power, at random: the old or the new calibration is in use each time."""
+    """The cable or the power, from begin to end: the old or the new one is in use each time."""
     from triaxcal.device.unit import flash, identify
 
     with on(node, vcan), linked(vcan) as link:
         flash(link, file("old"), "old.bin")
-    before, rng = node.flash.read_bytes(), Random(3)
+    before = node.flash.read_bytes()
     found = {"OLD": 0, "NEW": 0}
     for attempt in range(INTERRUPTED):
         node.flash.write_bytes(before)
-        cut, stop = rng.randrange(8, 450), None
+        part = attempt / (INTERRUPTED - 1)
+        cut, stop = FIRST_FRAMES + int(part * FRAMES), None
         if attempt % 2:
-            cut, stop = None, rng.randrange(FLASH_BYTES + len(file("new")) + 40)
+            cut, stop = None, int(part * (FLASH_BYTES + len(file("new")) + 40))
         with (
             on(node, vcan, stop),
             contextlib.suppress(RefusedError),
