@@ -8,11 +8,17 @@
  *     rig_node socket 7    on an inherited socket that carries struct can_frame and canfd_frame
  *     rig_node can vcan0   on a CAN device
  *
+ * With SAMPLES RATE behind it, the node has a sensor of its own: a file of rows of four int32, the
+ * temperature code and the raw codes x, y, z, from which it takes RATE rows a second, again and again.
+ * It sends RIG_TEMP, RIG_XY and RIG_Z of each, and then its answer, as a unit on the bench that
+ * compensates. Then it takes no frames.
+ *
  * Ends with 0 when the socket is closed, 1 when it fails, 2 for a wrong command line.
  */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <net/if.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -138,6 +144,51 @@ static int take_fd(node_t *node, const struct canfd_frame *frame)
     return answer(node, (uint8_t)(sample.sequence & 0xFFU), accel, status | node->temp_status);
 }
 
+/* One row of the sensor in the frames of the rig, and the answer to it. */
+static int measure(node_t *node, const int32_t row[4], uint8_t sequence)
+{
+    struct tilter_rig_temp_t temp = {0U, sequence, row[0], 0U};
+    struct tilter_rig_xy_t xy = {0U, sequence, row[1], row[2]};
+    struct tilter_rig_z_t z = {0U, sequence, row[3], 0U, 0U};
+    uint8_t payload[8];
+    int32_t accel[3];
+    uint32_t status;
+
+    (void)tilter_rig_temp_pack(payload, &temp, sizeof payload);
+    if (send_frame(node, TILTER_RIG_TEMP_FRAME_ID, payload) != 0) {
+        return -1;
+    }
+    (void)tilter_rig_xy_pack(payload, &xy, sizeof payload);
+    if (send_frame(node, TILTER_RIG_XY_FRAME_ID, payload) != 0) {
+        return -1;
+    }
+    (void)tilter_rig_z_pack(payload, &z, sizeof payload);
+    if (send_frame(node, TILTER_RIG_Z_FRAME_ID, payload) != 0) {
+        return -1;
+    }
+    status = triax_set_temperature(&node->state, &TRIAX_CALIB, row[0]);
+    status |= triax_apply(&node->state, &row[1], accel);
+    return answer(node, sequence, accel, status);
+}
+
+/* Samples of the node's own until the socket is closed (0), or it fails (-1). */
+static int run_sensor(node_t *node, FILE *samples, long rate)
+{
+    int32_t row[4] = {0, 0, 0, 0};
+    uint8_t sequence = 0;
+
+    for (;; sequence++) {
+        if (fread(row, sizeof row, 1, samples) != 1) {
+            rewind(samples);
+            (void)!fread(row, sizeof row, 1, samples);
+        }
+        if (measure(node, row, sequence) != 0) {
+            return errno == EPIPE || errno == ECONNRESET ? 0 : -1;
+        }
+        (void)usleep((useconds_t)(1000000 / rate));
+    }
+}
+
 static int open_can(const char *device)
 {
     struct sockaddr_can address;
@@ -171,16 +222,27 @@ int main(int argc, char **argv)
     } frame;
     ssize_t size;
     int failed;
+    const long rate = argc == 5 ? strtol(argv[4], NULL, 10) : 1;
 
     memset(&node, 0, sizeof node);
-    if (argc != 3 || (strcmp(argv[1], "socket") != 0 && strcmp(argv[1], "can") != 0)) {
-        fprintf(stderr, "rig_node: say: rig_node socket NUMBER, or rig_node can DEVICE\n");
+    if ((argc != 3 && argc != 5) || (strcmp(argv[1], "socket") != 0 && strcmp(argv[1], "can") != 0) ||
+        rate < 1 || rate > 1000000) {
+        fprintf(stderr, "rig_node: say: rig_node socket NUMBER, or rig_node can DEVICE; [SAMPLES RATE]\n");
         return 2;
     }
     node.socket = strcmp(argv[1], "can") == 0 ? open_can(argv[2]) : (int)strtol(argv[2], NULL, 10);
     if (node.socket < 0) {
         fprintf(stderr, "rig_node: %s: %s\n", argv[2], strerror(errno));
         return 1;
+    }
+    if (argc == 5) {
+        FILE *samples = fopen(argv[3], "rb");
+        (void)signal(SIGPIPE, SIG_IGN);
+        if (samples == NULL || run_sensor(&node, samples, rate) != 0) {
+            fprintf(stderr, "rig_node: %s: %s\n", samples == NULL ? argv[3] : argv[2], strerror(errno));
+            return 1;
+        }
+        return 0;
     }
     for (;;) {
         size = read(node.socket, &frame, sizeof frame);

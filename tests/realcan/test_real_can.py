@@ -16,6 +16,7 @@ from triaxcal.rig.dbc import default_dbc, read_dbc
 from triaxcal.rig.fil import exchange
 from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.plan import LAYOUTS
+from triaxcal.rig.port import SocketPort
 from triaxcal.rig.rigfile import read_description
 from triaxcal.rig.shippedrigs import find_description
 from triaxcal.rig.simframes import FrameMaker
@@ -165,7 +166,7 @@ def test_firmware_in_the_loop_bit_for_bit(vcan):
         link.setsockopt(socket.SOL_SOCKET, 33, 4 << 20)
         time.sleep(1.0)  # until the node has bound its socket
         dbc = read_dbc(default_dbc())
-        done = exchange(link, dbc, answers["temps"], answers["raw"], routine)
+        done = exchange(SocketPort(link), dbc, answers["temps"], answers["raw"], routine)
         assert done.samples == 5000
         link.close()
     finally:

@@ -17,6 +17,7 @@ from triaxcal.delivery.unit import deliver
 from triaxcal.rig.dbc import REQUIRED
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.fil import exchange, packing_source, vectors
+from triaxcal.rig.port import SocketPort
 from triaxcal.rig.protection import PROTECTIONS
 from triaxcal.unit.description import read_unit
 
@@ -60,16 +61,16 @@ def test_the_node_answers_bit_for_bit(node, delivery):
     temps, raw = vectors(5000, (plan.temp_min_code, plan.temp_max_code), 7)
     assert (temps < plan.temp_min_code).any()
     assert (temps > plan.temp_max_code).any()
-    with node_on(node, None) as link:
-        done = exchange(link, dbc(), temps, raw, python_routine(plan))
+    with node_on(node) as link:
+        done = exchange(SocketPort(link), dbc(), temps, raw, python_routine(plan))
     assert done.samples == 5000
 
 
 def test_the_node_answers_can_fd_bit_for_bit(node, delivery):
     plan = delivery.plan
     temps, raw = vectors(2000, (plan.temp_min_code, plan.temp_max_code), 9)
-    with node_on(node, None) as link:
-        done = exchange(link, dbc(), temps, raw, python_routine(plan), "fd")
+    with node_on(node) as link:
+        done = exchange(SocketPort(link), dbc(), temps, raw, python_routine(plan), "fd")
     assert done.samples == 2000
 
 
@@ -116,7 +117,7 @@ def test_the_node_passes_over_a_spoiled_fd_frame(node, place):
     data = layout.pack({s: np.array([5]) for s in layout.signals if s != "Crc"})
     data[0, place] ^= 0x10
     payload = data[0].tobytes().ljust(64, b"\0")
-    with node_on(node, None) as link:
+    with node_on(node) as link:
         link.send(layout.frame_id.to_bytes(4, "little") + bytes([48, 0, 0, 0]) + payload)
         # Its answer to the next, good sample is the first there is.
         temps, raw = np.array([0], np.int32), np.zeros((1, 3), np.int32)
@@ -127,7 +128,7 @@ def test_the_node_passes_over_a_spoiled_fd_frame(node, place):
             raise RefusedError("here", "the good one was answered")
 
         with pytest.raises(RefusedError, match="the good one was answered"):
-            exchange(link, dbc(), temps, raw, routine, "fd")
+            exchange(SocketPort(link), dbc(), temps, raw, routine, "fd")
     assert answers == [1]
 
 
@@ -146,12 +147,12 @@ def test_one_lsb_is_noticed(node, delivery):
         return accel, status
 
     temps, raw = vectors(64, (plan.temp_min_code, plan.temp_max_code), 8)
-    with node_on(node, None) as link, pytest.raises(RefusedError, match="sample 17: temp_code"):
-        exchange(link, dbc(), temps, raw, wrong)
+    with node_on(node) as link, pytest.raises(RefusedError, match="sample 17: temp_code"):
+        exchange(SocketPort(link), dbc(), temps, raw, wrong)
 
 
 def test_the_node_passes_over_what_is_spoiled(node):
-    with node_on(node, None) as link:
+    with node_on(node) as link:
         for size in (0, 1, 15, 17, 72):
             link.send(b"\xff" * size) if size else None
         spoiled = bytearray(16)

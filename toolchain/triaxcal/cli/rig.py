@@ -272,18 +272,34 @@ def export(log: Path, target: Path) -> None:
     click.echo(f"{target}: {count} frames")
 
 
-@rig.command(epilog=example("triaxcal rig fil --unit AT-SIM-BENCH --samples 1000"))
+@rig.command(
+    epilog=example(
+        "triaxcal rig fil --unit AT-SIM-BENCH --samples 1000",
+        "triaxcal rig fil --unit AT-7 --bus can0 --listen --samples 1000",
+    )
+)
 @session_options
 @click.option("--samples", type=click.IntRange(1), default=100_000, show_default=True)
-@click.option("--bus", help="CAN device to do it on; without it, a socket between two processes.")
+@click.option(
+    "--bus",
+    help="Check the node on this CAN device or bus of python-can; without it, one that is built "
+    "and started here.",
+)
+@click.option(
+    "--listen", is_flag=True, help="The node has a sensor of its own: compare what it sends."
+)
 @click.option("--seed", type=int, default=1, show_default=True)
-def fil(setup: Setup, samples: int, bus: str | None, seed: int) -> None:
-    """Run the generated C as a node and compare with Python.
+def fil(setup: Setup, samples: int, bus: str | None, listen: bool, seed: int) -> None:
+    """Compare the generated C in a node with Python.
 
-    Firmware in the loop: each answer must be equal, bit for bit.
+    Firmware in the loop: each result must be equal, bit for bit. The node is given raw codes in the
+    frames of the DBC. With --listen it sends its own, and its results.
     """
     from triaxcal.cli.rig_fil import firmware_in_the_loop  # noqa: PLC0415
 
-    done = firmware_in_the_loop(setup, samples, bus, seed)
+    if listen and bus is None:
+        raise click.UsageError("--listen needs the --bus that the node is on")
+    done = firmware_in_the_loop(setup, samples, bus, seed, listen)
     rate = done.samples / done.seconds
-    click.echo(f"{done.samples} samples bit for bit, {rate:.0f} a second")
+    lost = f"; {done.lost} more were not whole" if done.lost else ""
+    click.echo(f"{done.samples} samples bit for bit, {rate:.0f} a second{lost}")

@@ -1,4 +1,4 @@
-"""`triaxcal rig fil`: build the node, start it, ask it."""
+"""`triaxcal rig fil`: build a node, start and ask it; or check one that is on a bus."""
 
 from __future__ import annotations
 
@@ -26,17 +26,23 @@ from triaxcal.rig.fil import (
     packing_source,
     vectors,
 )
-from triaxcal.rig.socketcan import can_socket, open_refusal
+from triaxcal.rig.listen import listen
+from triaxcal.rig.port import Port, SocketPort
 
 
-def firmware_in_the_loop(setup: Setup, samples: int, bus: str | None, seed: int) -> Agreement:
-    """Calibrate the unit, build its node, and compare its answers.
+def firmware_in_the_loop(
+    setup: Setup, samples: int, bus: str | None, seed: int, own_sensor: bool = False
+) -> Agreement:
+    """Calibrate the unit, and compare the answers of its node.
+
+    Without `bus` the node is built and started here. With `own_sensor` it is not asked: it sends
+    its raw codes and its results.
 
     Raises
     ------
     RefusedError
-        When the unit is refused, its codes do not fit the frames, a tool is missing, or an
-        answer differs.
+        When the unit is refused, its codes do not fit the frames, a tool is missing, no node
+        answers, or an answer differs.
     """
     layout, bits = layout_of(setup.rig), setup.unit.adc.bits
     if bits > CODE_BITS[layout]:
@@ -48,13 +54,20 @@ def firmware_in_the_loop(setup: Setup, samples: int, bus: str | None, seed: int)
         )
     delivery = deliver(setup.folder)
     plan = delivery.plan
-    temps, raw = vectors(samples, (plan.temp_min_code, plan.temp_max_code), seed, bits)
-    with tempfile.TemporaryDirectory() as folder:
-        node = build_node(Path(folder), delivery.files, setup)
-        with node_on(node, bus, fd=layout == "fd") as link:
-            return exchange(
-                link, read_dbc(setup.rig.bus_file), temps, raw, python_routine(plan), layout
-            )
+    routine, dbc = python_routine(plan), read_dbc(setup.rig.bus_file)
+    with contextlib.ExitStack() as stack:
+        if bus is None:
+            folder = stack.enter_context(tempfile.TemporaryDirectory())
+            node = build_node(Path(folder), delivery.files, setup)
+            port: Port = SocketPort(stack.enter_context(node_on(node)))
+        else:
+            from triaxcal.rig.busport import port_of  # noqa: PLC0415  imports python-can
+
+            port = stack.enter_context(port_of(bus, fd=layout == "fd"))
+        if own_sensor:
+            return listen(port, dbc, samples, routine, setup.unit.serial)
+        temps, raw = vectors(samples, (plan.temp_min_code, plan.temp_max_code), seed, bits)
+        return exchange(port, dbc, temps, raw, routine, layout)
 
 
 def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
@@ -88,23 +101,15 @@ def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
 
 
 @contextlib.contextmanager
-def node_on(program: Path, bus: str | None, fd: bool = False) -> Iterator[socket.socket]:
-    """Start the node; gives our end of its bus."""
-    if bus is not None:
-        try:
-            link = can_socket(bus, fd)
-        except OSError as error:
-            raise open_refusal(bus, error) from error
-        process = subprocess.Popen([str(program), "can", bus])
-    else:
-        link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        number = theirs.fileno()
-        process = subprocess.Popen([str(program), "socket", str(number)], pass_fds=[number])
-        theirs.close()
+def node_on(program: Path, *sensor: str) -> Iterator[socket.socket]:
+    """Start the node; gives our end of its bus. `sensor` is the file of its own, and its rate."""
+    link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    number = theirs.fileno()
+    command = [str(program), "socket", str(number), *sensor]
+    process = subprocess.Popen(command, pass_fds=[number])
+    theirs.close()
     try:
         yield link
     finally:
         link.close()
-        if bus is not None:
-            process.terminate()
         process.wait(10)
