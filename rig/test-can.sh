@@ -68,7 +68,7 @@ mount -t tmpfs tmpfs /host$work/tmp || poweroff -f
 ip link set lo up
 echo started > /host$work/started
 chroot /host /bin/bash -c "cd $PWD && export PATH=$PATH PYTHONDONTWRITEBYTECODE=1 \
-    PYTHONPATH=$PYTHONPATH TRIAXCAL_CAN_WORK=$work TMPDIR=$work/tmp TRIAXCAL_CAN_INTERRUPTED=20 && $PWD/$python -m pytest -q -p no:cacheprovider \
+    PYTHONPATH=$PYTHONPATH TRIAXCAL_CAN_WORK=$work TMPDIR=$work/tmp TRIAXCAL_CAN_INTERRUPTED=12 && $PWD/$python -m pytest -q -p no:cacheprovider \
     -p no:hypothesispytest --durations=4 tests/realcan; echo \\\$? > $work/status"
 sync; poweroff -f
 INIT
