@@ -51,6 +51,9 @@ SHIPPED = {
     "rig/design.toml": "design",
     "rig/descriptions/tilter/rig.toml": "rig-description",
     "rig/descriptions/tilter-fd/rig.toml": "rig-description",
+    "rig/descriptions/automotive-imu/rig.toml": "rig-description",
+    "rig/descriptions/j1939-inclinometer/rig.toml": "rig-description",
+    "rig/descriptions/canopen-float/rig.toml": "rig-description",
 }
 
 

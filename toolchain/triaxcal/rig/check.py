@@ -11,6 +11,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import AXES
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.frames import ID_MASK, Frames, concatenate
+from triaxcal.rig.nominal import COARSE_MICRO_G
 from triaxcal.rig.orientation import described, recognised
 from triaxcal.rig.samples import BAD_CRC, DUPLICATE, INVALID, LOST_FRAME, ORPHAN, Samples
 from triaxcal.rig.source import Source
@@ -20,6 +21,8 @@ _RATE_TOLERANCE = 0.02
 """Of the plan's rate; a few seconds' count is exact to a sample or two."""
 _NOISE_MAX_MICRO_G = 2000.0
 """Above this the rig is being shaken: 100 times the noise of a navigation accelerometer at 1 Hz."""
+_NOISE_MAX_CODES = 3.0
+"""The same where one code is large."""
 
 
 @dataclass(frozen=True)
@@ -109,15 +112,15 @@ def _samples(setup: Setup, samples: Samples) -> list[Finding]:
     # Differences of neighbours: a drift does not enter.
     sd = np.sqrt(np.mean(np.diff(samples.codes, axis=0) ** 2, axis=0) / 2.0) * np.abs(scale)
     seen = recognised(samples.codes.mean(axis=0) - setup.nominal.zero_code, scale)
+    noise_max = np.maximum(_NOISE_MAX_MICRO_G, _NOISE_MAX_CODES * np.abs(scale))
+    fine = np.abs(scale) < COARSE_MICRO_G
     noise = ", ".join(f"{axis} {v:.0f}" for axis, v in zip(AXES, sd, strict=True))
     codes = samples.temp_code
     temp = setup.unit.temperature_sensor.degc(float(codes.mean())) if len(codes) else None
     return [
         Finding(lost == 0, f"{len(samples.number)} samples, {lost} lost"),
         Finding(abs(rate / plan.rate_hz - 1.0) < _RATE_TOLERANCE, f"{rate:.2f} samples a second"),
-        Finding(
-            bool((sd > 0.0).all() and (sd < _NOISE_MAX_MICRO_G).all()), f"noise {noise} micro-g"
-        ),
+        Finding(bool((sd[fine] > 0.0).all() and (sd < noise_max).all()), f"noise {noise} micro-g"),
         Finding(seen is not None, f"position {described(seen) if seen else 'not recognised'}"),
         Finding(temp is not None, f"temperature {temp:.2f} degC" if temp is not None else "none"),
     ]

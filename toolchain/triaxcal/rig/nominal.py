@@ -19,6 +19,9 @@ _SCALE_TOLERANCE = 0.2
 _DEGC_TOLERANCE = 0.5
 """By which the temperatures of unit.toml and of the bus description may differ in its range."""
 
+COARSE_MICRO_G = 200.0
+"""With larger codes the noise of an accelerometer at rest may stay within one code."""
+
 
 @dataclass(frozen=True)
 class Coding:

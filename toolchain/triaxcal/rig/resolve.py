@@ -168,6 +168,7 @@ def resolved(  # noqa: PLR0917
         names.message(f"{source}, [message.{message}]", message)
     uses = {m: _use(names, m, messages.get(m, MessageKeys())) for m in dict.fromkeys(used)}
     _refuse_overlaps(names, uses)
+    _refuse_shared_bits(names, [*axes, *others.values()], uses)
     _refuse_idle(names, messages, uses)
     join, at = _joining(names, keys, axes, uses)
     return RigDescription(
@@ -317,6 +318,28 @@ def _refuse_overlaps(names: _Names, uses: Mapping[str, MessageUse]) -> None:
                 remedy="state source_address where J1939 addresses differ",
             )
         seen.append(use)
+
+
+def _refuse_shared_bits(
+    names: _Names, signals: Sequence[SignalUnit], uses: Mapping[str, MessageUse]
+) -> None:
+    """Refuse signals that lie on each other, where both can be in one frame."""
+    every = list(signals)
+    for use in uses.values():
+        crc = use.guard.signal if use.guard is not None else None
+        inner = (use.counter, crc, use.status)
+        every += [SignalUnit(use.name, signal) for signal in inner if signal is not None]
+    for i, one in enumerate(every):
+        for other in every[:i]:
+            both = one.conditions == other.conditions or not (one.conditions and other.conditions)
+            same = one.message == other.message and one.signal != other.signal
+            if same and both and one.signal.bits & other.signal.bits:
+                raise RefusedError(
+                    f"{names.source}, {one.label}",
+                    f"shares bits with {other.signal.name}",
+                    expected="bits of its own",
+                    remedy=f"correct {names.files}, or name another signal",
+                )
 
 
 def _refuse_idle(names: _Names, messages: Iterable[str], uses: Mapping[str, MessageUse]) -> None:

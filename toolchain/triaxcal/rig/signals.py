@@ -65,6 +65,16 @@ class Signal:
         return (before + self.length + 7) // 8
 
     @property
+    def bits(self) -> int:
+        """Bits of the payload that it takes, as bits of an integer: byte 0 lowest."""
+        if self.little_endian:
+            return ((1 << self.length) - 1) << self.start
+        # Bits in the order in which a big-endian signal runs through the bytes.
+        first = self.start // 8 * 8 + 7 - self.start % 8
+        order = range(first, first + self.length)
+        return sum(1 << (place // 8 * 8 + 7 - place % 8) for place in order)
+
+    @property
     def is_plain(self) -> bool:
         """The value is the raw number."""
         return self.scale == 1 and self.offset == 0
