@@ -16,6 +16,7 @@ from triaxcal.rig.link import Link
 from triaxcal.rig.orientation import UP
 from triaxcal.rig.runner import Robot
 from triaxcal.rig.simhands import SimulatedChamber, SimulatedTable, simulated_attendant
+from triaxcal.rig.view import view
 
 LEARNED = 61
 """Seconds after which the noise of the short plan is known."""
@@ -213,6 +214,53 @@ def test_what_a_person_must_do_is_refused_at_the_start(tmp_path):
     with pytest.raises(RefusedError, match=r'\[chamber\] driver: found "operator"'):
         attendant(setup_with(tmp_path, tables).plan, lambda: 0.0)
     attendant(setup_with(tmp_path, tables, temps="[20]").plan, lambda: 0.0)
+
+
+def test_the_screen_asks_nobody_to_turn(tmp_path):
+    setup = short_setup(tmp_path)
+    rig, hands = run(setup)
+    shown = {}
+
+    class Seen:
+        def act(self, session, events):
+            hands.act(session, events)
+            found = hands.shown(session, view(session))
+            shown.setdefault(found.phase, []).append(found)
+
+        notes = staticmethod(hands.notes)
+
+    walk(setup, rig, Seen())
+    assert all(v.order.startswith("HANDS OFF") for p in shown if p != "done" for v in shown[p])
+    assert shown["turn"][0].headline == "UNATTENDED - turning to TP2 (-Y up), do not touch"
+    waiting = shown["temperature"][-1]
+    assert waiting.headline == "UNATTENDED - waiting for 25 degC, do not touch"
+    assert shown["temperature"][0].last_event == "chamber: from 20.0 to 25 degC"
+    assert all("do not touch" in v.headline for p in shown if p != "done" for v in shown[p])
+    assert 0.0 < waiting.left_s < shown["reference"][0].left_s
+    assert shown["done"][0].order == "DONE"
+
+
+@pytest.mark.long
+def test_instruments_are_asked_beside_the_loop(tmp_path):
+    """As on a real rig: each question in a thread of its own, while the readings come."""
+    setup = setup_with(tmp_path, "[positioner]\nturn_max_s = 3000\n", temps="[20]")
+    rig = rig_of(setup)
+    chamber, table = SimulatedChamber(rig), SimulatedTable(rig, setup.plan.equipment.positioner)
+    threads = set()
+
+    def noted(read):
+        threads.add(threading.get_ident())
+        return read()
+
+    chamber.read, read = (lambda: noted(read)), chamber.read
+    hands = Attendant(
+        setup.plan, (lambda: chamber, True), (lambda: table, True), lambda: float(rig.seconds)
+    )
+    _, events, _ = walk(setup, rig, hands)
+    assert sorted(accepted(events)) == ALL[:6]
+    assert threading.get_ident() not in threads
+    assert hands.make_safe() == ["chamber: set to the safe 23 degC", "positioner: left as it is"]
+    assert rig.target_degc == 23.0
 
 
 def test_beside_a_person_the_chamber_alone_is_set(tmp_path):

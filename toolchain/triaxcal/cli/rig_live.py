@@ -7,7 +7,6 @@ import sys
 import time
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -185,7 +184,7 @@ def _on_screen(
         for tick in ticks:
             now = time.monotonic()
             said = [e.text for e in tick.events if e.kind in {"refused", "trouble", "left"}]
-            alarms.extend((now, text) for text in (*said, *tick.notes, *tick.done))
+            alarms.extend((now, text) for text in (*said, *tick.notes))
             faults.add(time.strftime("%H:%M:%S"), (*said, *tick.notes))
             if now - shown < _REFRESH_S:
                 continue
@@ -193,9 +192,8 @@ def _on_screen(
             while alarms and now - alarms[0][0] > _ALARM_S:
                 alarms.popleft()
             shown_view = view(taken.engine.session)
-            left_s = hands.left_s(taken.engine.session) if hands else None
-            if left_s is not None:
-                shown_view = replace(shown_view, left_s=left_s)
+            if hands is not None:
+                shown_view = hands.shown(taken.engine.session, shown_view)
             picture.update(
                 screen(
                     shown_view,

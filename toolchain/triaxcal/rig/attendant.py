@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.extras import refuse_missing_packages
 from triaxcal.rig.chamberhand import ChamberHand
 from triaxcal.rig.equipment import Connection
-from triaxcal.rig.events import Event
+from triaxcal.rig.events import Event, View
 from triaxcal.rig.forecast import Forecast, duration
 from triaxcal.rig.instrument import Instrument
 from triaxcal.rig.link import Link
+from triaxcal.rig.orientation import described
 from triaxcal.rig.phases import Warming
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.session import Session
 from triaxcal.rig.tablehand import TableHand
 from triaxcal.rig.watch import Watch
 
+_HANDS_OFF = "HANDS OFF"
 Open = Callable[[], Instrument]
 
 
@@ -51,6 +54,7 @@ class Attendant:
         self._plan = plan
         self._clock = clock
         self._said: list[str] = []
+        self._last = ""
         self._watch = Watch(plan)
         self._alone = alone
         self.forecast = Forecast(plan, equipment.chamber.safe_degc)
@@ -69,11 +73,11 @@ class Attendant:
         self._chamber = None
         if chamber is not None:
             line = link("chamber", chamber[0], own.timeout_s, own.poll_s)
-            self._chamber = ChamberHand(own, line, chamber[1], self._said.append)
+            self._chamber = ChamberHand(own, line, chamber[1], self._say)
         self._table = None
         if table is not None:
             line = link("positioner", table[0], turns.timeout_s, turns.poll_s)
-            self._table = TableHand(turns, line, table[1], limits.attempts, self._said.append)
+            self._table = TableHand(turns, line, table[1], limits.attempts, self._say)
 
     def act(self, session: Session, events: Sequence[Event]) -> None:
         """Do what the session wants.
@@ -84,6 +88,8 @@ class Attendant:
             When the run cannot go on.
         """
         now_s = self._clock()
+        if events:
+            self._last = ""
         if self.forecast.see(now_s, session, events) and not session.done:
             self._said.append(f"left: about {duration(self.left_s(session))}")
         if session.done:
@@ -109,6 +115,19 @@ class Attendant:
         """Predicted seconds to the end."""
         return self.forecast.left_s(self._clock(), session)
 
+    def shown(self, session: Session, seen: View) -> View:
+        """View of a session beside which a person has nothing to do, or less."""
+        seen = replace(seen, left_s=self.left_s(session), last_event=self._last or seen.last_event)
+        if self._table is None or session.done:
+            return seen
+        doing = {
+            "temperature": f"waiting for {session.target_degc:g} degC",
+            "turn": f"turning to {described(self._table.told or str(session.wanted))}",
+        }.get(seen.phase)
+        headline = f"UNATTENDED - {doing}, do not touch" if doing else seen.headline
+        order = seen.order if seen.order.startswith(_HANDS_OFF) else _HANDS_OFF
+        return replace(seen, order=order, headline=headline)
+
     def notes(self) -> list[str]:
         """What was done since last asked, one line each."""
         said = list(self._said)
@@ -119,6 +138,10 @@ class Attendant:
         """Bring chamber and positioner to where they stay; what was done, one line each."""
         hands = [hand for hand in (self._chamber, self._table) if hand is not None]
         return [hand.make_safe() for hand in hands]
+
+    def _say(self, text: str) -> None:
+        self._said.append(text)
+        self._last = text
 
     def _positions(self, session: Session, told: str | None) -> tuple[str, str]:
         """Position to go to, and another one to come from."""

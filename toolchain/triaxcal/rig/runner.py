@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from triaxcal.rig.busload import bits_of
-from triaxcal.rig.events import Command, Event
+from triaxcal.rig.events import Command, Event, View
 from triaxcal.rig.frames import Frames
 from triaxcal.rig.recording import Recording
 from triaxcal.rig.session import Session
@@ -56,6 +56,9 @@ class Hands(Protocol):
     def left_s(self, session: Session, /) -> float | None:
         """Predicted seconds to the end; None where nothing is predicted."""
 
+    def shown(self, session: Session, seen: View, /) -> View:
+        """View of a session as a person beside the hands should see it."""
+
 
 class Robot:
     """Operator of the simulated rig: does what the session wants."""
@@ -79,6 +82,10 @@ class Robot:
 
     def left_s(self, _: Session) -> None:
         """It predicts nothing."""
+
+    def shown(self, _: Session, seen: View) -> View:
+        """It is shown what an operator is shown."""
+        return seen
 
 
 def live(
