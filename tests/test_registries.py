@@ -424,7 +424,7 @@ def test_a_file_with_a_broken_entry_is_named_when_it_is_loaded(
     "registry", [THERMAL_FUNCTIONS, METHODS, EXTENSIONS, OUTPUTS, CORES], ids=lambda r: r.kind
 )
 def test_threads_that_ask_first_get_every_entry(registry: Registry) -> None:  # type: ignore[type-arg]
-    fresh = Registry(registry.kind, registry._package, registry._type)
+    fresh = Registry(registry.kind, registry._packages, registry._type)
     barrier = threading.Barrier(4)
 
     def asked() -> tuple[str, ...]:

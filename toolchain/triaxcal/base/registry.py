@@ -39,8 +39,9 @@ class Registry(Generic[E]):
     ----------
     kind : str
         What an entry is, for messages: "thermal function".
-    package : str
-        Dotted name of the folder; it is read when the entries are first asked for.
+    package : str or tuple of str
+        Dotted name of the folder; it is read when the entries are first asked for. Several, where
+        a room above adds entries that need it.
     entry_type : type
         Class of the entries.
     parts : tuple of str
@@ -49,10 +50,14 @@ class Registry(Generic[E]):
     """
 
     def __init__(
-        self, kind: str, package: str, entry_type: type[E], parts: tuple[str, ...] = ()
+        self,
+        kind: str,
+        package: str | tuple[str, ...],
+        entry_type: type[E],
+        parts: tuple[str, ...] = (),
     ) -> None:
         self.kind = kind
-        self._package = package
+        self._packages = (package,) if isinstance(package, str) else package
         self._type = entry_type
         self._wanted = ("name", "label", "doc", *parts)
         own = [
@@ -104,8 +109,9 @@ class Registry(Generic[E]):
 
     def _loaded(self) -> dict[str, E]:
         found: dict[str, E] = {}
-        package = importlib.import_module(self._package)
-        for module in pkgutil.iter_modules(package.__path__, self._package + "."):
+        folders = [(name, importlib.import_module(name).__path__) for name in self._packages]
+        modules = [m for name, at in folders for m in pkgutil.iter_modules(at, name + ".")]
+        for module in modules:
             try:
                 entry = getattr(importlib.import_module(module.name), "ENTRY", None)
             except Exception as fault:

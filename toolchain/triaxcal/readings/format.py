@@ -135,7 +135,9 @@ class Format:
     rank: int = 100
 
 
-FORMATS = Registry("format", "triaxcal.readings.formats", Format, ("open",))
+FORMATS = Registry(
+    "format", ("triaxcal.readings.formats", "triaxcal.rig.formats"), Format, ("open",)
+)
 
 
 def starts_with(*magic: bytes) -> Callable[[bytes], bool]:

@@ -20,6 +20,8 @@ TIME_UNITS: Mapping[str, float] = MappingProxyType(
     {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, ISO: 1.0}
 )
 
+CAN_LOG = "can"
+"""Format of a log of CAN frames, whose columns a bus description gives."""
 TEMPERATURE_UNITS = ("degC", "K", "degF", "code")
 
 Column = str | int
@@ -143,6 +145,9 @@ class WrittenFile:
         Lines of text that begin with it are ignored.
     decimal
         Decimal sign of text.
+    dbc
+        Bus description (DBC, KCD, SYM, ARXML) of a log of CAN frames, beside it; columns are then
+        signals, as "Message.Signal".
     """
 
     format: str | None = setting(TEXT, None, words="found by the content")
@@ -152,10 +157,13 @@ class WrittenFile:
     skip_rows: int = setting(whole(0, 10**6), 0, "lines")
     comment: str = setting(TEXT, "#")
     decimal: str = setting(word((".", ",")), ".")
+    dbc: str | None = setting(FILE, None, example='"imu.dbc"')
 
     def layout(self, table: str, columns: Sequence[Column]) -> FileLayout:
         """Layout of the file of `table`, of which `columns` will be asked for."""
         written = {f.name: getattr(self, f.name) for f in fields(WrittenFile)}
+        if self.dbc is not None and self.format is None:
+            written["format"] = CAN_LOG
         return FileLayout(table, tuple(columns), **written)
 
 
