@@ -18,7 +18,8 @@ from triaxcal.keytable.catalogue import FILES
     type=click.Choice(tuple(FILES)),
     default="tilter",
     show_default=True,
-    help="What the file describes.",
+    metavar="KIND",
+    help="What the file describes: " + ", ".join(FILES) + ".",
 )
 def init(folder: Path, kind: str) -> None:
     """Write a first, commented file of a unit.

@@ -182,7 +182,7 @@ def status(setup: Setup, sessions: Path | None) -> None:
 @bus_options
 @click.option("--seconds", type=click.FloatRange(1.0, 600.0), default=5.0, show_default=True)
 def check(setup: Setup, bus: BusChoice, seconds: float) -> None:
-    """Check bus, DBC, unit, rate, counters, noise, chamber and positioner."""
+    """Check bus, DBC, unit, rate, noise and instruments."""
     from triaxcal.rig.check import collect, findings  # noqa: PLC0415
     from triaxcal.rig.instrumentcheck import instrument_findings  # noqa: PLC0415
 
