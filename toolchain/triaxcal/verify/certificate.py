@@ -221,7 +221,7 @@ def _statement(work: Workspace, image: Image, axis: int, s: int) -> dict[str, ob
         "functions": functions,
         "ranges": ranges,
         "output_shift": image.output_shift,
-        "scale": f" * (1 * / {2**spare})" if spare else " * 1",
+        "scale": f" * (1 * / {2**spare})" if spare > 0 else f" * (1 * {2**-spare})",
         "rate_fitted": _real(Fraction(float(rate.real[axis]))) if rate else "",
         "sensitivity_fitted": [
             _real(Fraction(float(exact))) for exact in ([] if by_force is None else by_force[axis])
