@@ -29,6 +29,7 @@ KEY, TITLE = "coq", "Coq: error bound"
 
 _HINT = re.compile(r"Hypothesis (a\d+) : ([^\n]*)\.\nLemma (b\d+) : \2\.\n apply \1\.\nQed\.\n")
 _PROVEN_HINT = r"Lemma \3 : \2.\nProof. identity. Qed.\n"
+_VARIABLE = re.compile(r"^Variable _(\w+) : R\.$", re.MULTILINE)
 _END = "End Generated_by_Gappa.\n"
 _LIBRARY = "Require Import Gappa.Gappa_library.\n"
 _AXIOM = re.compile(r"^([\w.]+)(?= :|$)", re.MULTILINE)
@@ -179,6 +180,7 @@ def _certificate(work: Workspace, image: Image, part: str, axis: int, s: int) ->
     context = {
         "file": file,
         "gappa": without_hypotheses(proof + end),
+        "gappa_order": _VARIABLE.findall(proof),
         "low": _real(low),
         "high": _real(high),
         **_statement(work, image, axis, s),
