@@ -26,6 +26,7 @@ from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
 from triaxcal.readings.format import FORMATS, Format
 from triaxcal.rig.instrument import DRIVERS
 from triaxcal.rig.logfile import LOG_FORMATS
+from triaxcal.rig.protection import PROTECTIONS
 from triaxcal.rig.source import SOURCES
 
 DOCS = Path(__file__).parent.parent
@@ -117,6 +118,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "methods": lambda: _named(METHODS),
     "functions": lambda: _named(THERMAL_FUNCTIONS),
     "sources": _sources,
+    "protections": lambda: _named(PROTECTIONS),
     "drivers": _drivers,
     "logs": _logs,
     "commands": _commands,

@@ -23,6 +23,7 @@ from triaxcal.cli.rig_options import (
     session_options,
     simulated,
 )
+from triaxcal.cli.rig_signals import signals
 
 if TYPE_CHECKING:
     from triaxcal.rig.engine import Setup
@@ -303,3 +304,6 @@ def fil(setup: Setup, samples: int, bus: str | None, listen: bool, seed: int) ->
     rate = done.samples / done.seconds
     lost = f"; {done.lost} more were not whole" if done.lost else ""
     click.echo(f"{done.samples} samples bit for bit, {rate:.0f} a second{lost}")
+
+
+rig.add_command(signals)
