@@ -71,7 +71,7 @@ def test_a_dead_output_is_named_and_no_unit_is_blamed():
     data = readings(cubic_truth(), TABLE_TEMPS, sd_v=1e-6)
     dwells = tuple(replace(d, voltage_v=d.voltage_v * [1, 1, 0]) for d in data.dwells)
     message = refusal(MeasurementSet("m.csv", dwells))
-    assert "Uz does not respond to gravity: it stays within 0 mV" in message
+    assert ": Uz does not respond to gravity: it stays within 0 mV" in message
 
 
 @pytest.mark.parametrize(("axis", "name"), [(0, "x"), (1, "y"), (2, "z")])

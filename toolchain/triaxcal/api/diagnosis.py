@@ -8,6 +8,7 @@ from typing import Any
 
 from triaxcal.api.unit import Unit, read_unit
 from triaxcal.base.errors import RefusedError
+from triaxcal.delivery.facewords import diagnosis_by_face
 from triaxcal.delivery.fitted import columns_of
 from triaxcal.diagnosis import Diagnosis
 from triaxcal.diagnosis import diagnose as _diagnose
@@ -77,7 +78,7 @@ def _of_recording(
 
     samples = read_samples(folder, layout, unit.temperature_sensor, columns)
     if layout.faces:
-        return _diagnose(unit, face_measurements(unit, layout, samples))
+        return diagnosis_by_face(_diagnose(unit, face_measurements(unit, layout, samples)))
     one_g = layout.reading_of_1_g
     poses = find_poses(samples, layout, factors=factors(one_g) if one_g else ())
     return diagnose_poses(unit, layout, poses)

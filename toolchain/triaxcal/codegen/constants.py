@@ -13,6 +13,7 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_NAMES, quadratic_log2
 from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.methods.method import INVERSE
+from triaxcal.model.metrological import per
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unit.thermometer import TemperatureSensor
 
@@ -191,18 +192,13 @@ def function_format(plan: Plan, f: int) -> tuple[str, float, int]:
     gain = f % 4 < 3
     if shape.inverse is not None:
         bits = shape.inverse.scale_log2 - shape.output_q - shape.output_shift if gain else 0
-        return (_per(reading, unit) if gain else reading, 2.0**-bits * plan.volts_per_lsb, bits)
+        return (per(reading, unit) if gain else reading, 2.0**-bits * plan.volts_per_lsb, bits)
     bits = shape.output_q + shape.output_shift - (0 if gain else 32)
     return (
-        _per(unit, reading) if gain else unit,
+        per(unit, reading) if gain else unit,
         2.0**-bits / (plan.volts_per_lsb if gain else 1.0),
         bits,
     )
-
-
-def _per(unit: str, by: str) -> str:
-    """A unit by another: m/s^2 by g is (m/s^2)/g."""
-    return "/".join(f"({name})" if "/" in name else name for name in (unit, by))
 
 
 def _raw_unit(plan: Plan, f: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from triaxcal.base.plaindata import plain
 from triaxcal.base.tomltable import content_of, text_of
 from triaxcal.delivery.causes import refuse_certain_fault, with_cause
 from triaxcal.delivery.coderange import settled_codes
+from triaxcal.delivery.facewords import by_face, named_by_face
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.delivery.posecauses import refuse_certain_fault_of_poses, with_pose_cause
 from triaxcal.fitting.core.calibration import Calibration
@@ -69,7 +70,9 @@ def fit_folder(unit: UnitDescription, folder: Path) -> Fitted:
         # SciPy's optimizers take as long to import as a whole tilter's calibration does.
         from triaxcal.fitting.route import calibrate_recording  # noqa: PLC0415
 
-        unit, measurements, calibration = calibrate_recording(unit, unit.recording, folder)
+        with named_by_face(unit):
+            unit, measurements, calibration = calibrate_recording(unit, unit.recording, folder)
+        calibration = _findings_by_face(unit, calibration)
     else:
         measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
         calibration = _of_tilter(unit, measurements, _stated_pair(unit, folder))
@@ -85,6 +88,12 @@ def _stated_pair(unit: UnitDescription, folder: Path) -> PairTerms | None:
     from triaxcal.fitting.pair.cross_coupling import stated_pair  # noqa: PLC0415
 
     return stated_pair(unit, folder)
+
+
+def _findings_by_face(unit: UnitDescription, calibration: Calibration) -> Calibration:
+    if unit.recording is None or not unit.recording.faces:
+        return calibration
+    return replace(calibration, notes=tuple(map(by_face, calibration.notes)))
 
 
 def _of_tilter(
@@ -125,7 +134,11 @@ def fit_columns(unit: UnitDescription, readings: Any) -> Fitted:
             digest.update(
                 f"{name} {hashlib.sha256(np.asarray(values).tobytes()).digest()!r}".encode()
             )
-        unit, measurements, calibration = calibrate_recording(unit, unit.recording, Path(), columns)
+        with named_by_face(unit):
+            unit, measurements, calibration = calibrate_recording(
+                unit, unit.recording, Path(), columns
+            )
+        calibration = _findings_by_face(unit, calibration)
     else:
         measurements = measurements_of(columns, unit)
         digest.update(json_bytes(plain(measurements)))
@@ -156,6 +169,11 @@ def refuse_beyond_limits(fitted: Fitted) -> None:
     RefusedError
         Names the readings at fault, or the thermal function, and what to do.
     """
+    with named_by_face(fitted.unit):
+        _refuse_beyond_limits(fitted)
+
+
+def _refuse_beyond_limits(fitted: Fitted) -> None:
     if fitted.calibration.recording is None:
         parts = fitted.unit, fitted.measurements, fitted.calibration
         try:

@@ -264,9 +264,12 @@ def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
 def answered(suspects: Iterable[Suspect], sound: Left, *, checks: bool = True) -> Diagnosis:
     """What is said of causes at their places, in any order; without `checks` some look alike."""
     # Two causes go first only where they are clearly more probable than one.
-    ranked = sorted(
+    of_name: dict[str, Suspect] = {}
+    for suspect in sorted(
         suspects, key=lambda s: (MARGIN if s.cause == TOGETHER else 0.0) - s.log_evidence
-    )
+    ):
+        of_name.setdefault(suspect.name, suspect)  # places without a name of their own are one
+    ranked = list(of_name.values())
     best = ranked[0]
     answer = [
         s

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.diagnosis.causes.registry import CAUSES
-from triaxcal.diagnosis.core.cause import Cause, Known
+from triaxcal.diagnosis.core.cause import DwellCause, Known
 from triaxcal.diagnosis.core.curves import standing_force
 from triaxcal.diagnosis.core.evidence import Judged, climb, judge, linked, sensible
 from triaxcal.diagnosis.core.pair import Pair
@@ -72,7 +72,7 @@ class Sound:
 class Ranked:
     """A cause with the places where it was judged, the best first."""
 
-    cause: Cause
+    cause: DwellCause
     places: tuple[Judged, ...]
 
     @property
@@ -194,7 +194,7 @@ def _sound(readings: Readings) -> Sound:
     return Sound(standing_force(readings, fit.theta), system, fit, scales)
 
 
-def _screened(known: Known, screen: Screen) -> list[tuple[Cause, list[Screened]]]:
+def _screened(known: Known, screen: Screen) -> list[tuple[DwellCause, list[Screened]]]:
     """Causes with their places, the most probable ones first."""
     scored = [
         (
@@ -209,7 +209,7 @@ def _screened(known: Known, screen: Screen) -> list[tuple[Cause, list[Screened]]
 
 
 def _careful(
-    cause: Cause, screened: list[Screened], readings: Readings, theta: FloatArray
+    cause: DwellCause, screened: list[Screened], readings: Readings, theta: FloatArray
 ) -> Ranked:
     best = screened[0].log_evidence
     # Those with the same words are the same place with another strength.

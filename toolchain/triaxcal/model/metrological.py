@@ -89,3 +89,8 @@ def worst_force_error_g(
     gain_error = np.abs(found[0] - exact[0]).sum(axis=-1)
     worst: FloatArray = gain_error * voltage_max_v + np.abs(found[1] - exact[1])
     return worst
+
+
+def per(unit: str, by: str) -> str:
+    """A unit by another: m/s^2 by g is (m/s^2)/g."""
+    return "/".join(f"({name})" if "/" in name else name for name in (unit, by))

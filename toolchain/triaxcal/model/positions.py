@@ -37,3 +37,10 @@ def specific_force_g(position: str, gravity_g: float) -> FloatArray:
     `gravity_g` is the local gravity in the same unit.
     """
     return np.array(TEST_POSITIONS[position], dtype=np.float64) * gravity_g
+
+
+def position_of(face: str) -> str:
+    """Test position in which an axis, as "+x", points up."""
+    axis = AXES.index(face[1])
+    sign = 1 if face[0] == "+" else -1
+    return next(name for name, force in TEST_POSITIONS.items() if force[axis] == sign)

@@ -199,6 +199,13 @@ def _format_of(path: Path, layout: FileLayout) -> Format:
         except RefusedError as unknown:
             where = f"{path}, [{layout.table}] format"
             raise RefusedError(where, unknown.found, expected=unknown.expected) from None
+    if path.is_dir() and not (path / _FOLDERS_FILE).is_file():
+        raise RefusedError(
+            str(path),
+            f"a folder without {_FOLDERS_FILE}",
+            expected="a recording: a file, or the folder of a ROS 2 bag",
+            remedy="name the file in it",
+        )
     try:
         # Of a folder, as ROS 2 writes bags, the file that describes it is asked.
         with (path / _FOLDERS_FILE if path.is_dir() else path).open("rb") as file:

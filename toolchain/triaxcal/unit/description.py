@@ -132,6 +132,12 @@ class UnitDescription:
     priors: Priors = field(default_factory=Priors)
     firmware_terms: str = AUTO
     prefix: str = DEFAULT_PREFIX
+
+    @property
+    def reading_unit(self) -> str:
+        """Unit of the readings: V, or that of the recording."""
+        return "V" if self.recording is None else self.recording.acceleration_unit
+
     nominal_v_per_g: tuple[float, float, float] | None = None
     nominal_tolerance: float = 0.2
     gravity_difference_m_per_s2: float | None = None

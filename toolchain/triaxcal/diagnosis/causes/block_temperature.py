@@ -46,7 +46,7 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
             if not _inside(new).all() or abs(new.mean() - old.mean()) < _LEAST_DEGC:
                 continue
             rows = readings.rows[own]
-            name = "a sign too many" if form == _SIGN and old.mean() < 0.0 else form
+            name = "a minus sign too many" if form == _SIGN and old.mean() < 0.0 else form
             where = rows_in_words(rows)
             ways, shared = (len(together), 2.5) if any(some is t for t in together) else (0, 1.0)
             yield Hypothesis(

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from triaxcal.base.registry import Registry
-from triaxcal.diagnosis.core.cause import Cause
+from triaxcal.diagnosis.core.cause import Cause, DwellCause
 
-CAUSES = Registry("cause", "triaxcal.diagnosis.causes", Cause, ("apart",))
+CAUSES: Registry[DwellCause] = Registry("cause", "triaxcal.diagnosis.causes", Cause, ("apart",))

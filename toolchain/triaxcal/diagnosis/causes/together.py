@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from triaxcal.diagnosis.core.cause import Cause
+from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known
 
-ENTRY = Cause(
+ENTRY: Cause[Known, Hypothesis] = Cause(
     name="together",
     label="two causes at once",
     doc="No cause explains the readings alone; two together do, best those that are named.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,10 @@ Size = float | FloatArray
 SIZES_G = (0.5e-3, 5e-3, 50e-3, 500e-3)
 """Prior standard deviations of an amplitude; each as probable as the others."""
 _SMALL = 1e-5
+K = TypeVar("K")
+"""What the hypotheses are made of: `Known`, or `poses.core.cause.KnownPoses`."""
+H = TypeVar("H")
+"""A place of the cause: `Hypothesis`, or `poses.core.cause.PoseHypothesis`."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +173,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Cause:
+class Cause(Generic[K, H]):
     """One kind of mistake.
 
     Attributes
@@ -197,7 +201,7 @@ class Cause:
     name: str
     label: str
     doc: str
-    hypotheses: Callable[[Any], Iterable[Any]]
+    hypotheses: Callable[[K], Iterable[H]]
     apart: str
     discrete: bool = False
     spoils: bool = False
@@ -206,7 +210,11 @@ class Cause:
     rank: int = 100
 
 
-def name_of(cause: Cause, hypothesis: Hypothesis) -> str:
+DwellCause: TypeAlias = "Cause[Known, Hypothesis]"
+"""A cause of the dwells of a tilter, or of faces."""
+
+
+def name_of(cause: DwellCause, hypothesis: Hypothesis) -> str:
     """Label and place, in words."""
     if not hypothesis.place:
         return cause.label

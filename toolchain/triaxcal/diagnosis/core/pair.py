@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Size, either, name_of
+from triaxcal.diagnosis.core.cause import DwellCause, Hypothesis, Size, either, name_of
 from triaxcal.diagnosis.core.evidence import FAULT_LOG_ODDS, Judged
 from triaxcal.diagnosis.core.readings import Readings
 from triaxcal.model.types import FloatArray
@@ -27,7 +27,7 @@ class Pair:
         About the readings without the first.
     """
 
-    causes: tuple[Cause, Cause]
+    causes: tuple[DwellCause, DwellCause]
     first: Judged
     second: Hypothesis
 

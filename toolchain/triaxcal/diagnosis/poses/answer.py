@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.diagnosis.answer import Amplitude, Diagnosis, Suspect, answered
-from triaxcal.diagnosis.core.cause import Cause
 from triaxcal.diagnosis.poses.causes.registry import POSE_CAUSES
-from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseHypothesis
+from triaxcal.diagnosis.poses.core.cause import KnownPoses, PoseCause, PoseHypothesis
 from triaxcal.diagnosis.poses.core.evidence import JudgedPoses, Quick, SoundPoses, fit_of, judge
 from triaxcal.diagnosis.poses.core.readings import PoseReadings, pose_readings
 from triaxcal.diagnosis.remaining import in_words
@@ -134,7 +133,7 @@ def _standing_out(
     return tuple(int(k) for k in np.argsort(-gain, kind="stable")[:_ODD])
 
 
-def _suspect(cause: Cause, judged: JudgedPoses, base: float) -> Suspect:
+def _suspect(cause: PoseCause, judged: JudgedPoses, base: float) -> Suspect:
     hypothesis = judged.hypothesis
     amplitudes = tuple(
         Amplitude(p.name, p.unit, float(v) * p.per_unit, float(sd) * p.per_unit, abs(v) * p.moves_g)

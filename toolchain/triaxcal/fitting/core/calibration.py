@@ -10,7 +10,7 @@ from triaxcal.fitting.core.fieldupdate import Update
 from triaxcal.fitting.core.judged import HeldOutTest, OwnSquares, RunRepeatability
 from triaxcal.fitting.core.recorded import PairTerms, RecordingFit
 from triaxcal.model.curves import ThermalModel
-from triaxcal.model.metrological import pack_blocks
+from triaxcal.model.metrological import pack_blocks, per
 from triaxcal.model.terms import NO_TERMS, Terms
 from triaxcal.model.thermal.shape import ThermalShape
 from triaxcal.model.types import FloatArray
@@ -176,8 +176,7 @@ class Calibration:
     @property
     def gain_unit(self) -> str:
         """Unit of K."""
-        unit = self.reading_unit
-        return f"({unit})/g" if "/" in unit else f"{unit}/g"
+        return per(self.reading_unit, "g")
 
     def constants_covariance(self, temp_degc: FloatArray | float) -> FloatArray:
         """Covariance of the curves' constants, (..., 12, 12), at temperatures of shape (...)."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import did_you_mean, shown
-from triaxcal.model.positions import AXES, TEST_POSITIONS
+from triaxcal.model.positions import AXES, position_of
 from triaxcal.model.thermal.shape import GROUP_GAP_DEGC
 from triaxcal.poses.stated import refuse_wrong_unit
 from triaxcal.poses.steps import Steps
@@ -103,13 +103,6 @@ def _dwell(
         count=None,
         sd_v=None,
     )
-
-
-def position_of(face: str) -> str:
-    """Test position in which an axis, as "+x", points up."""
-    axis = AXES.index(face[1])
-    sign = 1 if face[0] == "+" else -1
-    return next(name for name, force in TEST_POSITIONS.items() if force[axis] == sign)
 
 
 def _refuse_moving(samples: Samples, run: Run, one_g: float) -> None:

@@ -82,9 +82,11 @@ def calibrate(
     terms = NO_TERMS if pair is None else Terms(pair.quadratic)
     refuse_unbelievable_temperatures(unit, measurements)
     groups = group_dwells(measurements, unit.t0_degc)
-    refuse_silent_outputs(measurements)
+    reading = unit.reading_unit
+    refuse_silent_outputs(measurements, reading)
     refuse_mistaken_units(measurements)
-    refuse_exchanged_positions(measurements.source, groups, unit.polarity, unit.nominal_v_per_g)
+    signs = unit.polarity, unit.nominal_v_per_g
+    refuse_exchanged_positions(measurements.source, groups, *signs, reading)
     _refuse_singular(measurements.source, groups, unit.gravity_g)
     refuse_other_sensitivity(unit, measurements.source, groups)
     squares = own_squares(unit, groups)

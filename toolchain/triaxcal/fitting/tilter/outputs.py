@@ -15,8 +15,10 @@ _COPY = 1e-6
 """Share of an output's span by which its copy differs at most: the rounding of a file."""
 
 
-def refuse_silent_outputs(measurements: MeasurementSet) -> None:
+def refuse_silent_outputs(measurements: MeasurementSet, reading_unit: str = "V") -> None:
     """Refuse an output that does not change, or that repeats another one.
+
+    `reading_unit` is that of the readings.
 
     Raises
     ------
@@ -30,9 +32,10 @@ def refuse_silent_outputs(measurements: MeasurementSet) -> None:
     remedy = "check the wiring and the columns of the readings"
     for i in np.flatnonzero(spans <= DEAD_OUTPUT * spans[liveliest]).tolist():
         raise RefusedError(
-            f"{measurements.source}, U{AXES[i]}",
-            f"U{AXES[i]} does not respond to gravity: it stays within {spans[i] * 1e3:.3g} mV in "
-            f"all dwells, while U{AXES[liveliest]} changes by {spans[liveliest] * 1e3:.4g} mV",
+            measurements.source,
+            f"U{AXES[i]} does not respond to gravity: it stays within "
+            f"{_size(spans[i], reading_unit, 3)} in all dwells, while U{AXES[liveliest]} changes "
+            f"by {_size(spans[liveliest], reading_unit, 4)}",
             expected=expected,
             remedy=remedy,
         )
@@ -40,7 +43,7 @@ def refuse_silent_outputs(measurements: MeasurementSet) -> None:
         for sign, word in ((1.0, "repeats"), (-1.0, "is the negative of")):
             if np.ptp(readings[:, j] - sign * readings[:, i]) <= _COPY * spans[i]:
                 raise RefusedError(
-                    f"{measurements.source}, U{AXES[j]}",
+                    measurements.source,
                     f"U{AXES[j]} {word} U{AXES[i]} in all dwells",
                     expected=expected,
                     remedy=remedy,
@@ -74,6 +77,10 @@ def refuse_mistaken_units(measurements: MeasurementSet) -> None:
                 expected="one unit throughout",
                 remedy="V taken for mV, or mV for V? convert these rows",
             )
+
+
+def _size(value: float, unit: str, digits: int) -> str:
+    return f"{value * 1e3:.{digits}g} mV" if unit == "V" else f"{value:.{digits}g} {unit}"
 
 
 def _temps(temps: list[float]) -> str:

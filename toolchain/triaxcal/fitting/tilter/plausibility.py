@@ -29,6 +29,7 @@ import numpy as np
 from triaxcal.base.errors import ContradictionError
 from triaxcal.fitting.core.grouping import TemperatureGroup
 from triaxcal.fitting.tilter.estimators import DEAD_OUTPUT
+from triaxcal.model.metrological import per
 from triaxcal.model.positions import AXES, TEST_POSITIONS
 from triaxcal.model.types import FloatArray
 
@@ -47,6 +48,7 @@ def refuse_exchanged_positions(
     groups: tuple[TemperatureGroup, ...],
     polarity: tuple[int, int, int] | None,
     nominal_v_per_g: tuple[float, float, float] | None = None,
+    reading_unit: str = "V",
 ) -> None:
     """Refuse groups in which two positions look exchanged, and name the two.
 
@@ -56,6 +58,7 @@ def refuse_exchanged_positions(
         Signs of Kxx, Kyy, Kzz; None means that all three are alike.
     nominal_v_per_g : tuple of three floats, or None
         Where the signs come from it, it is the key that is named.
+    reading_unit : str
 
     Raises
     ------
@@ -71,7 +74,7 @@ def refuse_exchanged_positions(
     first = next(pairs for pairs in found if pairs)
     spoiled = [g for g, pairs in zip(groups, found, strict=True) if pairs == first]
     if all(pairs == first for pairs in found) and all(p in _AXIS_PAIRS for p in first):
-        _refuse_signs(source, groups, polarity, nominal_v_per_g)
+        _refuse_signs(source, groups, polarity, nominal_v_per_g, reading_unit)
     row_of = [(spoiled[0].dwells[a].row, spoiled[0].dwells[b].row) for a, b in first]
     rows = "; ".join(f"rows {min(r)} and {max(r)}" for r in row_of)
     remedy = f"exchange {'the positions of these rows' if len(first) == 1 else 'them back'}"
@@ -80,8 +83,8 @@ def refuse_exchanged_positions(
     raise ContradictionError(
         f"{source}, {rows}",
         f"{_exchanged(first)} look exchanged at {_temps([g.temp_degc for g in spoiled])} degC: "
-        f"Kxx, Kyy, Kzz are {_diagonal(spoiled[0], ())} V/g as recorded, "
-        f"{_diagonal(spoiled[0], first)} V/g with the exchange undone",
+        f"Kxx, Kyy, Kzz are {_diagonal(spoiled[0], ())} {per(reading_unit, 'g')} as recorded, "
+        f"{_diagonal(spoiled[0], first)} {per(reading_unit, 'g')} with the exchange undone",
         expected="each output to follow the force along its own axis",
         remedy=remedy,
     )
@@ -92,6 +95,7 @@ def _refuse_signs(
     groups: tuple[TemperatureGroup, ...],
     polarity: tuple[int, int, int] | None,
     nominal_v_per_g: tuple[float, float, float] | None,
+    reading_unit: str,
 ) -> None:
     """Signs that differ at every temperature: positions, a turn of the unit, or its polarity.
 
@@ -118,8 +122,8 @@ def _refuse_signs(
     raise ContradictionError(
         place,
         f"{names} {'has' if len(wrong) == 1 else 'have'} the wrong sign at every temperature: "
-        f"Kxx, Kyy, Kzz are {_diagonal(groups[0], ())} V/g; the readings cannot tell {ways} from "
-        "polarity",
+        f"Kxx, Kyy, Kzz are {_diagonal(groups[0], ())} {per(reading_unit, 'g')}; the readings "
+        f"cannot tell {ways} from polarity",
         expected=expected,
         remedy="see how the unit was seated and correct the positions; only if it has this "
         f"polarity, set {_key(signs, nominal_v_per_g)} under [sensor] in unit.toml",

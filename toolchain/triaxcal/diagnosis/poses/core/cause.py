@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
-from triaxcal.diagnosis.core.cause import SIZES_G, Parameter
+from triaxcal.diagnosis.core.cause import SIZES_G, Cause, Parameter
 from triaxcal.diagnosis.poses.core.readings import PoseReadings
 from triaxcal.fitting.core.noise import NoisePrior
 from triaxcal.fitting.recorded.wrong import WrongPoses
@@ -87,3 +88,7 @@ class KnownPoses:
     wrong: WrongPoses | None
     priors: Priors
     unit: str
+
+
+PoseCause: TypeAlias = Cause[KnownPoses, PoseHypothesis]
+"""A cause of the poses of a recording."""
