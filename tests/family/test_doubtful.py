@@ -183,7 +183,7 @@ def labelled(turn_deg: float = 0.0, labels: tuple[str, ...] = LABELS) -> str:
 def test_a_face_that_is_turned_is_told_with_the_face_opposite(tmp_path: Path) -> None:
     folder = write_unit(tmp_path / "U", labelled(5.0), f"{COLUMNS}\n{FACES}")
     told = findings(folder)
-    assert "TP2 (-y up, row 7) or TP4 (+y up, row 17) at 20 degC contradicts" in told
+    assert "face -y (row 7) or face +y (row 17) at 20 degC contradicts" in told
     # 5 deg are 87.2 mg; the placement of the others, 0.2 mg, reaches it through the constants.
     size = re.search(r"contradicts the other positions by ([\d.]+) mg", told)
     assert size is not None

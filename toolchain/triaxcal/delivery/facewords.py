@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     from triaxcal.diagnosis.answer import Diagnosis, Suspect
 
 _FACE_OF = {position_of(face): f"face {face}" for face in FACES}
-_POSITION = re.compile(rf"\b({'|'.join(_FACE_OF)})\b")
+_POSITION = re.compile(rf"\b({'|'.join(_FACE_OF)})\b( \([+-][xyz] up, )?")
+"""A position, perhaps with the face beside it: "TP2 (-y up, row 7)"."""
 
 
 def by_face(text: str) -> str:
     """Text with faces in place of test positions: "face +z" for "TP1"."""
-    return _POSITION.sub(lambda found: _FACE_OF[found[1]], text)
+    return _POSITION.sub(lambda found: _FACE_OF[found[1]] + (" (" if found[2] else ""), text)
 
 
 @contextmanager
