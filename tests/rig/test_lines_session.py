@@ -111,6 +111,7 @@ def codes_of(number, codes, temp):
     return ";".join(map(str, (number % 256, 0, *codes, temp)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("description", "text", "rounding_code"),
     [
@@ -166,6 +167,7 @@ def test_lines_that_are_none_are_counted(tmp_path):
     assert sorted(samples.trouble.tolist()) == [1, 1, 5 - 1]  # two of another form, one no number
 
 
+@pytest.mark.long
 def test_a_recorded_session_is_replayed_from_its_lines(tmp_path):
     """SIGKILL in the middle, as far as the files know; then go on, and replay all."""
     setup = lines_setup(tmp_path, CODES)

@@ -88,6 +88,7 @@ def test_durations(seconds, words):
     assert duration(seconds) == words
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("order", "said"),
     [
@@ -168,25 +169,28 @@ silence_max_s = 30
 
 CYCLES = {"cycle_k": 2.0, "cycle_s": 60.0}
 SLIPS = [f"slip@{at}:150" for at in range(84, 900, 23)]
+STOPS = [
+    (["deaf@0:1:9999"], {}, r"(chamber|positioner): .*: no answer within 5 s \(tried 3 t"),
+    (["kelvin@0:1:9999"], {}, r"chamber: answers 293.15, which is K: the unit is at 2\d.\d"),
+    (["runaway@200:40:9999"], {}, r"chamber: (it|the unit) is at [23]\d.\d degC; expected 15"),
+    (["halt@85:1:9999"], {}, r"positioner: .*, not there after 20 s: it answers 4\d \(tri"),
+    (["astray@85:1:9999"], {}, r"positioner: .*, not there after 20 s: it answers \d \(tried"),
+    (["linkdown@200:1:9999"], {}, r"unattended run: no readings for 30 s; what was accepted"),
+]  # fmt: skip
+MORE_STOPS = [
+    (["deaf@200:1:9999"], {}, r"(chamber|positioner): .*no answer within 5 s \(tried 3 tim"),
+    (["kelvin@200:1:9999"], {}, r"chamber: it is at 29\d.\d degC; expected 15.0 to 25.\d d"),
+    ([], CYCLES, r"no equilibrium at 20 degC within 300 s: \d+.\d\d degC, [-+]\d.\d+ K"),
+    (["status@10:2:9999"], {}, r"not learned within 160 s: the rig reports status 0x02"),
+    (["status@85:2:9999"], {}, r"run: TP\d was not at rest within 100 s: the rig reports sta"),
+    (SLIPS, {}, r"unattended run: at 20 degC 3 times, the last time: TP\d: [a-z]+ of"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("orders", "settings", "said"),
-    [
-        (["deaf@0:1:9999"], {}, r"(chamber|positioner): .*: no answer within 5 s \(tried 3 t"),
-        (["deaf@200:1:9999"], {}, r"(chamber|positioner): .*no answer within 5 s \(tried 3 tim"),
-        (["kelvin@0:1:9999"], {}, r"chamber: answers 293.15, which is K: the unit is at 2\d.\d"),
-        (["kelvin@200:1:9999"], {}, r"chamber: it is at 29\d.\d degC; expected 15.0 to 25.\d d"),
-        (["runaway@200:40:9999"], {}, r"chamber: (it|the unit) is at [23]\d.\d degC; expected 15"),
-        (["halt@85:1:9999"], {}, r"positioner: .*, not there after 20 s: it answers 4\d \(tri"),
-        (["astray@85:1:9999"], {}, r"positioner: .*, not there after 20 s: it answers \d \(tried"),
-        (["linkdown@200:1:9999"], {}, r"unattended run: no readings for 30 s; what was accepted"),
-        ([], CYCLES, r"no equilibrium at 20 degC within 300 s: \d+.\d\d degC, [-+]\d.\d+ K"),
-        (["status@10:2:9999"], {}, r"not learned within 160 s: the rig reports status 0x02"),
-        (["status@85:2:9999"], {}, r"run: TP\d was not at rest within 100 s: the rig reports sta"),
-        (SLIPS, {}, r"unattended run: at 20 degC 3 times, the last time: TP\d: [a-z]+ of"),
-    ],
-)  # fmt: skip
+    [*STOPS, *(pytest.param(*case, marks=pytest.mark.long) for case in MORE_STOPS)],
+)
 def test_what_stays_wrong_stops_the_run_with_its_reason(tmp_path, orders, settings, said):
     setup = setup_with(tmp_path, LIMITS + "attempts = 3\n", temps="[20, 25]")
     rig, hands = run(setup, *orders, **settings)
@@ -216,6 +220,7 @@ def test_what_a_person_must_do_is_refused_at_the_start(tmp_path):
     attendant(setup_with(tmp_path, tables, temps="[20]").plan, lambda: 0.0)
 
 
+@pytest.mark.long
 def test_the_screen_asks_nobody_to_turn(tmp_path):
     setup = short_setup(tmp_path)
     rig, hands = run(setup)
@@ -264,6 +269,7 @@ def test_instruments_are_asked_beside_the_loop(tmp_path):
     assert rig.target_degc == 23.0
 
 
+@pytest.mark.long
 def test_beside_a_person_the_chamber_alone_is_set(tmp_path):
     """A person turns the unit; the bench sets the chamber and does not stop by its own limits."""
     setup = setup_with(tmp_path, LIMITS.replace("= 300", "= 10") + "attempts = 1\n")
