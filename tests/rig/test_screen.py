@@ -19,8 +19,8 @@ from triaxcal.rig.engine import Engine
 from triaxcal.rig.events import Agree, Redo
 from triaxcal.rig.runner import Robot
 from triaxcal.rig.screen import (
-    _ALARM,
-    _COLOURS,
+    ALARM,
+    COLOURS,
     HELP,
     About,
     BusView,
@@ -121,7 +121,7 @@ def test_pages_take_the_place_of_the_readings(states):
 def test_colours_differ_for_the_colour_blind():
     """Backgrounds, by the luminance and the blue-yellow axis, which every common kind keeps."""
     found = {}
-    for name, style in {"alarm": _ALARM, **_COLOURS}.items():
+    for name, style in {"alarm": ALARM, **COLOURS}.items():
         colour = Style.parse(style).bgcolor
         assert colour is not None
         r, g, b = (v / 255 for v in colour.get_truecolor())

@@ -20,6 +20,7 @@ from triaxcal.cli.rig_options import (
     bus_options,
     open_source,
     refuse_missing_bench,
+    run_options,
     session_options,
     simulated,
 )
@@ -27,6 +28,7 @@ from triaxcal.cli.rig_signals import signals
 
 if TYPE_CHECKING:
     from triaxcal.rig.engine import Setup
+    from triaxcal.rig.manysetup import ManySetup
 
 _SAID = {True: "good ", False: "WRONG", None: "note "}
 
@@ -43,28 +45,34 @@ def rig() -> None:
     epilog=example(
         "triaxcal rig run --bus can0 --unit AT-7",
         "triaxcal rig run --bus virtual --unit AT-SIM-BENCH --plain",
+        "triaxcal rig run --plan chamber.toml --unattended",
     )
 )
-@session_options
-@bus_options
+@run_options
 @SESSIONS
 @PLAIN
 @UNATTENDED
-def run(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool, unattended: bool) -> None:
-    """Guide a session through the plan.
+def run(
+    setup: Setup | ManySetup, bus: BusChoice, sessions: Path | None, plain: bool, unattended: bool
+) -> None:
+    """Guide a session through the plan, of one unit or of those that it lists.
 
-    It ends with measurements.csv in the unit's folder.
+    It ends with measurements.csv in the folder of each unit.
     """
     from triaxcal.cli.rig_live import guide  # noqa: PLC0415
+    from triaxcal.cli.rig_many import guide_many  # noqa: PLC0415
+    from triaxcal.rig.manysetup import ManySetup  # noqa: PLC0415
     from triaxcal.rig.recording import next_folder  # noqa: PLC0415
 
-    source = open_source(setup, bus)
-    guide(setup, source, next_folder(sessions or setup.folder / "sessions"), plain, unattended)
+    folder = next_folder(sessions or setup.sessions)
+    if isinstance(setup, ManySetup):
+        guide_many(setup, bus, folder, plain, unattended)
+    else:
+        guide(setup, open_source(setup, bus), folder, plain, unattended)
 
 
 @rig.command(epilog=example("triaxcal rig resume --bus can0 --unit AT-7"))
-@session_options
-@bus_options
+@run_options
 @SESSIONS
 @PLAIN
 @click.option(
@@ -72,7 +80,7 @@ def run(setup: Setup, bus: BusChoice, sessions: Path | None, plain: bool, unatte
 )
 @UNATTENDED
 def resume(
-    setup: Setup,
+    setup: Setup | ManySetup,
     bus: BusChoice,
     sessions: Path | None,
     *,
@@ -82,8 +90,13 @@ def resume(
 ) -> None:
     """Go on with the last session, whatever ended it."""
     from triaxcal.cli.rig_live import guide  # noqa: PLC0415
+    from triaxcal.cli.rig_many import guide_many  # noqa: PLC0415
+    from triaxcal.rig.manysetup import ManySetup  # noqa: PLC0415
 
-    folder = _last_session(sessions or setup.folder / "sessions")
+    folder = _last_session(sessions or setup.sessions)
+    if isinstance(setup, ManySetup):
+        guide_many(setup, bus, folder, plain, unattended)
+        return
     _mend(setup, folder, mend)
     guide(setup, open_source(setup, bus), folder, plain, unattended)
 
@@ -164,7 +177,7 @@ def status(setup: Setup, sessions: Path | None) -> None:
     from triaxcal.rig.journal import read_journal  # noqa: PLC0415
     from triaxcal.rig.recording import JOURNAL_FILE, durable_events, session_folders  # noqa: PLC0415
 
-    root = sessions or setup.folder / "sessions"
+    root = sessions or setup.sessions
     for folder in session_folders(root):
         found = read_journal(folder / JOURNAL_FILE)
         dwells = [e for e in durable_events(found.records) if e.dwell is not None]

@@ -32,8 +32,15 @@ def hands_of(setup: Setup, source: Source, unattended: bool) -> Iterator[Hands |
         hands = attendant(setup.plan, lambda: float(rig.seconds), at_once=True)
     else:
         hands = attendant(setup.plan, time.monotonic, alone=unattended)
-    try:
+    with made_safe(hands):
         yield hands
+
+
+@contextlib.contextmanager
+def made_safe(hands: Attendant) -> Iterator[None]:
+    """Chamber and positioner are brought to safety at the end, whatever ends it."""
+    try:
+        yield
     finally:
         with _uninterrupted():
             _end(hands)

@@ -46,7 +46,7 @@ _ALARM_S = 10.0
 _PAGES = {"?": "help", "h": "help", "f": "faults"}
 
 
-class _Stop(Exception):  # noqa: N818  not an error
+class Stop(Exception):  # noqa: N818  not an error
     """The operator wants to stop."""
 
 
@@ -71,7 +71,7 @@ class Operator:
             position = f"{'C' if self._of_checks else 'T'}P{key}"
             self._of_checks = key == "c"
             if key == "q":
-                raise _Stop
+                raise Stop
             if key == "y":
                 words.append(Agree())
             elif key in _PAGES:
@@ -90,7 +90,7 @@ def guide(
         taken = recording.Recording(setup, folder, source.name)
         try:
             log = _guided(taken, source, hands, plain, start)
-        except (_Stop, KeyboardInterrupt):
+        except (Stop, KeyboardInterrupt):
             click.echo(f"stopped; go on with: triaxcal rig resume --unit {setup.folder}", err=True)
             sys.exit(1)
         finally:

@@ -17,6 +17,7 @@ from triaxcal.rig.source import SOURCES, Wanted, kind_of
 
 if TYPE_CHECKING:
     from triaxcal.rig.engine import Setup
+    from triaxcal.rig.manysetup import ManySetup
     from triaxcal.rig.source import Source, SourceKind
 
 _DEFAULT_PLAN = "five-temperatures.toml"
@@ -34,6 +35,24 @@ def _optioned(command: Callable[..., None], *options: Callable[..., Any]) -> Cal
     return command
 
 
+_SESSION = (
+    click.option("--plan", type=click.Path(path_type=Path), help="TOML file of the session."),
+    click.option(
+        "--dbc",
+        type=click.Path(path_type=Path),
+        help="Bus description in place of the one that the rig description names.",
+    ),
+)
+_SIMULATED = (
+    click.option(
+        "--fault",
+        multiple=True,
+        help="Faults of the simulated rig: kind@s[:value[:s]], of one of many units UNIT/kind@s.",
+    ),
+    click.option("--seed", type=int, default=1, help="Seed of the simulated rig."),
+)
+
+
 def session_options(command: Callable[..., None]) -> Callable[..., None]:
     """Options that say what the session is about; `command` gets them as its `setup`."""
 
@@ -45,13 +64,59 @@ def session_options(command: Callable[..., None]) -> Callable[..., None]:
     return _optioned(
         with_setup,
         click.option("--unit", required=True, type=UnitFolder(), help="Folder, or name in units/."),
-        click.option("--plan", type=click.Path(path_type=Path), help="TOML file of the session."),
-        click.option(
-            "--dbc",
-            type=click.Path(path_type=Path),
-            help="Bus description in place of the one that the rig description names.",
-        ),
+        *_SESSION,
     )
+
+
+def run_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options of a session of one unit, or of the units that a plan lists.
+
+    `command` gets them as its `setup`, a Setup or a ManySetup, and its `bus`.
+    """
+
+    @wraps(command)
+    def with_both(  # noqa: PLR0917
+        unit: Path | None,
+        plan: Path | None,
+        dbc: Path | None,
+        bus: str | None,
+        fault: tuple[str, ...],
+        seed: int,
+        **others: Any,
+    ) -> None:
+        refuse_missing_bench()
+        setup, name = _one_or_many(unit, plan, dbc, bus)
+        command(setup=setup, bus=BusChoice(name, fault, seed), **others)
+
+    return _optioned(
+        with_both,
+        click.option(
+            "--unit",
+            type=UnitFolder(),
+            help="Folder, or name in units/; without it, all units that the plan lists.",
+        ),
+        *_SESSION,
+        click.option("--bus", cls=_BusOption),
+        *_SIMULATED,
+    )
+
+
+def _one_or_many(
+    unit: Path | None, plan: Path | None, dbc: Path | None, bus: str | None
+) -> tuple[Setup | ManySetup, str]:
+    """Setup of a session, and its bus."""
+    from triaxcal.rig.manysetup import many_of_plan  # noqa: PLC0415
+    from triaxcal.rig.plan import list_planned  # noqa: PLC0415
+
+    planned = list_planned(plan) if plan is not None else {}
+    if unit is None and plan is not None and planned:
+        return many_of_plan(plan, bus or "", dbc), bus or ""
+    if unit is None:
+        raise click.UsageError("Missing option '--unit', or a '--plan' that lists units.")
+    known = planned[unit.name].bus if unit.name in planned else None
+    if bus is None and known is None:
+        raise click.UsageError("Missing option '--bus'.")
+    return _setup(unit, plan, dbc), bus or known or ""
 
 
 @dataclass(frozen=True)
@@ -81,10 +146,7 @@ def bus_options(command: Callable[..., None]) -> Callable[..., None]:
     return _optioned(
         with_bus,
         click.option("--bus", required=True, cls=_BusOption),
-        click.option(
-            "--fault", multiple=True, help="Faults of the simulated rig: kind@s[:value[:s]]."
-        ),
-        click.option("--seed", type=int, default=1, help="Seed of the simulated rig."),
+        *_SIMULATED,
     )
 
 
@@ -105,10 +167,13 @@ SECONDS = click.option("--seconds", type=float, help="Stop after this time; by d
 def _setup(folder: Path, plan: Path | None, dbc: Path | None) -> Setup:
     from triaxcal.base.shipped import shipped  # noqa: PLC0415
     from triaxcal.rig.engine import Setup  # noqa: PLC0415
-    from triaxcal.rig.plan import read_plan  # noqa: PLC0415
+    from triaxcal.rig.manysetup import one_of_plan  # noqa: PLC0415
+    from triaxcal.rig.plan import list_planned, read_plan  # noqa: PLC0415
     from triaxcal.rig.rigfile import read_description  # noqa: PLC0415
     from triaxcal.unit.description import read_unit  # noqa: PLC0415
 
+    if plan is not None and list_planned(plan):
+        return one_of_plan(plan, folder.name, dbc)
     description = read_unit(folder)
     session_plan = read_plan(plan or shipped("rig") / "plans" / _DEFAULT_PLAN, description)
     rig = read_description(session_plan.rig, dbc)
@@ -127,7 +192,7 @@ def open_source(setup: Setup, bus: BusChoice) -> Source:
     kind = kind_of(bus.name)
     if bus.faults and not kind.simulated:
         raise RefusedError("--fault", f"given with --bus {bus.name}", expected="--bus virtual")
-    _refuse_other_kind(setup, kind)
+    refuse_other_kind(setup, kind)
     rig = setup.rig
     source = kind.open(Wanted(bus.name, rig.fd, lambda: simulated(setup, bus), rig.lines))
     try:
@@ -138,7 +203,7 @@ def open_source(setup: Setup, bus: BusChoice) -> Source:
     return source
 
 
-def _refuse_other_kind(setup: Setup, kind: SourceKind) -> None:
+def refuse_other_kind(setup: Setup, kind: SourceKind) -> None:
     """Refuse frames for a rig that sends lines, and the other way round."""
     lines = setup.rig.lines
     if not kind.serves(lines):

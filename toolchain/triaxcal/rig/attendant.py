@@ -102,14 +102,41 @@ class Attendant:
             )
         if session.previous is None:
             return
-        if self._chamber is not None:
-            self._chamber.tend(now_s, session.target_degc, session.temp_degc)
-            rests = any(event.kind == "equilibrium" for event in events)
-            if rests and session.temp_degc is not None:
-                self._chamber.refuse_disagreement(session.temp_degc)
+        rests = any(event.kind == "equilibrium" for event in events)
+        self.heat(now_s, session.target_degc, session.temp_degc, rests)
         if self._table is not None and not self._watch.silent(now_s):
             wanted, away = self._positions(session, self._table.told)
-            self._table.tend(now_s, wanted, away, session.seen)
+            self.turn(now_s, wanted, away, session.seen)
+
+    def heat(self, now_s: float, target_degc: float, temp_degc: float | None, rests: bool) -> None:
+        """Tend the chamber.
+
+        Parameters
+        ----------
+        temp_degc : float or None
+            Temperature of the unit.
+        rests : bool
+            The unit has come to rest at it.
+
+        Raises
+        ------
+        RefusedError
+            As `ChamberHand.tend` and `refuse_disagreement`.
+        """
+        if self._chamber is None:
+            return
+        self._chamber.tend(now_s, target_degc, temp_degc)
+        if rests and temp_degc is not None:
+            self._chamber.refuse_disagreement(temp_degc)
+
+    def turn(self, now_s: float, wanted: str, away: str, seen: str | None) -> None:
+        """Tend the positioner, as `TableHand.tend`; nothing where a person turns."""
+        if self._table is not None:
+            self._table.tend(now_s, wanted, away, seen)
+
+    def say(self, text: str) -> None:
+        """Add a line to what was done."""
+        self._said.append(text)
 
     def left_s(self, session: Session) -> float:
         """Predicted seconds to the end."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import can
@@ -70,20 +71,26 @@ class BusSource(Watched):
         self.bus.shutdown()
 
 
-class SimulatedSource:
-    """The simulated rig behind a python-can virtual bus, in a clock as fast as the machine."""
+class VirtualSource:
+    """Frames that are made, behind a python-can virtual bus, in a clock as fast as the machine.
 
-    def __init__(self, rig: SimulatedRig, name: str = "virtual") -> None:
+    Parameters
+    ----------
+    advance : callable
+        Makes the frames of the next second.
+    """
+
+    def __init__(self, advance: Callable[[], Frames], name: str = "virtual") -> None:
         self.name = name
         self.rates: BitRates | None = _SIMULATED
-        self.rig = rig
+        self._advance = advance
         options: dict[str, Any] = {"interface": "virtual", "preserve_timestamps": True}
         self._out = can.Bus(channel=f"triaxcal-{id(self)}", **options)
         self._in = can.Bus(channel=f"triaxcal-{id(self)}", **options)
 
     def read(self) -> Frames:
         """Frames of the next second, through the bus."""
-        sent = messages_of(self.rig.advance())
+        sent = messages_of(self._advance())
         for message in sent:
             self._out.send(message)
         received = [self._in.recv(1.0) for _ in sent]
@@ -97,6 +104,14 @@ class SimulatedSource:
         """Shut both ends down."""
         self._in.shutdown()
         self._out.shutdown()
+
+
+class SimulatedSource(VirtualSource):
+    """The simulated rig behind a virtual bus."""
+
+    def __init__(self, rig: SimulatedRig, name: str = "virtual") -> None:
+        super().__init__(rig.advance, name)
+        self.rig = rig
 
 
 def frames_of(messages: list[can.Message]) -> Frames:

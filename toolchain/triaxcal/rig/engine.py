@@ -33,6 +33,11 @@ class Setup:
     plan: SessionPlan
     rig: RigDescription
 
+    @property
+    def sessions(self) -> Path:
+        """Folder of the unit's sessions."""
+        return self.folder / "sessions"
+
     @cached_property
     def nominal(self) -> Nominal:
         """Nominal meaning of the unit's codes.

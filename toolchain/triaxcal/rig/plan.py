@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
@@ -19,6 +19,7 @@ from triaxcal.rig.equipment import (
     read_equipment,
     refuse_without_angles,
 )
+from triaxcal.rig.planunits import UnitKeys, planned_units
 from triaxcal.rig.plansteps import Step, StepKeys, planned_steps, refuse_merged
 from triaxcal.rig.shippedrigs import find_description
 from triaxcal.unit.description import UnitDescription
@@ -126,6 +127,8 @@ class SessionPlan:
         unit.toml or of the bus description.
     take_out_of_order : bool
         A position found out of order is taken without asking.
+    units : mapping
+        Units that are measured together, by name; empty in the plan of one unit.
     sha256 : str
         Of the plan's file; of what decides in it, where it has tables of the equipment: an address
         may be corrected between `rig run` and `rig resume`.
@@ -141,6 +144,7 @@ class SessionPlan:
     stillness: Stillness
     thermal: Thermal
     equipment: Equipment
+    units: Mapping[str, UnitKeys] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,6 +193,7 @@ def session_plan_file() -> FileKeys:
             TableKeys.of(Stillness),
             TableKeys.of(Thermal),
             *equipment_tables(),
+            TableKeys.of(UnitKeys),
         ),
         first=("volts_per_g",),
     )
@@ -218,18 +223,32 @@ def read_plan(path: Path, unit: UnitDescription) -> SessionPlan:
     planned = planned_steps(tables["steps"], steps, unit, equipment)
     every = (position for step in planned for position in step.positions)
     refuse_without_angles(equipment, tables["positioner"], every)
+    units = planned_units(str(path), tables)
     return SessionPlan(
         source=str(path),
         sha256=_hash_of(path),
         rate_hz=rig.rate_hz,
         rig=_rig_file(tables["rig"], rig, path.parent),
         volts_per_g=rig.volts_per_g,
-        take_out_of_order=steps.take_out_of_order,
+        # The order of many units is that of the tilter, and each takes what it can.
+        take_out_of_order=steps.take_out_of_order or bool(units),
         steps=planned,
         stillness=stillness,
         thermal=thermal,
         equipment=equipment,
+        units=units,
     )
+
+
+def list_planned(path: Path) -> Mapping[str, UnitKeys]:
+    """Units that a plan lists, by name; none in the plan of one unit.
+
+    Raises
+    ------
+    RefusedError
+        When the file breaks a rule of docs/reference/keys.md.
+    """
+    return planned_units(str(path), session_plan_file().read(path))
 
 
 def _rig_file(values: Values, keys: _Rig, folder: Path) -> Path:

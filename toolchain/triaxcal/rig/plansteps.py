@@ -35,7 +35,7 @@ class StepKeys:
     direction
         Order of the temperatures.
     take_out_of_order
-        A position found out of order is taken without asking.
+        A position found out of order is taken without asking; always so in a plan that lists units.
     """
 
     temperatures_degc: tuple[float, ...] = setting(

@@ -90,17 +90,18 @@ def replay_records(setup: Setup, log: Path, records: Sequence[Record]) -> Replay
     events: list[Event] = []
     lines, left = 0, Left()
     cuts = [int(r["log"]["lines"]) for r in words]
-    for frames in _chunks(log, setup.rig.lines, cuts, left):
+    for frames in chunks(log, setup.rig.lines, cuts, left):
         while words and int(words[0]["log"]["lines"]) == lines:
-            events += _say(engine, words.pop(0))
+            events += say(engine, words.pop(0))
         events += engine.feed(frames)
         lines += len(frames)
     for word in words:
-        events += _say(engine, word)
+        events += say(engine, word)
     return Replayed(engine, tuple(events), state, tuple(left.notes(log)))
 
 
-def _say(engine: Engine, record: Record) -> list[Event]:
+def say(engine: Engine, record: Record) -> list[Event]:
+    """Decisions of a session after a command or a restart of its journal."""
     if record["kind"] == "resume":
         # A decision that the crash kept from the journal was not taken.
         engine.resume(int(record["durable"]))
@@ -113,7 +114,7 @@ def _say(engine: Engine, record: Record) -> list[Event]:
     return engine.command(Agree() if name == "Agree" else Redo(**said), t_ns)
 
 
-def _chunks(log: Path, form: LineFormat | None, cuts: list[int], left: Left) -> Iterator[Frames]:
+def chunks(log: Path, form: LineFormat | None, cuts: list[int], left: Left) -> Iterator[Frames]:
     """Frames of a log, cut after each of these numbers of lines; what is none is counted."""
     done = 0
     for parsed in frames_of_log(log, form):

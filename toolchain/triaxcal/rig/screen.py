@@ -18,9 +18,9 @@ from triaxcal.rig.bigtext import big
 from triaxcal.rig.events import View
 from triaxcal.rig.orientation import described
 
-_ALARM = "bright_white on #a53e00"
+ALARM = "bright_white on #a53e00"
 _DO, _LEAVE = "black on #f0e442", "bright_white on #0072b2"
-_COLOURS = {
+COLOURS = {
     "turn": _DO,
     "still": _DO,
     "settle": _LEAVE,
@@ -119,7 +119,7 @@ class BigText:
 
 
 @dataclass(frozen=True)
-class _Fitted:
+class Fitted:
     """Parts from top to bottom; where the terminal is too small, the least important go first."""
 
     parts: tuple[tuple[int, RenderableType], ...]
@@ -144,7 +144,7 @@ def screen(
     alarms: tuple[str, ...],
     about: About,
     page: RenderableType | None = None,
-) -> _Fitted:
+) -> Fitted:
     """Everything the operator sees, for 80 columns and 24 lines or more.
 
     Parameters
@@ -155,7 +155,7 @@ def screen(
         `help_page` or `faults_page`, in place of the readings.
     """
     done, whole = view.progress
-    style = _ALARM if alarms else _COLOURS[view.phase]
+    style = ALARM if alarms else COLOURS[view.phase]
     headline = Text(view.headline, style="bold", justify="center")
     bar = ProgressBar(
         total=max(whole, 1), completed=done, complete_style="bold", finished_style="bold"
@@ -169,7 +169,7 @@ def screen(
     )
     if page is not None:
         readings = ((5, page),)
-    return _Fitted(
+    return Fitted(
         (
             (4, _title(about)),
             (2, Padding(BigText(view.order), (1, 2, 0, 2), style=style)),

@@ -4,19 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.rig.attendant import Attendant
 from triaxcal.rig.equipment import TEMP_UNITS, Positioner
 from triaxcal.rig.instrument import Order
 from triaxcal.rig.plan import SessionPlan
-from triaxcal.rig.simulator import SimulatedRig
+from triaxcal.rig.simorders import Fault
+from triaxcal.rig.simulator import RigSettings
+
+
+class Equipped(Protocol):
+    """What chamber and table are of: one simulated rig, or many on one table."""
+
+    target_degc: float
+
+    @property
+    def settings(self) -> RigSettings:
+        """How chamber and table behave."""
+
+    @property
+    def seconds(self) -> int:
+        """Seconds simulated so far."""
+
+    @property
+    def position(self) -> str:
+        """Position of the table."""
+
+    @property
+    def turning(self) -> bool:
+        """A turn is under way, or has stopped half way."""
+
+    @property
+    def chamber_degc(self) -> float:
+        """True temperature of the chamber."""
+
+    def active(self, kind: str, /) -> Fault | None:
+        """Fault of a kind that is in force now."""
+
+    def turn_to(self, position: str, /) -> None:
+        """Start a turn."""
 
 
 class _Simulated:
     """What both share: they may be deaf."""
 
-    def __init__(self, rig: SimulatedRig) -> None:
+    def __init__(self, rig: Equipped) -> None:
         self._rig = rig
 
     def _listen(self) -> None:
@@ -45,7 +79,7 @@ class SimulatedChamber(_Simulated):
 class SimulatedTable(_Simulated):
     """Turns the simulated rig and says where it is."""
 
-    def __init__(self, rig: SimulatedRig, positioner: Positioner) -> None:
+    def __init__(self, rig: Equipped, positioner: Positioner) -> None:
         super().__init__(rig)
         self._positioner = positioner
 
@@ -61,7 +95,7 @@ class SimulatedTable(_Simulated):
         return tuple(value + 45.0 for value in at) if self._rig.turning else at
 
 
-def simulated_attendant(plan: SessionPlan, rig: SimulatedRig, blind: bool = False) -> Attendant:
+def simulated_attendant(plan: SessionPlan, rig: Equipped, blind: bool = False) -> Attendant:
     """Attendant of the simulated rig, in its time.
 
     Parameters

@@ -62,14 +62,15 @@ def _order(session: Session, phase: Stage, done: int) -> str:
     if session.phase.position is not None or phase == "still":
         return f"HANDS OFF {session.dwell_s[2] - len(session.rest)}"
     if session.reseat is not None:
-        return f"RESEAT {_up(session.reseat.position)}"
+        return f"RESEAT {up_letters(session.reseat.position)}"
     if phase == "temperature" and session.seen == session.wanted:
         return f"WAIT FOR {session.target_degc:g}"
     assert session.wanted is not None
-    return f"TURN TO {_up(session.wanted)}"
+    return f"TURN TO {up_letters(session.wanted)}"
 
 
-def _up(position: str) -> str:
+def up_letters(position: str) -> str:
+    """Axis that points up in a position, in the letters of `bigtext`."""
     tilted = " TILTED" if position in CHECK_POSITIONS else ""
     return f"{UP['T' + position[1:]]} UP{tilted}"
 

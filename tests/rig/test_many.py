@@ -1,0 +1,293 @@
+"""Many units in one session: told apart, measured together, each with records of its own."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+from many_cases import Run, bench_of, plan_of, setup_of
+
+from triaxcal.base.errors import RefusedError, UsageError
+from triaxcal.rig.frames import ERR_FLAG, Frames, alike, concatenate
+from triaxcal.rig.journal import read_journal
+from triaxcal.rig.manyreplay import replay_bus
+from triaxcal.rig.manysetup import many_of_plan, one_of_plan
+from triaxcal.rig.recording import JOURNAL_FILE
+from triaxcal.rig.replay import replay
+from triaxcal.rig.split import Splitter
+from triaxcal.rig.store import write_records
+from triaxcal.simulation.tilts import truth_force_g
+from triaxcal.simulation.truth import read_truth
+
+J1939_UNIT = """
+format = 1
+serial = "SN-1"
+[adc]
+bits = 17
+code_min = 0
+code_max = 65535
+full_scale_v = 655.36
+[temperature_sensor]
+degc_per_code = 0.03125
+degc_at_zero = -273
+[site]
+local_gravity_m_per_s2 = 9.81
+[thermal]
+t0_degc = 20
+range_degc = [-40, 70]
+"""
+"""As the shipped description of that sensor says."""
+ALL = [(0, f"TP{k}") for k in range(1, 7)]
+
+
+def frame_ids(setup):
+    return sorted(use.layout.can_id for use in setup.rig.messages.values())
+
+
+# ---- the plan ----
+
+
+def test_each_unit_has_ids_of_its_own(tmp_path):
+    """tilter.dbc has 0x100 to 0x102 and 0x110; units are 0x10 apart, 16 of them on a bus."""
+    path = plan_of(tmp_path, 1)
+    (first,) = many_of_plan(path).places
+    whole = frame_ids(first.setup)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("id_offset = 0", "id_offset = 0x400"), encoding="utf-8")
+    moved = one_of_plan(path, "AT-1")
+    assert frame_ids(moved) == [can_id + 0x400 for can_id in whole]
+    assert moved.plan.take_out_of_order
+
+
+def test_units_of_j1939_differ_in_their_source_address(tmp_path):
+    path = plan_of(tmp_path, 1)
+    text = path.read_text(encoding="utf-8").replace('layout = "classic"', "").replace(
+        "id_offset = 0", 'rig = "j1939-inclinometer"\nsource_address = 0x42'
+    )  # fmt: skip
+    path.write_text(text.replace("volts_per_g = [-0.55, -0.55, -0.55]", ""), encoding="utf-8")
+    (tmp_path / "units" / "AT-1" / "unit.toml").write_text(J1939_UNIT, encoding="utf-8")
+    ids = frame_ids(one_of_plan(path, "AT-1"))
+    assert len(ids) == 2
+    assert all(can_id & 0xFF == 0x42 for can_id in ids)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("id_offset = 16", "id_offset = 0", "AT-1 and AT-2 have the same IDs on can0: "),
+        ("id_offset = 16", "id_offset = 1", "AT-1 and AT-2 have the same IDs on can0: "),
+        ("id_offset = 16", "id_offset = 0x800", "[unit.AT-2] id_offset: found 2048: the ID of "),
+        ("id_offset = 16", "source_address = 9", "[unit.AT-2] source_address: given, and all IDs"),
+        ('folder = "units/AT-2"', 'folder = "units/AT-1"', "AT-1 and AT-2 have the same folder"),
+        ('folder = "units/AT-2"', 'folder = "units/AT-9"', 'no such unit (did you mean "AT-'),
+        ('folder = "units/AT-2"', 'serial = "X"\nfolder = "units/AT-2"', "serial: found X"),
+        ("id_offset = 16", "id_ofset = 16", "unknown: [unit.AT-2] id_ofset (did you mean"),
+    ],
+)
+def test_a_plan_that_cannot_be_is_refused(tmp_path, old, new, said):
+    path = plan_of(tmp_path, 2)
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(RefusedError) as refused:
+        many_of_plan(path)
+    assert said in str(refused.value)
+
+
+def test_units_share_ids_on_different_buses_but_never_a_serial_number(tmp_path):
+    path = plan_of(tmp_path, 2, AT_2="can1")
+    text = path.read_text(encoding="utf-8").replace("id_offset = 16", "id_offset = 0")
+    path.write_text(text, encoding="utf-8")
+    assert many_of_plan(path).buses == ("can0", "can1")
+    unit = tmp_path / "units" / "AT-2" / "unit.toml"
+    unit.write_text(unit.read_text(encoding="utf-8").replace("SN-0002", "SN-0001"))
+    with pytest.raises(RefusedError, match=r'"SN-0001" is also the serial of .*AT-2'):
+        many_of_plan(path)
+
+
+def test_a_unit_needs_a_bus(tmp_path):
+    path = plan_of(tmp_path, 2)
+    text = path.read_text(encoding="utf-8").replace('bus = "can0"\n', "", 1)
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RefusedError, match=r"\[unit.AT-1\] bus: missing; expected a bus here"):
+        many_of_plan(path)
+    assert [p.bus for p in many_of_plan(path, "can7").places] == ["can7", "can0"]
+
+
+def test_no_more_than_32_units(tmp_path):
+    path = plan_of(tmp_path, 2)
+    more = "".join(f"[unit.B{i}]\n" for i in range(31))
+    path.write_text(path.read_text(encoding="utf-8") + more, encoding="utf-8")
+    with pytest.raises(RefusedError, match="lists 33 units; expected at most 32"):
+        many_of_plan(path)
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [("AT-9/slip@3", "a unit of the plan"), ("AT-1/halt@3", "all units share chamber and table")],
+)
+def test_faults_of_one_unit(tmp_path, order, said):
+    with pytest.raises(UsageError, match=said):
+        bench_of(setup_of(tmp_path, 1), order)
+
+
+# ---- the frames ----
+
+
+def test_frames_go_to_the_unit_that_sent_them(tmp_path):
+    setup = setup_of(tmp_path, 3)
+    splitter = Splitter([place.setup.rig for place in setup.places])
+    first = frame_ids(setup.places[0].setup)[0]
+
+    def sent(*ids: int) -> Frames:
+        one = np.zeros((1, 8), np.uint8)
+        return concatenate([alike(np.array([k]), i, 8, False, one) for k, i in enumerate(ids)])
+
+    parts = splitter.split(sent(first + 32, first, 0x7FF, first + 32, first + 16))
+    assert [part.t_ns.tolist() for part in parts] == [[1], [4], [0, 3]]
+    parts = splitter.split(sent(first + 32, ERR_FLAG | 8, first))
+    assert [part.t_ns.tolist() for part in parts] == [[1, 2], [1], [0, 1]]
+
+
+# ---- sessions ----
+
+
+def test_another_unit_is_refused_at_the_start(tmp_path):
+    setup = setup_of(tmp_path, 2)
+    run = Run(setup, bench_of(setup, "AT-2/serial@0"), tmp_path / "001")
+    with pytest.raises(RefusedError, match=r'expected "SN-0002" \(0x[0-9A-F]{8}\) of AT-2'):
+        run.go()
+
+
+def test_two_units_with_exchanged_plugs_are_refused(tmp_path):
+    setup = setup_of(tmp_path, 2)
+    bench = bench_of(setup)
+    path = tmp_path / "many.toml"
+    text = path.read_text(encoding="utf-8")
+    text = text.replace("id_offset = 0\n", "id_offset = X\n").replace("= 16", "= 0")
+    path.write_text(text.replace("= X", "= 16"), encoding="utf-8")
+    run = Run(many_of_plan(path), bench, tmp_path / "001")
+    with pytest.raises(RefusedError, match=r"number 'SN-0002' of AT-2 .* expected .SN-0001."):
+        run.go()
+
+
+def test_a_unit_that_is_silent_from_the_start_is_refused(tmp_path):
+    setup = setup_of(tmp_path, 2, tables="[unattended]\nsilence_max_s = 5\n")
+    run = Run(setup, bench_of(setup, "AT-2/linkdown@0:1:99"), tmp_path / "001")
+    with pytest.raises(RefusedError, match="can0, AT-2: no readings for 5 s"):
+        run.go()
+
+
+def expected_codes(place, position, temp_degc):
+    """Codes of the truth: U = K(T) a + U0(T) by the volts of a code."""
+    truth, _ = read_truth(place.setup.folder)
+    force = truth_force_g(position, place.setup.unit.gravity_g)
+    volts = truth.voltage_v(force[None], np.array([temp_degc]))[0]
+    return volts / place.setup.unit.adc.volts_per_code
+
+
+def refuse_false_records(place, folder):
+    """Every row of a unit's records is the unit's own truth, within six of its deviations."""
+    with (folder / "measurements.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert rows
+    for row in rows:
+        temp = float(row["temp_code"]) * place.setup.unit.temperature_sensor.degc_per_code
+        exact = expected_codes(place, row["position"], temp)
+        for axis, code in zip("xyz", exact, strict=True):
+            u = float(row[f"sd_u{axis}_code"]) / float(row["count"]) ** 0.5
+            assert abs(float(row[f"u{axis}_code"]) - code) < 6.0 * u + 1.0
+    return len(rows)
+
+
+@pytest.mark.long
+def test_one_dies_one_slips_the_others_go_on(tmp_path):
+    setup = setup_of(tmp_path, 3, "[20, 25]")
+    orders = ("AT-2/linkdown@150:1:99999", "AT-3/slip@84:150", "halt@120:1:20", "deaf@40:1:15")
+    run = Run(setup, bench_of(setup, *orders), tmp_path / "001", alone=True).go()
+    asides = {m.name: m.aside for m in run.group.members}
+    assert asides == {"AT-1": "", "AT-2": "no readings for 60 s", "AT-3": ""}
+    for name in ("AT-1", "AT-3"):
+        assert sorted(run.accepted(name)) == sorted(ALL + [(1, p) for _, p in ALL])
+    slips = [e.text for m, e in run.told if m.name == "AT-3" and e.kind == "refused"]
+    assert any(text.startswith("TP1: slip of 14") for text in slips)
+    # The slipped unit leaves TP1 without the others' waiting for a second dwell in it.
+    order = [p for s, p in run.accepted("AT-3") if s == 0]
+    assert order.index("TP1") > order.index("TP2")
+    records = read_journal(tmp_path / "001" / JOURNAL_FILE).records
+    assert [r["unit"] for r in records if r["kind"] == "aside"] == ["AT-2"]
+    for place in setup.places[::2]:
+        member = next(m for m in run.group.members if m.place is place)
+        folder = tmp_path / place.name
+        folder.mkdir()
+        write_records(folder, member.session, place.setup.rig, {"sha256": ""})
+        assert refuse_false_records(place, folder) == 12
+
+
+@pytest.mark.long
+def test_a_session_is_gone_on_with_and_made_again_from_its_logs(tmp_path):
+    setup = setup_of(tmp_path, 2)
+    bench, folder = bench_of(setup, "AT-1/lose@100:30"), tmp_path / "001"
+    first = Run(setup, bench, folder).go(until=lambda run: len(run.accepted("AT-2")) == 2)
+    again = Run(setup, bench, folder)
+    assert again.taken.resumed
+    again.go()
+    assert [len(first.accepted(n)) + len(again.accepted(n)) for n in ("AT-1", "AT-2")] == [6, 6]
+    played = replay_bus(setup, folder, "can0", ["AT-1", "AT-2"])
+    for member in again.group.members:
+        assert played[member.name].accepted == member.session.accepted
+    # Samples have two frames, each tenth one a temperature besides, the first an identity: 30
+    # frames from a full second on are 4 + 9 * 2 + 3 + 2 * 2 + 1, of 14 samples.
+    assert played["AT-1"].lost == 14
+    # One unit's own session out of the same log, as `rig replay --unit` does.
+    alone = replay(one_of_plan(tmp_path / "many.toml", "AT-2"), folder / "frames-1.log")
+    assert alone.engine.session.accepted == again.group.members[1].session.accepted
+
+
+@pytest.mark.long
+def test_a_unit_set_aside_stays_so_and_another_plan_is_refused(tmp_path):
+    setup = setup_of(tmp_path, 2, tables="[unattended]\nsilence_max_s = 5\n")
+    bench, folder = bench_of(setup, "AT-2/linkdown@80:1:20"), tmp_path / "001"
+    Run(setup, bench, folder).go(until=lambda run: run.group.members[1].aside)
+    again = Run(setup, bench, folder)
+    assert again.group.members[1].aside == "no readings for 5 s"
+    assert [m.name for m in again.group.active] == ["AT-1"]
+    again.taken.close()
+    other = setup_of(tmp_path / "other", 3)
+    with pytest.raises(RefusedError, match="of the units AT-1, AT-2; expected AT-1, AT-2, AT-3"):
+        Run(other, bench_of(other), folder)
+
+
+@pytest.mark.long
+def test_a_bus_that_is_silent_stops_the_run_and_sets_nobody_aside(tmp_path):
+    tables = "[unattended]\nsilence_max_s = 5\n"
+    path = plan_of(tmp_path, 4, "[20]", tables, AT_3="can1", AT_4="can1")
+    setup = many_of_plan(path)
+    orders = [f"AT-{k}/linkdown@90:1:9999" for k in (3, 4)]
+    run = Run(setup, bench_of(setup, *orders), tmp_path / "001", alone=True)
+    with pytest.raises(RefusedError, match="unattended run: no readings from can1 for 5 s"):
+        run.go()
+    assert not any(m.aside for m in run.group.members)
+
+
+@pytest.mark.long
+def test_a_unit_that_never_rests_is_set_aside_after_its_attempts(tmp_path):
+    setup = setup_of(tmp_path, 3, tables="[unattended]\nattempts = 2\n")
+    orders = [f"AT-2/nudge@{s}:40:0.3" for s in range(62, 600, 9)]
+    run = Run(setup, bench_of(setup, *orders), tmp_path / "001").go()
+    assert run.accepted("AT-1") == run.accepted("AT-3") == ALL
+    assert run.accepted("AT-2") == []
+    aside = run.group.members[1].aside
+    assert aside.startswith("at 20 degC 2 times, the last time: TP2: shaken: variance on "), aside
+
+
+@pytest.mark.long
+def test_what_hits_all_alike_stops_an_unattended_run(tmp_path):
+    """The chamber leaves its temperature again and again: no unit is to blame."""
+    setup = setup_of(tmp_path, 3, tables="[unattended]\nattempts = 2\n")
+    orders = [f"runaway@{s}:4:30" for s in (90, 240)]
+    run = Run(setup, bench_of(setup, *orders), tmp_path / "001", alone=True)
+    with pytest.raises(RefusedError, match=r"run: [23] units at 20 degC 2 times, the last"):
+        run.go()
+    assert not any(m.aside for m in run.group.members)
