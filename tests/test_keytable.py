@@ -91,7 +91,7 @@ def test_the_reference_names_every_key_with_its_documentation(kind: str) -> None
         for key in table.keys:
             (row,) = [
                 row
-                for row in page.split(f"`[{table.name}]`")[-1 if table.name else 0].splitlines()
+                for row in page.split(f"`[{table.header}]`")[-1 if table.name else 0].splitlines()
                 if row.startswith(f"| `{key.name}` |")
             ][:1]
             assert key.doc.replace("|", "\\|") in row

@@ -16,7 +16,7 @@ from rich.screen import Screen
 
 from triaxcal.rig.manyscreen import Recent, many_screen
 
-MOMENTS = {"reference": 31, "average": 90, "slip": 103, "dead": 232, "warming": 460}
+MOMENTS = {"reference": 31, "average": 90, "slip": 96, "dead": 232, "warming": 460}
 ORDERS = ("AT-2/linkdown@150:1:99999", "AT-3/slip@84:150")
 
 
@@ -38,6 +38,7 @@ def draw(count: int, target: Path) -> None:
             if now > max(MOMENTS.values()):
                 break
         run.taken.close()
+        run.sources.close()
 
 
 def svg(view, width: int, height: int) -> str:
@@ -54,5 +55,5 @@ def svg(view, width: int, height: int) -> str:
 if __name__ == "__main__":
     goal = Path(sys.argv[1])
     goal.mkdir(parents=True, exist_ok=True)
-    for units in (8, 20):
+    for units in (8, 32):
         draw(units, goal)

@@ -27,7 +27,7 @@ serial = "SN-1"
 bits = 17
 code_min = 0
 code_max = 65535
-full_scale_v = 655.36
+full_scale_v = 65.536
 [temperature_sensor]
 degc_per_code = 0.03125
 degc_at_zero = -273
@@ -37,7 +37,7 @@ local_gravity_m_per_s2 = 9.81
 t0_degc = 20
 range_degc = [-40, 70]
 """
-"""As the shipped description of that sensor says."""
+"""Codes as the shipped description of that sensor has them."""
 ALL = [(0, f"TP{k}") for k in range(1, 7)]
 
 

@@ -55,9 +55,9 @@ def rig() -> None:
 def run(
     setup: Setup | ManySetup, bus: BusChoice, sessions: Path | None, plain: bool, unattended: bool
 ) -> None:
-    """Guide a session through the plan, of one unit or of those that it lists.
+    """Guide a session through the plan.
 
-    It ends with measurements.csv in the folder of each unit.
+    It ends with measurements.csv in the folder of the unit, or of each unit that the plan lists.
     """
     from triaxcal.cli.rig_live import guide  # noqa: PLC0415
     from triaxcal.cli.rig_many import guide_many  # noqa: PLC0415

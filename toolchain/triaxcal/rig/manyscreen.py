@@ -21,9 +21,9 @@ _ALARM_S = 10.0
 _SAID = {"refused", "left"}
 _STYLES = {"reference": "reference", "temperature": "temperature", "turn": "turn",
            "dwell": "average", "done": "done"}  # fmt: skip
-_AROUND = 14
+_AROUND = 12
 """Lines of the screen beside the units, with small letters."""
-_AROUND_TALL = 22
+_AROUND_TALL = 17
 _TALL = 30
 _KEYS = " 1-6 take TP1-TP6 again    q stop (then: rig resume)"
 

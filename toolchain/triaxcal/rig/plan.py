@@ -19,8 +19,8 @@ from triaxcal.rig.equipment import (
     read_equipment,
     refuse_without_angles,
 )
-from triaxcal.rig.planunits import UnitKeys, planned_units
 from triaxcal.rig.plansteps import Step, StepKeys, planned_steps, refuse_merged
+from triaxcal.rig.planunits import UnitKeys, planned_units
 from triaxcal.rig.shippedrigs import find_description
 from triaxcal.unit.description import UnitDescription
 
