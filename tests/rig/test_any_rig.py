@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from any_rig_cases import KINDS, any_rig, any_setup
@@ -279,3 +281,24 @@ def test_a_real_log_gives_the_published_means(tmp_path):
     values = codes * [axis.step for axis in rig.axes] + [axis.zero for axis in rig.axes]
     np.testing.assert_allclose(values.mean(axis=0), [-0.4992, -0.1973, 10.5012], atol=5e-5, rtol=0)
     assert {int(i) & ID_MASK for i in [rig.messages["gnss_imu"].layout.can_id]} == {9}
+
+
+# ---- a sensor whose code is larger than its noise ----
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("noise_code", [0.05, 0.3])
+def test_a_session_with_noise_below_one_code_has_an_honest_u(tmp_path, monkeypatch, noise_code):
+    kind = KINDS["j1939-inclinometer"]
+    code_g = 0.01 / 9.80665
+    monkeypatch.setitem(
+        KINDS, "j1939-inclinometer", replace(kind, sd=noise_code * code_g, u_max=400.0)
+    )
+    setup = any_setup(tmp_path, "j1939-inclinometer")
+    assert setup.nominal.fine == (False, False, False)
+    engine = Engine(setup, "test")
+    play(any_rig(setup), engine.feed, engine.session)
+    u_code = np.array([d.u_code for d in engine.session.accepted.values()])
+    limit_code = 1.0 / np.sqrt(12.0)
+    assert u_code.max() <= 1.02 * limit_code
+    assert np.median(u_code) > (0.9 if noise_code == 0.05 else 0.2) * limit_code

@@ -21,6 +21,7 @@ from still_cases import (
 )
 
 from triaxcal.rig.reasons import Why
+from triaxcal.rig.rounding import rounding
 from triaxcal.rig.stillness import average, make_reference, motion, slope_micro_g_per_min
 
 
@@ -141,3 +142,27 @@ def test_the_slope_is_that_put_in():
     slope, t = slope_micro_g_per_min(blocks, MICRO_G_PER_CODE)
     u = slope[0] / t[0]
     assert abs(abs(slope[0]) - 50.0) < 4.0 * abs(u)
+
+
+# ---- steps larger than the noise ----
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.1, 0.2, 0.3, 0.5, 1.0])
+def test_u_says_what_rounding_leaves_in_a_mean(sigma):
+    """Means of readings that are rounded to whole codes, about true values anywhere."""
+    rng = np.random.default_rng(8)
+    truth = rng.uniform(0.0, 1.0, 400)
+    readings = np.rint(truth[:, None] + sigma * rng.standard_normal((400, 3000)))
+    error = readings.mean(axis=1) - truth
+    said = np.array([rounding(np.full(3, v), np.ones(3))[0] for v in readings.var(axis=1, ddof=1)])
+    # The mean of 3000 readings has an error of its own.
+    expected = np.sqrt(said.mean() + sigma**2 / 3000)
+    found = np.sqrt(np.mean(error**2))
+    assert found <= 1.15 * expected  # 400 errors: their rms is known to 4 %
+    if sigma in {0.0, 0.5, 1.0}:  # in between the noise is hard to see, and u is too large
+        assert found >= 0.85 * expected
+
+
+def test_fine_codes_leave_nothing():
+    assert (rounding(np.full(3, 100.0), np.ones(3)) == 0.0).all()
+    assert (rounding(np.zeros(3), np.zeros(3)) == 0.0).all()

@@ -93,8 +93,8 @@ def at_a_terminal() -> bool:
 
 def _asked(file: BusFile, key: str, guess: str) -> str:
     """Name of a signal, asked for until there is one of it; the temperature may be left out."""
+    from triaxcal.rig.buslookup import nearest  # noqa: PLC0415
     from triaxcal.rig.firstrig import names_of  # noqa: PLC0415
-    from triaxcal.rig.resolve import nearest  # noqa: PLC0415
 
     known = names_of(file)
     if guess == "" and key == "x":

@@ -11,7 +11,6 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import AXES
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.frames import ID_MASK, Frames, concatenate
-from triaxcal.rig.nominal import COARSE_MICRO_G
 from triaxcal.rig.orientation import described, recognised
 from triaxcal.rig.samples import BAD_CRC, DUPLICATE, INVALID, LOST_FRAME, ORPHAN, Samples
 from triaxcal.rig.source import Source
@@ -113,7 +112,7 @@ def _samples(setup: Setup, samples: Samples) -> list[Finding]:
     sd = np.sqrt(np.mean(np.diff(samples.codes, axis=0) ** 2, axis=0) / 2.0) * np.abs(scale)
     seen = recognised(samples.codes.mean(axis=0) - setup.nominal.zero_code, scale)
     noise_max = np.maximum(_NOISE_MAX_MICRO_G, _NOISE_MAX_CODES * np.abs(scale))
-    fine = np.abs(scale) < COARSE_MICRO_G
+    fine = np.array(setup.nominal.fine)
     noise = ", ".join(f"{axis} {v:.0f}" for axis, v in zip(AXES, sd, strict=True))
     codes = samples.temp_code
     temp = setup.unit.temperature_sensor.degc(float(codes.mean())) if len(codes) else None

@@ -10,10 +10,20 @@ from triaxcal.rig.frames import BUS_OFF, error_names
 from triaxcal.rig.plan import SessionPlan
 from triaxcal.rig.reasons import Reason, Why, because
 
+Three = tuple[bool, bool, bool]
 
-def fault(block: Block, previous: Block | None, plan: SessionPlan) -> Reason | None:
-    """What makes a block worthless; None when nothing does."""
-    return next(_faults(block, previous, plan), None)
+
+def fault(
+    block: Block, previous: Block | None, plan: SessionPlan, fine: Three = (True, True, True)
+) -> Reason | None:
+    """What makes a block worthless; None when nothing does.
+
+    Parameters
+    ----------
+    fine : tuple of three bool
+        Axes that show noise at rest: another one may give the same code all the time.
+    """
+    return next(_faults(block, previous, plan, fine), None)
 
 
 def complaint(block: Block) -> Reason | None:
@@ -22,7 +32,9 @@ def complaint(block: Block) -> Reason | None:
     return because(Why.BUS_ERRORS, count=count, names=error_names(bits)) if count else None
 
 
-def _faults(block: Block, previous: Block | None, plan: SessionPlan) -> Iterator[Reason]:
+def _faults(
+    block: Block, previous: Block | None, plan: SessionPlan, fine: Three
+) -> Iterator[Reason]:
     limits, trouble = plan.stillness, block.trouble
     if trouble.error_bits & BUS_OFF:
         yield because(Why.BUS_OFF, names=error_names(trouble.error_bits))
@@ -38,7 +50,9 @@ def _faults(block: Block, previous: Block | None, plan: SessionPlan) -> Iterator
         yield because(Why.LOST_IN_SECOND, lost=block.lost, expected=plan.rate_hz)
     if block.clipped:
         yield because(Why.CLIPPED, count=block.clipped)
-    stuck = [axis for axis, is_stuck in zip(AXES, block.stuck, strict=True) if is_stuck]
+    stuck = [
+        a for a, is_stuck, shows in zip(AXES, block.stuck, fine, strict=True) if is_stuck and shows
+    ]
     if stuck:
         yield because(Why.STUCK, axes=", ".join(stuck))
     if block.status:

@@ -11,9 +11,10 @@ from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.tomltext import toml_value
 from triaxcal.rig import hints
 from triaxcal.rig.busfile import BusFile, read_bus_file
+from triaxcal.rig.buslookup import nearest
 from triaxcal.rig.layout import FrameLayout
 from triaxcal.rig.recorded import ACCELERATIONS, TEMPERATURES, folded
-from triaxcal.rig.resolve import AXES, nearest
+from triaxcal.rig.resolve import AXES
 from triaxcal.rig.rigfile import read_description
 from triaxcal.rig.rigkeys import JOINS, RIG_FILE
 

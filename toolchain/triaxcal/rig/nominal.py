@@ -52,10 +52,20 @@ class Nominal:
         Signed.
     zero_code : array, shape (3,)
         Code at 0 g; 0 where the bus description says nothing of it.
+    step_code : array, shape (3,)
+        Step to which readings are rounded: 1 of raw integers, 0 of floats.
     """
 
     micro_g_per_code: FloatArray
     zero_code: FloatArray
+    step_code: FloatArray
+
+    @property
+    def fine(self) -> tuple[bool, bool, bool]:
+        """Which axes show noise at rest: the same reading for a second means that one is stuck."""
+        step_micro_g = np.abs(self.micro_g_per_code) * self.step_code
+        x, y, z = ((step_micro_g > 0.0) & (step_micro_g < COARSE_MICRO_G)).tolist()
+        return x, y, z
 
 
 def coding_of(rig: RigDescription, unit: UnitDescription) -> Coding:
@@ -85,6 +95,9 @@ def nominal_of(rig: RigDescription, unit: UnitDescription, plan: SessionPlan) ->
     coding = coding_of(rig, unit)
     by_bus = [_g_of_code(axis, factor) for axis, factor in zip(rig.axes, coding.axes, strict=True)]
     zero = np.array([0.0 if g is None else g[1] for g in by_bus])
+    step = np.array(
+        [_step(axis, factor) for axis, factor in zip(rig.axes, coding.axes, strict=True)]
+    )
     stated = plan.volts_per_g or unit.nominal_v_per_g
     if stated is None:
         unknown = [a for a, g in zip(AXES, by_bus, strict=True) if g is None]
@@ -95,7 +108,7 @@ def nominal_of(rig: RigDescription, unit: UnitDescription, plan: SessionPlan) ->
                 expected=f"the nominal scale: {rig.bus_file.name} states no acceleration as the "
                 f"unit of {', '.join(unknown)}",
             )
-        return Nominal(np.array([1e6 * g[0] for g in by_bus if g is not None]), zero)
+        return Nominal(np.array([1e6 * g[0] for g in by_bus if g is not None]), zero, step)
     micro_g = 1e6 * unit.adc.volts_per_code / np.array(stated)
     for axis, what, known, scale in zip(AXES, rig.axes, by_bus, micro_g, strict=True):
         if known is not None and abs(abs(scale / (1e6 * known[0])) - 1.0) > _SCALE_TOLERANCE:
@@ -106,7 +119,14 @@ def nominal_of(rig: RigDescription, unit: UnitDescription, plan: SessionPlan) ->
                 f"{what.label}",
                 remedy=f"correct volts_per_g, [adc] of {unit.source}, or the unit in rig.toml",
             )
-    return Nominal(micro_g, zero)
+    return Nominal(micro_g, zero, step)
+
+
+def _step(axis: Recorded, factor: float) -> float:
+    """Step of an axis's readings in codes; 0 of a float, whose steps nothing states."""
+    if axis.signal.is_float:
+        return 0.0
+    return abs(axis.signal.scale * factor) if axis.as_value else 1.0
 
 
 def _g_of_code(axis: Recorded, factor: float) -> tuple[float, float] | None:

@@ -53,7 +53,7 @@ class Learning(Phase):
             self.blocks.append(block)
         if len(self.blocks) < settings.reference_s:
             return self, False
-        found = make_reference(self.blocks, settings)
+        found = make_reference(self.blocks, settings, state.step_code)
         if isinstance(found, int):
             self.blocks = self.blocks[found + 1 :]
             return self, False
@@ -186,7 +186,7 @@ class Dwelling(Phase):
         t_ns, scale = _now(state).t_ns, state.micro_g_per_code
         assert state.reference is not None
         reasons = _loss(rest[window], state) or refusals(
-            rest, window, state.reference, state.plan.stillness, scale
+            rest, window, state.reference, state.plan.stillness, scale, step_code=state.step_code
         )
         if reasons:
             text = f"{self.position}: {'; '.join(map(str, reasons))}, retake"
@@ -212,7 +212,9 @@ class Dwelling(Phase):
         return Warming() if moved_on else Turning()
 
     def _dwell(self, state: State, blocks: Sequence[Block]) -> AcceptedDwell:
-        means = average(blocks, state.plan.stillness, state.micro_g_per_code)
+        means = average(
+            blocks, state.plan.stillness, state.micro_g_per_code, step_code=state.step_code
+        )
         codes = [b.temp_code for b in blocks if b.temp_code is not None]
         temp_code = sum(codes) / len(codes)
         return AcceptedDwell(

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import Protocol
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.rig.buslookup import Described, Names
 from triaxcal.rig.description import MessageUse, RigDescription, SampleTime
-from triaxcal.rig.layout import Condition, FrameLayout
-from triaxcal.rig.protection import PROTECTIONS, Guard
+from triaxcal.rig.messageuse import use_of
 from triaxcal.rig.recorded import (
     ACCELERATIONS,
     TEMPERATURES,
@@ -23,115 +19,8 @@ from triaxcal.rig.recorded import (
     recorded,
 )
 from triaxcal.rig.rigkeys import MessageKeys, SignalKeys
-from triaxcal.rig.signals import Signal
 
 AXES = ("x", "y", "z")
-_NEAR = 3
-
-
-class Described(Protocol):
-    """What describes messages: a bus description, or the format of lines."""
-
-    @property
-    def path(self) -> Path:
-        """File."""
-
-    @property
-    def sha256(self) -> str:
-        """Of its content."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What breaks the letter of its format."""
-
-    def layouts(self) -> Iterable[FrameLayout]:
-        """Layouts of its messages."""
-
-
-class _Names:
-    """Signals of the bus descriptions by their full names."""
-
-    def __init__(self, source: str, files: Sequence[Described]) -> None:
-        self.source = source
-        self.layouts: dict[str, FrameLayout] = {}
-        self._twice: set[str] = set()
-        for layout in (layout for file in files for layout in file.layouts()):
-            if layout.name in self.layouts:
-                self._twice.add(layout.name)
-            self.layouts[layout.name] = layout
-        self._full = {
-            f"{layout.name}.{name}": (layout, signal)
-            for layout in self.layouts.values()
-            for name, signal in layout.signals.items()
-        }
-        self.files = ", ".join(str(f.path) for f in files)
-
-    def signal(self, key: str, name: str) -> SignalUnit:
-        """Signal of a key of [signals]."""
-        place = f"{self.source}, [signals] {key}"
-        found = self._full.get(name)
-        if found is None:
-            raise self._missing(place, "signal", name, self._full)
-        layout, signal = found
-        self._refuse_unfit(place, layout, signal)
-        return SignalUnit(layout.name, signal, layout.multiplexed.get(signal.name, ()))
-
-    def message(self, place: str, name: str) -> FrameLayout:
-        """Layout of a message."""
-        if name not in self.layouts:
-            raise self._missing(place, "message", name, self.layouts)
-        return self.layouts[name]
-
-    def inner(self, layout: FrameLayout, key: str, name: str) -> Signal:
-        """Signal of a key of [message.X]: an integer that is in every frame of the message."""
-        place = f"{self.source}, [message.{layout.name}] {key}"
-        signal = layout.signals.get(name)
-        if signal is None:
-            raise self._missing(place, "signal", name, layout.signals)
-        self._refuse_unfit(place, layout, signal)
-        if signal.is_float or signal.length > 32 or layout.multiplexed.get(name):
-            what = (
-                "multiplexed" if name in layout.multiplexed else "a float, or longer than 32 bits"
-            )
-            raise RefusedError(
-                place, f"{name} is {what}", expected="an integer of at most 32 bits in every frame"
-            )
-        return signal
-
-    def _refuse_unfit(self, place: str, layout: FrameLayout, signal: Signal) -> None:
-        last = signal.first_byte + signal.byte_count
-        if last > layout.size:
-            raise RefusedError(
-                place,
-                f"{layout.name}.{signal.name} needs {last} bytes, and the message has "
-                f"{layout.size}",
-                remedy=f"correct {self.files}",
-            )
-        for condition in layout.multiplexed.get(signal.name, ()):
-            if not condition.selector.is_plain:
-                raise RefusedError(
-                    place,
-                    f"its multiplexer {condition.selector.name} has a factor or an offset",
-                    expected="a plain number: tools differ in what they compare",
-                )
-        if layout.name in self._twice:
-            raise RefusedError(
-                place, f"{layout.name} stands in {self.files} twice", expected="one message"
-            )
-
-    def _missing(self, place: str, what: str, name: str, known: Iterable[str]) -> RefusedError:
-        near = nearest(name, known)
-        hint = "; nearest: " + ", ".join(near) if near else ""
-        return RefusedError(
-            place, f"no {what} {name!r}{hint}", expected=f"a {what} of {self.files}"
-        )
-
-
-def nearest(name: str, known: Iterable[str]) -> list[str]:
-    """Names that are most like one."""
-    by_lower = {k.lower(): k for k in known}
-    near = difflib.get_close_matches(name.lower(), by_lower, n=_NEAR, cutoff=0.4)
-    return [by_lower[n] for n in near]
 
 
 def resolved(  # noqa: PLR0917
@@ -156,7 +45,7 @@ def resolved(  # noqa: PLR0917
     RefusedError
         As `read_description`.
     """
-    names = _Names(source, files)
+    names = Names(source, files)
     axes = _axes(names, keys)
     others = {
         key: names.signal(key, text)
@@ -166,7 +55,7 @@ def resolved(  # noqa: PLR0917
     used = [axis.message for axis in axes] + [other.message for other in others.values()]
     for message in messages:
         names.message(f"{source}, [message.{message}]", message)
-    uses = {m: _use(names, m, messages.get(m, MessageKeys())) for m in dict.fromkeys(used)}
+    uses = {m: use_of(names, m, messages.get(m, MessageKeys())) for m in dict.fromkeys(used)}
     _refuse_overlaps(names, uses)
     _refuse_shared_bits(names, [*axes, *others.values()], uses)
     _refuse_idle(names, messages, uses)
@@ -190,7 +79,7 @@ def resolved(  # noqa: PLR0917
     )
 
 
-def _axes(names: _Names, keys: SignalKeys) -> tuple[Recorded, Recorded, Recorded]:
+def _axes(names: Names, keys: SignalKeys) -> tuple[Recorded, Recorded, Recorded]:
     found = []
     by_signal: dict[str, str] = {}
     for axis in AXES:
@@ -216,7 +105,7 @@ def _axes(names: _Names, keys: SignalKeys) -> tuple[Recorded, Recorded, Recorded
     return x, y, z
 
 
-def _temperature(names: _Names, keys: SignalKeys, where: SignalUnit | None) -> Recorded | None:
+def _temperature(names: Names, keys: SignalKeys, where: SignalUnit | None) -> Recorded | None:
     if where is None:
         return None
     place = f"{names.source}, [signals] temperature"
@@ -224,88 +113,7 @@ def _temperature(names: _Names, keys: SignalKeys, where: SignalUnit | None) -> R
     return recorded(where, how, unit, place, TEMPERATURES)
 
 
-def _use(names: _Names, name: str, keys: MessageKeys) -> MessageUse:
-    layout = _with_source(names, names.layouts[name], keys)
-    place = f"{names.source}, [message.{name}]"
-
-    def signal(key: str) -> Signal | None:
-        given = getattr(keys, key)
-        return None if given is None else names.inner(layout, key, given)
-
-    counter, crc, status, mux = (signal(key) for key in ("counter", "crc", "status", "mux"))
-    for one, other in (("crc", "protection"), ("mux", "mux_value")):
-        if (getattr(keys, one) is None) != (getattr(keys, other) is None):
-            absent = other if getattr(keys, other) is None else one
-            raise RefusedError(f"{place} {absent}", "missing", expected=f"{one} and {other}")
-    protection = PROTECTIONS[keys.protection] if keys.protection is not None else None
-    guard = None
-    if crc is not None and protection is not None:
-        guard = Guard(crc, layout.frame_id, counter, keys.data_id, keys.data_id_mode)
-        _refuse_wrong_guard(place, guard, protection.name)
-    own = protection.counter_modulus if protection is not None else 0
-    modulus = keys.counter_modulus or own or (1 << counter.length if counter else 0)
-    if counter is not None and modulus > 1 << counter.length:
-        raise RefusedError(
-            f"{place} counter_modulus",
-            f"found {modulus}",
-            expected=f"at most {1 << counter.length}, the values of {counter.name}",
-        )
-    only = (Condition(mux, (keys.mux_value,)),) if mux and keys.mux_value is not None else ()
-    return MessageUse(layout, counter, modulus, guard, protection, status, keys.status_good, only)
-
-
-def _with_source(names: _Names, layout: FrameLayout, keys: MessageKeys) -> FrameLayout:
-    """Layout whose ID matches as the keys say."""
-    j1939 = layout.j1939 if keys.j1939 is None else keys.j1939
-    place = f"{names.source}, [message.{layout.name}]"
-    if j1939 and not layout.extended:
-        raise RefusedError(
-            f"{place} j1939",
-            f"ID 0x{layout.frame_id:X} of 11 bits",
-            expected="an ID of 29 bits, as J1939 has them",
-        )
-    if keys.source_address is None:
-        return replace(layout, j1939=j1939)
-    if not j1939:
-        raise RefusedError(
-            f"{place} source_address",
-            "given for an ID that is not J1939's",
-            expected="j1939 = true",
-        )
-    return replace(layout, j1939=True, frame_id=(layout.frame_id & ~0xFF) | keys.source_address)
-
-
-def _refuse_wrong_guard(place: str, guard: Guard, name: str) -> None:
-    protection = PROTECTIONS[name]
-    signal = guard.signal
-    aligned = signal.start % 8 == (0 if signal.little_endian else 7)
-    if signal.length not in protection.bits or not aligned:
-        bits = " or ".join(map(str, protection.bits))
-        raise RefusedError(
-            f"{place} crc",
-            f"{signal.name} has {signal.length} bits from bit {signal.start}",
-            expected=f"{bits} bits in whole bytes, the CRC of {protection.label}",
-        )
-    if len(guard.data_ids) != protection.data_ids:
-        raise RefusedError(
-            f"{place} data_id",
-            f"{len(guard.data_ids)} numbers",
-            expected=f"{protection.data_ids} for {protection.label}",
-        )
-    largest = {8: 0xFFFF, 16: 0xFFFF, 32: 0xFFFFFFFF}[signal.length]
-    largest = 0xFF if protection.data_ids > 1 else largest
-    if any(data_id > largest for data_id in guard.data_ids):
-        raise RefusedError(
-            f"{place} data_id", f"found {max(guard.data_ids)}", expected=f"at most {largest}"
-        )
-    needs_counter = protection.data_ids > 1 or guard.data_id_mode == "alternating"
-    if protection.data_ids and needs_counter and guard.counter is None:
-        raise RefusedError(
-            f"{place} counter", "missing", expected=f"the counter that {protection.label} uses"
-        )
-
-
-def _refuse_overlaps(names: _Names, uses: Mapping[str, MessageUse]) -> None:
+def _refuse_overlaps(names: Names, uses: Mapping[str, MessageUse]) -> None:
     seen: list[MessageUse] = []
     for use in uses.values():
         other = next((o for o in seen if o.layout.overlaps(use.layout)), None)
@@ -321,7 +129,7 @@ def _refuse_overlaps(names: _Names, uses: Mapping[str, MessageUse]) -> None:
 
 
 def _refuse_shared_bits(
-    names: _Names, signals: Sequence[SignalUnit], uses: Mapping[str, MessageUse]
+    names: Names, signals: Sequence[SignalUnit], uses: Mapping[str, MessageUse]
 ) -> None:
     """Refuse signals that lie on each other, where both can be in one frame."""
     every = list(signals)
@@ -342,7 +150,7 @@ def _refuse_shared_bits(
                 )
 
 
-def _refuse_idle(names: _Names, messages: Iterable[str], uses: Mapping[str, MessageUse]) -> None:
+def _refuse_idle(names: Names, messages: Iterable[str], uses: Mapping[str, MessageUse]) -> None:
     idle = [m for m in messages if m not in uses]
     if idle:
         raise RefusedError(
@@ -353,7 +161,7 @@ def _refuse_idle(names: _Names, messages: Iterable[str], uses: Mapping[str, Mess
 
 
 def _sample_time(
-    names: _Names, keys: SignalKeys, axes: Sequence[Recorded], where: SignalUnit | None
+    names: Names, keys: SignalKeys, axes: Sequence[Recorded], where: SignalUnit | None
 ) -> SampleTime | None:
     if where is None:
         return None
@@ -378,7 +186,7 @@ def _sample_time(
     return SampleTime(where, float(tick_us))
 
 
-def _whole(names: _Names, key: str, where: SignalUnit | None) -> SignalUnit | None:
+def _whole(names: Names, key: str, where: SignalUnit | None) -> SignalUnit | None:
     if where is not None and (where.signal.is_float or where.signal.length > 32):
         raise RefusedError(
             f"{names.source}, [signals] {key}",
@@ -389,7 +197,7 @@ def _whole(names: _Names, key: str, where: SignalUnit | None) -> SignalUnit | No
 
 
 def _joining(
-    names: _Names,
+    names: Names,
     keys: SignalKeys,
     axes: Sequence[Recorded],
     uses: Mapping[str, MessageUse],

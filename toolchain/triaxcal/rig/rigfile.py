@@ -10,10 +10,11 @@ from pathlib import Path
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import Values, each_of
 from triaxcal.rig.busfile import read_bus_file
+from triaxcal.rig.buslookup import Described
 from triaxcal.rig.description import RigDescription
 from triaxcal.rig.layout import FrameLayout
 from triaxcal.rig.lines import MOST_COLUMNS, LineFormat
-from triaxcal.rig.resolve import Described, resolved
+from triaxcal.rig.resolve import resolved
 from triaxcal.rig.rigkeys import MessageKeys, RigKeys, SignalKeys, rig_file
 from triaxcal.rig.shippedrigs import descriptions_folder
 

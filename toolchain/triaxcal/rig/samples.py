@@ -10,7 +10,7 @@ the unit's own clock must then agree, or the sample is marked as a jump (`triaxc
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,9 +19,16 @@ from triaxcal.model.types import IntArray
 from triaxcal.rig.description import MessageUse, RigDescription
 from triaxcal.rig.frames import BoolArray, Frames
 from triaxcal.rig.join import AgeJoin, CounterJoin, Joined, NoJoin, Part
-from triaxcal.rig.layout import Condition
 from triaxcal.rig.nominal import AS_SENT, Coding
 from triaxcal.rig.numbering import Clocks, Numbering
+from triaxcal.rig.parts import (
+    PartPlan,
+    codes_of,
+    first_of,
+    lacking,
+    parts_of,
+    status_of_parts,
+)
 from triaxcal.rig.recorded import Recorded, SignalUnit
 from triaxcal.rig.rows import Rows, available, rows_of, status_of
 
@@ -71,15 +78,6 @@ _MOST_LOST = 255
 """Frames counted for one step of a counter: after a restart it means nothing."""
 
 
-@dataclass(frozen=True)
-class _PartPlan:
-    """What to take from the frames of one part."""
-
-    use: MessageUse
-    conditions: tuple[Condition, ...]
-    axes: tuple[int, ...]
-
-
 class SampleDecoder:
     """Turns frames of one unit into samples, remembering what a batch leaves open.
 
@@ -94,7 +92,7 @@ class SampleDecoder:
     def __init__(self, rig: RigDescription, rate_hz: int, coding: Coding = AS_SENT) -> None:
         self._rig = rig
         self._coding = coding
-        self._parts = _parts(rig)
+        self._parts = parts_of(rig)
         self._seen = 0
         lead = self._lead
         numbers = self._parts[lead].use.counter is not None and (
@@ -134,7 +132,7 @@ class SampleDecoder:
         found = {name: rows_of(use, frames, seen) for name, use in rig.messages.items()}
         rows = {name: good for name, (good, _) in found.items()}
         joined = self._join.feed([self._part(plan, rows[plan.use.name]) for plan in self._parts])
-        invalid = _invalid(joined)
+        invalid = lacking(joined)
         if invalid is not None:
             fit = np.flatnonzero(~invalid)
             parts = [part.take(fit) for part in joined.parts]
@@ -143,8 +141,8 @@ class SampleDecoder:
         else:
             dropped = joined.place[:0]
         before = self._numbering.last
-        sequence = _first_of(part.sequence for part in joined.parts)
-        time = _first_of(part.time for part in joined.parts)
+        sequence = first_of(part.sequence for part in joined.parts)
+        time = first_of(part.time for part in joined.parts)
         zero = np.zeros(len(joined.place), np.int64)
         number, duplicate, jump = self._numbering.number(
             joined.t_ns, zero if sequence is None else sequence, zero if time is None else time
@@ -166,7 +164,7 @@ class SampleDecoder:
             (number_before(self._lost(rows)), LOST_FRAME),
         )
         new = ~duplicate
-        codes, status = _codes(joined.parts, self._parts), _status(joined.parts, zero)
+        codes, status = codes_of(joined.parts, self._parts), status_of_parts(joined.parts, zero)
         if not new.all():
             number, codes, status, jump = number[new], codes[new], status[new], jump[new]
         return Samples(
@@ -190,7 +188,7 @@ class SampleDecoder:
             ),
         )
 
-    def _part(self, plan: _PartPlan, rows: Rows) -> Part:
+    def _part(self, plan: PartPlan, rows: Rows) -> Part:
         """Columns of one part."""
         use = plan.use
         rows = rows.where(plan.conditions)
@@ -278,46 +276,3 @@ class SampleDecoder:
             if lost.any():
                 places.append(np.repeat(mine.place, np.minimum(lost, _MOST_LOST)))
         return places[0] if len(places) == 1 else np.sort(np.concatenate(places))
-
-
-def _parts(rig: RigDescription) -> list[_PartPlan]:
-    """Parts of a sample: what one frame gives of it."""
-    by_frame: dict[tuple[str, tuple[Condition, ...]], list[int]] = {}
-    for i, axis in enumerate(rig.axes):
-        by_frame.setdefault((axis.message, axis.conditions), []).append(i)
-    return [
-        _PartPlan(rig.messages[name], conditions, tuple(axes))
-        for (name, conditions), axes in by_frame.items()
-    ]
-
-
-def _first_of(columns: Iterable[IntArray | None]) -> IntArray | None:
-    return next((column for column in columns if column is not None), None)
-
-
-def _invalid(joined: Joined) -> BoolArray | None:
-    """Which samples lack a number; None where none does."""
-    goods = [part.good for part in joined.parts if part.good is not None]
-    if not goods:
-        return None
-    good: BoolArray = np.logical_and.reduce(goods)
-    return None if good.all() else ~good
-
-
-def _codes(parts: list[Part], plans: list[_PartPlan]) -> np.ndarray:
-    """What is recorded, shape (n, 3)."""
-    by_axis = {
-        axis: column
-        for part, plan in zip(parts, plans, strict=True)
-        for axis, column in zip(plan.axes, part.axes, strict=True)
-    }
-    return np.stack([by_axis[axis] for axis in range(3)], axis=1)
-
-
-def _status(parts: list[Part], zero: IntArray) -> IntArray:
-    """Status of all parts of a sample, or-ed."""
-    said = [part.status for part in parts if part.status is not None]
-    status = said[0] if said else zero
-    for other in said[1:]:
-        status = status | other
-    return status

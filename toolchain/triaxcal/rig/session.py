@@ -50,9 +50,11 @@ class Session(State):
         self.bad_crc += block.trouble.bad_crc
         if before is not None and block.index > before.index + 1:
             self.gaps.append((before.index, block.index - before.index - 1))
-        wrong = fault(block, before, self.plan)
+        wrong = fault(block, before, self.plan, self.fine)
         limits, scale = self.plan.stillness, self.micro_g_per_code
-        self.unrest = wrong or motion(block, before, self.reference, limits, scale)
+        self.unrest = wrong or motion(
+            block, before, self.reference, limits, scale, step_code=self.step_code
+        )
         if found := wrong or complaint(block):
             self.say("trouble", block.t_ns, str(found), reasons=(found,))
         self.look(block)

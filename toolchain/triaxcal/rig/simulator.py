@@ -19,7 +19,8 @@ from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.identity import sent_serial
 from triaxcal.rig.nominal import coding_of
 from triaxcal.rig.plan import SessionPlan
-from triaxcal.rig.simframes import FrameMaker, with_frame_faults
+from triaxcal.rig.simfaults import with_frame_faults
+from triaxcal.rig.simframes import FrameMaker
 from triaxcal.rig.simorders import Fault
 from triaxcal.simulation.tilts import truth_force_g
 from triaxcal.simulation.truth import Truth, codes_of_voltage

@@ -62,6 +62,8 @@ class State:
         self.unit = unit
         self.micro_g_per_code = nominal.micro_g_per_code
         self.zero_code = nominal.zero_code
+        self.step_code = nominal.step_code
+        self.fine = nominal.fine
         self.durable = [event for event in history if event.kind in DURABLE]
         self.lost = self.bad_crc = 0
         self.gaps: list[tuple[int, int]] = []

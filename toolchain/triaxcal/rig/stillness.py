@@ -17,6 +17,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.rig.blocks import Block
 from triaxcal.rig.plan import Stillness
 from triaxcal.rig.reasons import Reason, Why, because
+from triaxcal.rig.rounding import FLICKER, LEAST_VARIANCE, ONE_CODE, at_least, hides, rounding
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,12 @@ class Average:
     readings: int
 
 
-def make_reference(blocks: Sequence[Block], settings: Stillness) -> Reference | int:
+def make_reference(
+    blocks: Sequence[Block], settings: Stillness, step_code: FloatArray = ONE_CODE
+) -> Reference | int:
     """Noise of blocks at rest, or the place of the last block that moved among them."""
     variances = np.array([b.variance for b in blocks])
-    median = np.median(variances, axis=0)
+    median = at_least(np.median(variances, axis=0), step_code)
     limit = _moving_ratio(settings, blocks[0].count)
     moving = np.flatnonzero((variances > limit * median).any(axis=1))
     if len(moving):
@@ -82,6 +85,8 @@ def motion(
     reference: Reference | None,
     settings: Stillness,
     micro_g_per_code: FloatArray,
+    *,
+    step_code: FloatArray = ONE_CODE,
 ) -> Reason | None:
     """Why a block is not at rest; None when it is."""
     if previous is not None and previous.index == block.index - 1:
@@ -90,7 +95,7 @@ def motion(
         if step[axis] > settings.moving_step_micro_g:
             return because(Why.MOVED, micro_g=float(step[axis]), axis=AXES[axis])
     if reference is not None:
-        ratio = np.array(block.variance) / _at_least(reference.variance)
+        ratio = np.array(block.variance) / at_least(reference.variance, step_code)
         axis = int(np.argmax(ratio))
         if ratio[axis] > _moving_ratio(settings, block.count):
             return because(Why.SHAKEN, ratio=float(ratio[axis]), axis=AXES[axis])
@@ -107,6 +112,8 @@ def refusals(
     reference: Reference,
     settings: Stillness,
     micro_g_per_code: FloatArray,
+    *,
+    step_code: FloatArray = ONE_CODE,
 ) -> list[Reason]:
     """Why an average is not to be trusted; empty when it is.
 
@@ -115,8 +122,9 @@ def refusals(
     """
     scale = np.abs(micro_g_per_code)
     averaged = rest[dwell]
-    slip_t, slip = _slip(rest, dwell.start, reference, scale)
-    creep_t, creep = _creep(rest, reference, scale)
+    noise = _noise_of_means(_means(rest), rest[0].count, reference, step_code)
+    slip_t, slip = _slip(rest, dwell.start, noise, scale)
+    creep_t, creep = _creep(rest, noise, scale)
     # Large creep looks like a step too, and a step like creep: the better fit gives the name.
     if creep_t > max(settings.creep_t, slip_t):
         found = [creep]
@@ -126,8 +134,10 @@ def refusals(
         found = [creep]
     else:
         found = _slope(averaged, settings, scale)
-    found += _noise(averaged, reference, settings)
-    u_micro_g = np.array(average(averaged, settings, micro_g_per_code).u_code) * scale
+    found += _noise(averaged, reference, settings, step_code)
+    u_micro_g = (
+        np.array(average(averaged, settings, micro_g_per_code, step_code=step_code).u_code) * scale
+    )
     axis = int(np.argmax(u_micro_g))
     if u_micro_g[axis] > settings.u_max_micro_g:
         limit = settings.u_max_micro_g
@@ -136,10 +146,17 @@ def refusals(
     return found
 
 
-def average(dwell: Sequence[Block], settings: Stillness, micro_g_per_code: FloatArray) -> Average:
+def average(
+    dwell: Sequence[Block],
+    settings: Stillness,
+    micro_g_per_code: FloatArray,
+    *,
+    step_code: FloatArray = ONE_CODE,
+) -> Average:
     """Mean of a dwell, u(A) from batch means (GUM 4.2 with batches as the observations).
 
-    Batches, because filtered samples are correlated: s / sqrt(n) would be far too small.
+    Batches, because filtered samples are correlated: s / sqrt(n) would be far too small. What
+    rounding leaves in the mean, where the noise is small against a step, is added in quadrature.
     """
     readings = sum(b.count for b in dwell)
     totals = [sum(b.total[axis] for b in dwell) for axis in range(3)]
@@ -152,6 +169,7 @@ def average(dwell: Sequence[Block], settings: Stillness, micro_g_per_code: Float
     )
     floor = settings.allan_floor_micro_g / np.abs(micro_g_per_code)
     u_squared = np.var(means, axis=0, ddof=1) / settings.batches + floor**2
+    u_squared += rounding(_pooled(dwell)[0], step_code)
     return Average(
         mean_code=_triple(np.array([total / readings for total in totals])),
         u_code=_triple(np.sqrt(u_squared)),
@@ -181,14 +199,13 @@ def _moving_ratio(settings: Stillness, count: int) -> float:
 
 
 def _slip(
-    blocks: Sequence[Block], start: int, reference: Reference, scale: FloatArray
+    blocks: Sequence[Block], start: int, noise: FloatArray, scale: FloatArray
 ) -> tuple[float, Reason]:
     """The largest step between what lies before and after any moment: t value, and reason."""
     means = _means(blocks)
     n = len(means)
     if n < 4:
         return 0.0, because(Why.SLIP)
-    noise = _noise_of_means(means, reference)
     sums = np.cumsum(means - means[0], axis=0)
     # Two blocks at least on either side: one alone is the motion detector's business.
     split = np.arange(2, n - 1)
@@ -202,14 +219,13 @@ def _slip(
     return float(t[at, axis]), slip
 
 
-def _creep(rest: Sequence[Block], reference: Reference, scale: FloatArray) -> tuple[float, Reason]:
+def _creep(rest: Sequence[Block], noise: FloatArray, scale: FloatArray) -> tuple[float, Reason]:
     """What settles exponentially since the unit was left alone: t value, and reason.
 
     The best test there is for a known form in white noise is its correlation with that form
     (matched filter); a straight line finds a tenth of it.
     """
     means = _means(rest)
-    noise = _noise_of_means(means, reference)
     t_s = np.array([b.index - rest[0].index for b in rest], np.float64) + 0.5
     best = (0.0, 0, 0.0, 0.0)
     for tau_s in _CREEP_TAU_S:
@@ -232,9 +248,11 @@ def _slope(dwell: Sequence[Block], settings: Stillness, scale: FloatArray) -> li
     return [because(Why.CREEP, micro_g_per_min=float(slope[axis]), axis=AXES[axis])]
 
 
-def _noise(dwell: Sequence[Block], reference: Reference, settings: Stillness) -> list[Reason]:
+def _noise(
+    dwell: Sequence[Block], reference: Reference, settings: Stillness, step_code: FloatArray
+) -> list[Reason]:
     pooled, readings = _pooled(dwell)
-    ratio = pooled / _at_least(reference.variance)
+    ratio = pooled / at_least(reference.variance, step_code)
     limit = 1.0 + settings.noise_sigma * np.sqrt(2.0 / readings + 2.0 / reference.readings)
     axis = int(np.argmax(ratio))
     if ratio[axis] > limit:
@@ -242,11 +260,17 @@ def _noise(dwell: Sequence[Block], reference: Reference, settings: Stillness) ->
     return []
 
 
-def _noise_of_means(means: FloatArray, reference: Reference) -> FloatArray:
+def _noise_of_means(
+    means: FloatArray, count: int, reference: Reference, step_code: FloatArray
+) -> FloatArray:
     """Variance of a block's mean, of these and of the reference together, shape (3,)."""
     n = len(means)
     shared = np.array(reference.block_variance) * reference.blocks
-    return _at_least((_neighbour_variance(means) * n + shared) / (n + reference.blocks))
+    found = (_neighbour_variance(means) * n + shared) / (n + reference.blocks)
+    hidden = hides(np.array(reference.variance), step_code)
+    least = np.where(hidden, FLICKER / count * step_code**2, LEAST_VARIANCE)
+    noise: FloatArray = np.maximum(found, np.maximum(least, LEAST_VARIANCE))
+    return noise
 
 
 def _means(blocks: Sequence[Block]) -> FloatArray:
@@ -267,11 +291,6 @@ def _neighbour_variance(means: FloatArray) -> FloatArray:
     """
     differences = np.diff(means, axis=0)
     return np.asarray((differences**2).sum(axis=0) / (2.0 * len(differences)), np.float64)
-
-
-def _at_least(variance: FloatArray | tuple[float, float, float]) -> FloatArray:
-    """A variance, no smaller than that of rounding to a code: noise can hide in one code."""
-    return np.maximum(np.asarray(variance, np.float64), 1.0 / 12.0 / 1e4)
 
 
 def _triple(values: FloatArray) -> tuple[float, float, float]:
