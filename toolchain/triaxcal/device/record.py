@@ -118,7 +118,7 @@ def read_record(path: Path) -> DeviceRecord | None:
     """
     try:
         return parsed_record(path.read_bytes(), str(path))
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
         raise refused_by_system(path, "read", error) from error
