@@ -129,6 +129,7 @@ def test_bent_curves_of_the_biases_are_no_fault(temps, powers):
     assert "step" not in {s.cause for s in found.answer}
 
 
+@pytest.mark.long
 def test_a_fault_is_certain_only_where_each_cause_of_the_answer_spoils_constants():
     data = readings(curved((8.0, 4.0)), NINE, sd_v=1e-5, count=400, spread_degc=0.05)
     away = with_temperature(data, -40.0, 200.0)

@@ -376,7 +376,9 @@ def test_two_folders_change_places(tmp_path):
 # ---- Clocks ----
 
 
-@pytest.mark.parametrize("step_s", [-7200, -1, 1, 7200])
+@pytest.mark.parametrize(
+    "step_s", [-7200, *(pytest.param(s, marks=pytest.mark.long) for s in (-1, 1, 7200))]
+)
 def test_a_step_of_the_clock_costs_no_dwell_and_makes_none_wrong(tmp_path, step_s):
     """In the middle of the third dwell, and back again in the fifth."""
     setup = short_setup(tmp_path, temps="[20]")
