@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
+import numpy as np
 from rig_cases import BENCH, FAST, SHORT_PLAN
 
 from triaxcal.rig.canbus import VirtualSource
@@ -15,6 +17,8 @@ from triaxcal.rig.manysetup import ManySetup, many_of_plan
 from triaxcal.rig.simbench import SimulatedBench, simulated_bench
 from triaxcal.rig.simhands import simulated_attendant
 from triaxcal.rig.simulator import RigSettings
+from triaxcal.simulation.tilts import truth_force_g
+from triaxcal.simulation.truth import read_truth
 
 PER_BUS = 16
 ID_STEP = 0x10
@@ -96,3 +100,25 @@ class Run:
     def accepted(self, name: str) -> list[tuple[int, str]]:
         mine = [e for m, e in self.told if m.name == name and e.kind == "accepted"]
         return [(e.step, e.dwell.position) for e in mine]
+
+
+def expected_codes(place, position, temp_degc):
+    """Codes of the truth: U = K(T) a + U0(T) by the volts of a code."""
+    truth, _ = read_truth(place.setup.folder)
+    force = truth_force_g(position, place.setup.unit.gravity_g)
+    volts = truth.voltage_v(force[None], np.array([temp_degc]))[0]
+    return volts / place.setup.unit.adc.volts_per_code
+
+
+def refuse_false_records(place, folder):
+    """Every row of a unit's records is the unit's own truth, within six of its deviations."""
+    with (folder / "measurements.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert rows
+    for row in rows:
+        temp = float(row["temp_code"]) * place.setup.unit.temperature_sensor.degc_per_code
+        exact = expected_codes(place, row["position"], temp)
+        for axis, code in zip("xyz", exact, strict=True):
+            u = float(row[f"sd_u{axis}_code"]) / float(row["count"]) ** 0.5
+            assert abs(float(row[f"u{axis}_code"]) - code) < 6.0 * u + 1.0
+    return len(rows)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-
 import numpy as np
 import pytest
-from many_cases import Run, bench_of, plan_of, setup_of
+from many_cases import Run, bench_of, plan_of, refuse_false_records, setup_of
 
 from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.rig.frames import ERR_FLAG, Frames, alike, concatenate
@@ -17,8 +15,6 @@ from triaxcal.rig.recording import JOURNAL_FILE
 from triaxcal.rig.replay import replay
 from triaxcal.rig.split import Splitter
 from triaxcal.rig.store import write_records
-from triaxcal.simulation.tilts import truth_force_g
-from triaxcal.simulation.truth import read_truth
 
 J1939_UNIT = """
 format = 1
@@ -177,28 +173,6 @@ def test_a_unit_that_is_silent_from_the_start_is_refused(tmp_path):
     run = Run(setup, bench_of(setup, "AT-2/linkdown@0:1:99"), tmp_path / "001")
     with pytest.raises(RefusedError, match="can0, AT-2: no readings for 5 s"):
         run.go()
-
-
-def expected_codes(place, position, temp_degc):
-    """Codes of the truth: U = K(T) a + U0(T) by the volts of a code."""
-    truth, _ = read_truth(place.setup.folder)
-    force = truth_force_g(position, place.setup.unit.gravity_g)
-    volts = truth.voltage_v(force[None], np.array([temp_degc]))[0]
-    return volts / place.setup.unit.adc.volts_per_code
-
-
-def refuse_false_records(place, folder):
-    """Every row of a unit's records is the unit's own truth, within six of its deviations."""
-    with (folder / "measurements.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    assert rows
-    for row in rows:
-        temp = float(row["temp_code"]) * place.setup.unit.temperature_sensor.degc_per_code
-        exact = expected_codes(place, row["position"], temp)
-        for axis, code in zip("xyz", exact, strict=True):
-            u = float(row[f"sd_u{axis}_code"]) / float(row["count"]) ** 0.5
-            assert abs(float(row[f"u{axis}_code"]) - code) < 6.0 * u + 1.0
-    return len(rows)
 
 
 @pytest.mark.long
