@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 from many_cases import Run, bench_of, plan_of, refuse_false_records, setup_of
+from rich.console import Console
 
 from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.rig.frames import ERR_FLAG, Frames, alike, concatenate
 from triaxcal.rig.journal import read_journal
 from triaxcal.rig.manyreplay import replay_bus
+from triaxcal.rig.manyscreen import group_line, many_screen
 from triaxcal.rig.manysetup import many_of_plan, one_of_plan
+from triaxcal.rig.phases import Turning
 from triaxcal.rig.recording import JOURNAL_FILE
 from triaxcal.rig.replay import replay
 from triaxcal.rig.split import Splitter
@@ -265,3 +270,26 @@ def test_what_hits_all_alike_stops_an_unattended_run(tmp_path):
     with pytest.raises(RefusedError, match=r"run: [23] units at 20 degC 2 times, the last"):
         run.go()
     assert not any(m.aside for m in run.group.members)
+
+
+def test_the_screen_asks_a_person_to_turn_and_nobody_where_a_table_does(tmp_path):
+    setup = setup_of(tmp_path, 2)
+    for alone, line in ((False, "TURN TO TP1 (+Z up)"), (True, "THE TABLE TURNS TO TP1 (+Z up)")):
+        bench = bench_of(setup)
+        bench.turn_to("TP3")
+        run = Run(setup, bench, tmp_path / f"{alone}", alone=alone)
+        run.hands = None
+        for member in run.group.members:
+            member.engine.session.phase = Turning()
+        assert group_line(run.group) == line
+        text = drawn(many_screen(run.group, "001", "12:00", ""))
+        assert text.splitlines()[0].startswith(" 2 units   session 001   ends 12:00   0/12")
+        assert [name in text for name in ("AT-1", "AT-2", "NO READINGS")] == [True] * 3
+        run.taken.close()
+        run.sources.close()
+
+
+def drawn(view) -> str:
+    console = Console(width=80, height=24, file=io.StringIO(), record=True)
+    console.print(view)
+    return console.export_text()

@@ -38,7 +38,7 @@ class Recent:
         """Take what a pass of the loop brought."""
         said = [f"{m.name} {e.text}" for m, e in tick.told if e.kind in _SAID]
         said += [f"{m.name} set aside: {m.aside}" for m in tick.asides]
-        self._alarms.extend((now_s, text) for text in (*said, *tick.notes, *tick.done))
+        self._alarms.extend((now_s, text) for text in (*said, *tick.notes))
 
     def alarm(self, now_s: float) -> str:
         """The last one; "" when there is none."""
@@ -85,7 +85,7 @@ def group_line(group: Group) -> str:
     return {
         "reference": f"LEARNING THE NOISE in {position} - do not touch",
         "temperature": f"WAIT FOR {target:g} degC - in {position}, do not touch",
-        "turn": f"TURN TO {position}",
+        "turn": f"TURN TO {position}" if group.follow else f"THE TABLE TURNS TO {position}",
         "dwell": f"MEASURING {position} - do not touch",
     }[stage]
 
@@ -113,7 +113,9 @@ def _order(group: Group) -> str:
     stage = group.stage
     if stage == "done":
         return "DONE"
-    if stage == "turn" or group.seen != group.position:
+    if not group.follow and stage == "turn":
+        return "HANDS OFF"
+    if group.follow and group.seen != group.position:
         return f"TURN TO {up_letters(group.position)}"
     if stage == "temperature":
         return f"WAIT FOR {group.target_degc:g}"
