@@ -14,9 +14,16 @@ _QUEUE = 1024
 
 
 class _Reader:
-    """One source in a thread of its own, so that none waits for another."""
+    """One source in a thread of its own, so that none waits for another.
+
+    Attributes
+    ----------
+    error : Exception or None
+        Why it gives no more; what came before has been taken.
+    """
 
     def __init__(self, source: Source) -> None:
+        self.error: Exception | None = None
         self._source = source
         self._queue: queue.Queue[Frames | Exception] = queue.Queue(_QUEUE)
         self._stop = threading.Event()
@@ -45,7 +52,8 @@ class _Reader:
             while True:
                 item = self._queue.get(timeout=0.0 if found else wait_s)
                 if isinstance(item, Exception):
-                    raise item
+                    self.error = item
+                    return found
                 found.append(item)
         except queue.Empty:
             return found
@@ -81,6 +89,9 @@ class Gathered:
         """
         if not self._readers:
             return [(bus, source.read()) for bus, source in self.sources.items()]
+        for reader in self._readers.values():
+            if reader.error is not None:
+                raise reader.error
         return [
             (bus, frames)
             for bus, reader in self._readers.items()
