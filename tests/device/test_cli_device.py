@@ -6,6 +6,7 @@ import importlib.util
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -72,6 +73,68 @@ def test_the_whole_way(bench: Bench, tmp_path: Path) -> None:
         assert abs(float(error[1])) <= 4 * float(error[2]) + 1e-3
         told = run("flash", bench.file, *bus, "--power-cycle", answer="\n")
         assert "after the power cycle too" in told
+
+
+@pytest.fixture(scope="module")
+def flashed(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    pytest.importorskip("pyxcp")
+    from device.bridge import bridged
+
+    made = bench_of_at_sim(tmp_path_factory.mktemp("flashed"))
+    with bridged(made.node) as name:
+        run("flash", made.file, "--bus", name)
+    return made
+
+
+def test_a_length_beyond_the_limit_at_rest_is_not_verified(flashed: Bench) -> None:
+    from device.bridge import bridged
+
+    flashed.turn(0, 0, 1, gravity_g=flashed.gravity_g - 4.99e-3)
+    with bridged(flashed.node) as name:
+        text = refused("verify", UNITS / "AT-SIM", "--bus", name)
+        there = f"{(flashed.gravity_g - 4.99e-3) * 9.80665:.6f}"
+        told = run("verify", UNITS / "AT-SIM", "--bus", name, "--gravity", there)
+    error = re.search(r"not verified: \|a\| - g is (-[0-9.]+) mg at rest, every bit", text)
+    assert error is not None
+    # The noise of the mean is some micro-g.
+    assert float(error[1]) == pytest.approx(-4.99, abs=0.02)
+    assert "\n" not in text
+    assert ": verified on device AT-SIM-001" in told
+
+
+@pytest.mark.parametrize("steps", ["at random", "slowly"])
+def test_a_unit_that_moves_is_compared_but_not_judged(flashed: Bench, steps: str) -> None:
+    from device.atsim import ROWS, codes
+    from device.bridge import bridged
+    from device.node import write_samples
+
+    # Turned by up to 60 degrees about y, in an order that is one turn, or none at all.
+    angles = np.radians(np.linspace(0.0, 60.0, ROWS))
+    if steps == "at random":
+        angles = np.random.default_rng(3).permutation(angles)
+    forces = np.column_stack([np.sin(angles), 0 * angles, np.cos(angles)]) * flashed.gravity_g
+    found = [codes(flashed.delivery, force) for force in forces]
+    write_samples(flashed.node.samples, found[0][0], np.vstack([raw[:1] for _, raw in found]))
+    with bridged(flashed.node) as name:
+        told = run("verify", UNITS / "AT-SIM", "--bus", name)
+    assert ": every bit verified on device AT-SIM-001" in told
+    assert "|a| - g not judged: not at rest, the samples scatter by " in told
+
+
+@pytest.mark.parametrize(("sd_g", "slope_g"), [(1e-5, 0.0), (3e-3, 0.0), (1e-5, 4e-3)])
+def test_what_is_rest(sd_g: float, slope_g: float) -> None:
+    """White noise is rest, also one larger than the limit of 1 mg; a drift beyond it is not."""
+    from triaxcal.device.compare import Samples
+    from triaxcal.device.rest import why_not_at_rest
+
+    n = 100
+    force_g = np.array([0, 0, 1.0]) + sd_g * np.random.default_rng(2).standard_normal((n, 3))
+    force_g[:, 0] += slope_g * np.arange(n) / n
+    accel, zero = np.rint(force_g * 2**24).astype(np.int32), np.zeros(n, np.int32)
+    samples = Samples(zero, zero, accel, accel, zero.astype(np.uint32))
+    why = why_not_at_rest(samples, 24, 1e-3)
+    # The standard deviation of an even drift is its length / sqrt(12).
+    assert why == ("" if not slope_g else "not at rest, the samples scatter by 1.16 mg")
 
 
 def test_a_bus_that_is_none() -> None:

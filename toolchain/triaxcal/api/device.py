@@ -23,11 +23,13 @@ from triaxcal.device.record import (
     record_path,
     sha256_of,
 )
+from triaxcal.device.rest import Allowed
 from triaxcal.device.unit import require_in_use
 from triaxcal.model.positions import CHECK_POSITIONS
 from triaxcal.report.files import CERTIFICATE, all_files
 from triaxcal.report.passport.content import passport
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.thermal import near_t0
 from triaxcal.verify.record import RENEWED, is_delivered, tools_of
 
 
@@ -47,6 +49,16 @@ def require_delivered(delivery: Delivery, target: Path) -> None:
             expected=f"the files of {delivery.unit.name} as it is now",
             remedy="run `triaxcal calib` first, and flash the device",
         )
+
+
+def allowed_length(delivery: Delivery, temp_code: float) -> Allowed:
+    """What |a| - g may be at the temperature of a code."""
+    unit, uncertainty = delivery.unit, delivery.firmware.uncertainty
+    temp_degc = unit.temperature_sensor.degc(temp_code)
+    at_t0_g, over_range_g = uncertainty.length_g
+    near = near_t0(temp_degc, unit.t0_degc)
+    limit_g, _ = unit.limits.at(temp_degc, unit.t0_degc)
+    return Allowed(limit_g, at_t0_g if near else over_range_g)
 
 
 def verify_at_positions(  # noqa: PLR0917

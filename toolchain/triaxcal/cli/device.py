@@ -201,7 +201,7 @@ def verify(  # noqa: PLR0917
     """Compare a node's samples with the integer model.
 
     Result and status of each must be equal bit for bit. The node must have this UNIT's
-    calibration in use. With --positions, passport and certificate state the result.
+    calibration in use. At rest |a| - g is judged too. With --positions, passport and certificate state the result.
     """
     from triaxcal.api.unit import read_unit  # noqa: PLC0415
     from triaxcal.delivery.unit import deliver  # noqa: PLC0415
@@ -239,9 +239,11 @@ def verify(  # noqa: PLR0917
 def _verify_samples(
     opener: Opener, delivery: Delivery, samples: int, gravity_m_per_s2: float | None
 ) -> None:
+    from triaxcal.api.device import allowed_length  # noqa: PLC0415
     from triaxcal.codegen.crosscheck import python_routine  # noqa: PLC0415
     from triaxcal.codegen.names import names_of  # noqa: PLC0415
     from triaxcal.device.compare import compare, take_samples  # noqa: PLC0415
+    from triaxcal.device.rest import judge_length  # noqa: PLC0415
     from triaxcal.device.unit import require_in_use  # noqa: PLC0415
     from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2  # noqa: PLC0415
 
@@ -257,12 +259,19 @@ def _verify_samples(
     routine = python_routine(plan, taken.rate)
     found = compare(taken, routine, plan.shape.output_q, gravity_g)
     found.refuse_difference(name)
+    allowed = allowed_length(delivery, float(taken.temp.mean()))
+    why_not = judge_length(name, taken, found, plan.shape.output_q, allowed)
+    length = f"not judged: {why_not}"
+    if not why_not:
+        length = (
+            f"{1e3 * found.length_error_g:+.3f} mg of the mean, standard error "
+            f"{1e3 * found.length_sd_g:.3f} mg; at rest, limit {1e3 * allowed.limit_g:g} mg"
+        )
     say(
-        f"{name}: verified on device {node.serial}\n"
+        f"{name}: {'every bit ' if why_not else ''}verified on device {node.serial}\n"
         f"  samples         {found.samples}, largest difference 0 LSB; "
         f"{found.flagged} with a status other than 0\n"
-        f"  |a| - g         {1e3 * found.length_error_g:+.3f} mg of the mean, standard error "
-        f"{1e3 * found.length_sd_g:.3f} mg; for a unit at rest only"
+        f"  |a| - g         {length}"
     )
 
 
