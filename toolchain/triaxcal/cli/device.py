@@ -201,7 +201,8 @@ def verify(  # noqa: PLR0917
     """Compare a node's samples with the integer model.
 
     Result and status of each must be equal bit for bit. The node must have this UNIT's
-    calibration in use. At rest |a| - g is judged too. With --positions, passport and certificate state the result.
+    calibration in use. At rest |a| - g is judged too. With --positions, passport and certificate
+    state the result.
     """
     from triaxcal.api.unit import read_unit  # noqa: PLC0415
     from triaxcal.delivery.unit import deliver  # noqa: PLC0415
