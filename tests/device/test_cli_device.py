@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from builds import UNITS
 from device.atsim import Bench, bench_of_at_sim
-from triaxcal.base.errors import RefusedError
+from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.cli.main import main
 
 
@@ -135,6 +135,45 @@ def test_what_is_rest(sd_g: float, slope_g: float) -> None:
     why = why_not_at_rest(samples, 24, 1e-3)
     # The standard deviation of an even drift is its length / sqrt(12).
     assert why == ("" if not slope_g else "not at rest, the samples scatter by 1.16 mg")
+
+
+AN_ID = "expected 0 to 0x7ff, or a 29-bit id with bit 31 set"
+COMMANDS = {
+    "identify": ["identify", "--bus", "virtual:ids"],
+    "read": ["read", "found.bin", "--bus", "virtual:ids"],
+    "flash": ["flash", "none.bin", "--bus", "virtual:ids"],
+    "verify": ["verify", UNITS / "AT-SIM", "--bus", "virtual:ids"],
+    "a2l": ["a2l", UNITS / "AT-SIM", "none.a2l"],
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("option", "value", "found"),
+    [
+        ("--request-id", "0x800", f"0x800; {AN_ID}: 0x80000800"),
+        ("--response-id", "0x1fffffff", f"0x1fffffff; {AN_ID}: 0x9fffffff"),
+        ("--response-id", "0xa0000000", f"0xa0000000; {AN_ID}"),
+        ("--request-id", "-1", f"-0x1; {AN_ID}"),
+        ("--response-id", "0x650", "0x650; expected another id than --request-id"),
+    ],
+)  # fmt: skip
+def test_what_is_no_can_id(command: str, option: str, value: str, found: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        run(*COMMANDS[command], option, value)
+    assert str(caught.value) == f"{option}: found {found}"
+
+
+def test_29_bits_reach_the_bus(capfd: pytest.CaptureFixture[str]) -> None:
+    """0x80000650 is the frame 0x650 of 29 bits, for which the bus has a listener of its own."""
+    can = pytest.importorskip("can")
+    pytest.importorskip("pyxcp")
+    with can.Bus(interface="virtual", channel="ids-29") as bus:
+        ids = ("--request-id", "0x80000650", "--response-id", "0x80000651")
+        assert "no answer" in refused("identify", "--bus", "virtual:ids-29", *ids)
+        message = bus.recv(1)
+    assert (message.arbitration_id, message.is_extended_id) == (0x650, True)
+    assert "properly shut down" not in capfd.readouterr().err
 
 
 def test_a_bus_that_is_none() -> None:

@@ -292,6 +292,14 @@ def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
         bus.shutdown()
 
 
+def test_a_bus_is_closed_when_the_master_takes_no_such_id() -> None:
+    bus = can.Bus(interface="virtual", channel="no-such-id")
+    with pytest.raises(Exception, match="2048"):
+        Link(bus, "a bus", 0x800)
+    with pytest.raises(can.CanOperationError):
+        bus.send(can.Message(arbitration_id=1))
+
+
 def connect(name: str) -> None:
     with contextlib.closing(Link(open_bus(name, fd=False), name, answer_s=0.02)):
         pass

@@ -47,7 +47,7 @@ def _ids(command: Callable[..., None]) -> Callable[..., None]:
     )  # fmt: skip
     response = click.option(
         "--response-id", type=HexNumber(), default="0x651", show_default=True,
-        help="CAN id of what it sends.",
+        help="CAN id of what it sends; the same.",
     )  # fmt: skip
     return request(response(command))
 
@@ -57,7 +57,10 @@ def _node_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def with_opener(bus: str, request_id: int, response_id: int, **others: Any) -> None:
-        command(opener=lambda: _connected(bus, request_id, response_id), **others)
+        from triaxcal.device.ids import node_ids  # noqa: PLC0415
+
+        ids = node_ids(request_id, response_id)
+        command(opener=lambda: _connected(bus, *ids), **others)
 
     return _BUS(_ids(with_opener))
 
@@ -304,6 +307,8 @@ def a2l(  # noqa: PLR0917
     """
     import triaxcal  # noqa: PLC0415
     from triaxcal.api.delivery import delivered_file  # noqa: PLC0415
+    from triaxcal.device.ids import node_ids  # noqa: PLC0415
 
+    ids = node_ids(request_id, response_id)
     made = triaxcal.firmware(triaxcal.load(delivered_file(unit, build)))
-    say(f"{made.write_node_a2l(file, (request_id, response_id), bitrate=bitrate)} written")
+    say(f"{made.write_node_a2l(file, ids, bitrate=bitrate)} written")

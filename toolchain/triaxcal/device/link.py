@@ -95,7 +95,11 @@ class Link:
     ) -> None:
         self.name = f"{name}, node {request_id:#x}"
         self._store_s = store_s
-        self._orders = Orders(bus, self.name, request_id, response_id, answer_s)
+        try:
+            self._orders = Orders(bus, self.name, request_id, response_id, answer_s)
+        except BaseException:
+            bus.shutdown()
+            raise
         try:
             self.connect()
         except BaseException:
