@@ -149,6 +149,19 @@ def test_a_signal_beyond_its_message_is_refused(tmp_path):
         read_description(written(tmp_path, dbc=dbc))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "label"),
+    [
+        ('AccY : 16|16@1- (0.001', 'AccY : 16|16@1- (0', "y: IMU.AccY"),
+        ("Temp : 0|16@1- (0.01", "Temp : 0|16@1- (0.0", "temperature: ENV.Temp"),
+    ],
+)  # fmt: skip
+def test_a_factor_of_0_is_refused(tmp_path, old, new, label):
+    with pytest.raises(RefusedError) as refusal:
+        read_description(written(tmp_path, dbc=DBC.replace(old, new)))
+    assert f"[signals] {label} has the factor 0: every value is the same" in str(refusal.value)
+
+
 def test_equal_names_in_two_messages_are_different_signals(tmp_path):
     text = change("IMU.AccZ", "MUX.AccZ") + 'join = "age"\nage_s = 0.01\n'
     rig = read_description(written(tmp_path, text))
@@ -208,8 +221,13 @@ def test_a_signal_narrower_than_the_adc_is_refused(tmp_path):
 
 def test_a_plan_whose_scale_is_not_the_bus_descriptions_is_refused(tmp_path):
     setup = any_setup(tmp_path, "automotive-imu")
+    plan = replace(setup.plan, volts_per_g=(1.0, 1.1, 1.0))
+    assert replace(setup, plan=plan).nominal.micro_g_per_code[1] > 0.0
     plan = replace(setup.plan, volts_per_g=(1.0, -1.1, 1.0))
-    assert replace(setup, plan=plan).nominal.micro_g_per_code[1] < 0.0
+    with pytest.raises(
+        RefusedError, match=r"one code of y is -110\.973 micro-g \(with the other s"
+    ):
+        _ = replace(setup, plan=plan).nominal
     plan = replace(setup.plan, volts_per_g=(1.0, 1.0, 9.81))
     with pytest.raises(RefusedError, match=r"one code of z is 12\.4435 micro-g; expected about"):
         _ = replace(setup, plan=plan).nominal

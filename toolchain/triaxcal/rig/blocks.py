@@ -10,7 +10,7 @@ import numpy as np
 
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.rig.frames import ERR_FLAG, ID_MASK
-from triaxcal.rig.samples import BAD_CRC, DUPLICATE, INVALID, LOST_FRAME, ORPHAN, Samples
+from triaxcal.rig.samples import BAD_CRC, CONFLICT, DUPLICATE, INVALID, LOST_FRAME, ORPHAN, Samples
 
 _COLUMNS = ("number", "t_ns", "codes", "status", "jump")
 
@@ -24,6 +24,7 @@ class Trouble:
     duplicates: int = 0
     invalid: int = 0
     lost_frames: int = 0
+    conflicts: int = 0
     error_frames: int = 0
     error_bits: int = 0
 
@@ -34,6 +35,7 @@ class Trouble:
             self.duplicates + other.duplicates,
             self.invalid + other.invalid,
             self.lost_frames + other.lost_frames,
+            self.conflicts + other.conflicts,
             self.error_frames + other.error_frames,
             self.error_bits | other.error_bits,
         )
@@ -195,6 +197,7 @@ def _trouble(kinds: IntArray) -> Trouble:
         duplicates=int((kinds == DUPLICATE).sum()),
         invalid=int((kinds == INVALID).sum()),
         lost_frames=int((kinds == LOST_FRAME).sum()),
+        conflicts=int((kinds == CONFLICT).sum()),
         error_frames=len(errors),
         error_bits=int(np.bitwise_or.reduce(errors)) & ID_MASK if len(errors) else 0,
     )

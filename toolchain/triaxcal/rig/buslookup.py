@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Protocol
@@ -60,6 +61,13 @@ class Names:
             raise self._missing(place, "signal", name, self._full)
         layout, signal = found
         self._refuse_unfit(place, layout, signal)
+        if signal.scale == 0 or not math.isfinite(signal.scale):
+            raise RefusedError(
+                place,
+                f"{name} has the factor {signal.scale:g}: every value is the same",
+                expected="the factor of one step",
+                remedy=f"correct {self.files}",
+            )
         return SignalUnit(layout.name, signal, layout.multiplexed.get(signal.name, ()))
 
     def message(self, place: str, name: str) -> FrameLayout:

@@ -12,7 +12,15 @@ from triaxcal.model.positions import AXES
 from triaxcal.rig.engine import Engine, Setup
 from triaxcal.rig.frames import ID_MASK, Frames, concatenate
 from triaxcal.rig.orientation import described, recognised
-from triaxcal.rig.samples import BAD_CRC, DUPLICATE, INVALID, LOST_FRAME, ORPHAN, Samples
+from triaxcal.rig.samples import (
+    BAD_CRC,
+    CONFLICT,
+    DUPLICATE,
+    INVALID,
+    LOST_FRAME,
+    ORPHAN,
+    Samples,
+)
 from triaxcal.rig.source import Source
 from triaxcal.rig.undetected import undetected
 
@@ -73,6 +81,7 @@ def _bus(setup: Setup, frames: Frames, samples: Samples) -> list[Finding]:
         ("samples sent twice", int((kinds == DUPLICATE).sum())),
         ("values that are no numbers", int((kinds == INVALID).sum())),
         ("frames lost by counters of other messages", int((kinds == LOST_FRAME).sum())),
+        ("samples with an old counter and new values (two nodes?)", int((kinds == CONFLICT).sum())),
         ("error frames", errors),
         ("jumps of the counters (two nodes with one ID?)", int(samples.jump.sum())),
     )

@@ -98,6 +98,8 @@ class RigDescription:
         What breaks the letter of the bus description's format.
     lines : LineFormat or None
         Format of the lines that it sends in place of frames.
+    channel : str or None
+        Channel of a log whose frames count; None: that of all.
     """
 
     name: str
@@ -116,6 +118,7 @@ class RigDescription:
     sample_at: str = ""
     warnings: tuple[str, ...] = field(default=())
     lines: LineFormat | None = None
+    channel: str | None = None
 
     @property
     def bus_file(self) -> Path:

@@ -38,6 +38,8 @@ def _faults(
     limits, trouble = plan.stillness, block.trouble
     if trouble.error_bits & BUS_OFF:
         yield because(Why.BUS_OFF, names=error_names(trouble.error_bits))
+    if trouble.conflicts:
+        yield because(Why.CONFLICT, count=trouble.conflicts)
     if trouble.orphans > limits.jumps_max_ratio * plan.rate_hz:
         yield because(Why.ORPHANS, count=trouble.orphans)
     if block.jumps > limits.jumps_max_ratio * block.count:

@@ -111,11 +111,14 @@ def nominal_of(rig: RigDescription, unit: UnitDescription, plan: SessionPlan) ->
         return Nominal(np.array([1e6 * g[0] for g in by_bus if g is not None]), zero, step)
     micro_g = 1e6 * unit.adc.volts_per_code / np.array(stated)
     for axis, what, known, scale in zip(AXES, rig.axes, by_bus, micro_g, strict=True):
-        if known is not None and abs(abs(scale / (1e6 * known[0])) - 1.0) > _SCALE_TOLERANCE:
+        if known is not None and abs(scale / (1e6 * known[0]) - 1.0) > _SCALE_TOLERANCE:
+            turned = (
+                " (with the other sign the positions are exchanged)" if scale * known[0] < 0 else ""
+            )
             raise RefusedError(
                 f"{plan.source}, [rig] volts_per_g",
-                f"one code of {axis} is {abs(scale):.6g} micro-g",
-                expected=f"about {abs(1e6 * known[0]):.6g}, what {rig.bus_file.name} says of "
+                f"one code of {axis} is {scale:.6g} micro-g{turned}",
+                expected=f"about {1e6 * known[0]:.6g}, what {rig.bus_file.name} says of "
                 f"{what.label}",
                 remedy=f"correct volts_per_g, [adc] of {unit.source}, or the unit in rig.toml",
             )

@@ -54,6 +54,25 @@ class _Last:
     time: int
 
 
+@dataclass(frozen=True)
+class Numbered:
+    """Numbers of samples.
+
+    Attributes
+    ----------
+    number : int64 array, shape (n,)
+    duplicate, conflict : bool arrays, shape (n,)
+        Sent twice; of the counter or clock of the one before, and with other codes.
+    jump : bool array, shape (n,)
+        Does not fit the one before.
+    """
+
+    number: IntArray
+    duplicate: BoolArray
+    conflict: BoolArray
+    jump: BoolArray
+
+
 class Numbering:
     """Numbers samples, remembering the one before the batch."""
 
@@ -61,6 +80,7 @@ class Numbering:
         self._clocks = clocks
         self._last: _Last | None = None
         self._recent: IntArray = np.zeros(0, np.int64)
+        self._codes: np.ndarray | None = None
 
     @property
     def last(self) -> int:
@@ -68,18 +88,20 @@ class Numbering:
         return -1 if self._last is None else self._last.number
 
     def number(
-        self, t_ns: IntArray, sequence: IntArray, time: IntArray
-    ) -> tuple[IntArray, BoolArray, BoolArray]:
-        """Numbers of samples (n,); which are sent twice; which do not fit the one before.
+        self, t_ns: IntArray, sequence: IntArray, time: IntArray, codes: np.ndarray
+    ) -> Numbered:
+        """Numbers of samples.
 
         Parameters
         ----------
         t_ns, sequence, time : arrays, shape (n,)
             Arrival, counter and the unit's clock; any numbers where there is none.
+        codes : array, shape (n, 3)
+            What they hold: a sample that is sent twice has the same codes both times.
         """
         if not len(t_ns):
             nothing = np.zeros(0, np.bool_)
-            return np.zeros(0, np.int64), nothing, nothing
+            return Numbered(np.zeros(0, np.int64), nothing, nothing, nothing)
         clocks = self._clocks
         last = self._last or _Last(-1, int(t_ns[0]), int(sequence[0]), int(time[0]))
         d_host_s = np.diff(t_ns, prepend=last.t_ns) * 1e-9
@@ -94,6 +116,9 @@ class Numbering:
         else:
             late = d_host_s > max(LATE_PERIODS / clocks.rate_hz, LATE_S)
             step, duplicate = np.where(late, d_host, 1), np.zeros(len(t_ns), np.bool_)
+        same = self._same(codes)
+        conflict = duplicate & ~same
+        duplicate &= same
         jump = step <= 0
         if clocks.time_turn:
             jump |= self._off_clock(d_time, step)
@@ -104,12 +129,19 @@ class Numbering:
             jump |= self._crowded(t_ns)
         step = np.where(jump, np.maximum(d_host, 1), step)
         if self._last is None:
-            duplicate[0], jump[0], step[0] = False, False, 1
+            duplicate[0], conflict[0], jump[0], step[0] = False, False, False, 1
         step[duplicate] = 0
         jump &= ~duplicate
         number: IntArray = last.number + np.cumsum(step)
         self._last = _Last(int(number[-1]), int(t_ns[-1]), int(sequence[-1]), int(time[-1]))
-        return number, duplicate, jump
+        return Numbered(number, duplicate, conflict, jump)
+
+    def _same(self, codes: np.ndarray) -> BoolArray:
+        """Which samples have the codes of the one before."""
+        before = codes[:1] if self._codes is None else self._codes
+        self._codes = codes[-1:]
+        earlier = np.concatenate([before, codes[:-1]])
+        return np.asarray((codes == earlier).all(axis=1), np.bool_)
 
     def _by_counter(self, d_sequence: IntArray, d_host: IntArray) -> tuple[IntArray, BoolArray]:
         """Steps by the counter, and where it stands still."""

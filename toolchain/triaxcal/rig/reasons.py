@@ -14,6 +14,10 @@ class Why(Enum):
     BUS_ERRORS = "{count} error frames: {names}"
     ORPHANS = "{count} frames without their partner: another node sends under the rig's IDs"
     JUMPS = "{count} jumps of the counters in 1 s: another node sends under the rig's IDs"
+    CONFLICT = (
+        "{count} samples in 1 s have the counter of the one before and other values: two nodes "
+        "send under the rig's IDs, or the counter does not count"
+    )
     GAP = "gap of {seconds} s or more without samples"
     RESTARTED = "the counters jumped: the rig restarted"
     LOST_IN_SECOND = "{lost} of {expected} samples lost in 1 s"

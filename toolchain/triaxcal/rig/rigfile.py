@@ -50,7 +50,7 @@ def read_description(path: Path, bus_file: Path | None = None) -> RigDescription
     named = path.parent.parent == descriptions_folder()
     name = path.parent.name if named else str(path)
     made = resolved(name, str(path), sha256, files, signals, messages)
-    return replace(made, lines=lines)
+    return replace(made, lines=lines, channel=keys.channel)
 
 
 def _lines(path: Path, tables: Mapping[str, Values]) -> LineFormat | None:

@@ -27,10 +27,13 @@ class RigKeys:
         Its description, beside this file: DBC, KCD, SYM or ARXML. Required without [lines].
     more_files
         More descriptions of the same bus, as of a thermometer of another make.
+    channel
+        Channel of the sensor in logs of several channels with equal IDs.
     """
 
     file: str | None = setting(_NAME, None, example='"imu.dbc"')
     more_files: tuple[str, ...] = setting(listed(_NAME, range(17), "a list of files"), ())
+    channel: str | None = setting(_NAME, None, example='"can0"')
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ from triaxcal.rig.frames import BoolArray, Frames
 from triaxcal.rig.join import AgeJoin, CounterJoin, Joined, NoJoin, Part
 from triaxcal.rig.nominal import AS_SENT, Coding
 from triaxcal.rig.numbering import Clocks, Numbering
+from triaxcal.rig.onechannel import OneChannel
 from triaxcal.rig.parts import (
     PartPlan,
     codes_of,
@@ -71,9 +72,10 @@ class Samples:
     trouble: IntArray
 
 
-BAD_CRC, ORPHAN, DUPLICATE, INVALID, LOST_FRAME = 1, 2, 3, 4, 5
+BAD_CRC, ORPHAN, DUPLICATE, INVALID, LOST_FRAME, CONFLICT = 1, 2, 3, 4, 5, 6
 """A frame with a wrong CRC, length or kind; one without its partner; a sample sent twice; a value
-that is no number or not available; a frame lost of a message whose counter numbers no samples."""
+that is no number or not available; a frame lost of a message whose counter numbers no samples; an
+equal counter with other values, as two nodes under one ID send."""
 _MOST_LOST = 255
 """Frames counted for one step of a counter: after a restart it means nothing."""
 
@@ -94,6 +96,7 @@ class SampleDecoder:
         self._coding = coding
         self._parts = parts_of(rig)
         self._seen = 0
+        self._channel = OneChannel(rig)
         lead = self._lead
         numbers = self._parts[lead].use.counter is not None and (
             rig.join == "counter"
@@ -126,8 +129,15 @@ class SampleDecoder:
         return next((i for i in here if 2 in self._parts[i].axes), here[-1])
 
     def feed(self, frames: Frames) -> Samples:
-        """Samples that these frames complete."""
+        """Samples that these frames complete.
+
+        Raises
+        ------
+        RefusedError
+            When a message of the rig comes on several channels at once.
+        """
         rig, seen = self._rig, self._seen
+        frames = self._channel.of(frames)
         self._seen += len(frames)
         found = {name: rows_of(use, frames, seen) for name, use in rig.messages.items()}
         rows = {name: good for name, (good, _) in found.items()}
@@ -144,9 +154,14 @@ class SampleDecoder:
         sequence = first_of(part.sequence for part in joined.parts)
         time = first_of(part.time for part in joined.parts)
         zero = np.zeros(len(joined.place), np.int64)
-        number, duplicate, jump = self._numbering.number(
-            joined.t_ns, zero if sequence is None else sequence, zero if time is None else time
+        codes, status = codes_of(joined.parts, self._parts), status_of_parts(joined.parts, zero)
+        numbered = self._numbering.number(
+            joined.t_ns,
+            zero if sequence is None else sequence,
+            zero if time is None else time,
+            codes,
         )
+        number, duplicate, jump = numbered.number, numbered.duplicate, numbered.jump
         numbers = np.concatenate([number, [before]])
 
         def number_before(place: IntArray) -> IntArray:
@@ -162,9 +177,9 @@ class SampleDecoder:
             (number[duplicate], DUPLICATE),
             (number_before(np.concatenate([dropped, no_temp])), INVALID),
             (number_before(self._lost(rows)), LOST_FRAME),
+            (number[numbered.conflict], CONFLICT),
         )
         new = ~duplicate
-        codes, status = codes_of(joined.parts, self._parts), status_of_parts(joined.parts, zero)
         if not new.all():
             number, codes, status, jump = number[new], codes[new], status[new], jump[new]
         return Samples(

@@ -48,6 +48,8 @@ class Session(State):
         before = self.previous
         self.lost += block.lost
         self.bad_crc += block.trouble.bad_crc
+        self.repeated += block.trouble.duplicates
+        self.invalid += block.trouble.invalid
         if before is not None and block.index > before.index + 1:
             self.gaps.append((before.index, block.index - before.index - 1))
         wrong = fault(block, before, self.plan, self.fine)

@@ -65,7 +65,7 @@ class State:
         self.step_code = nominal.step_code
         self.fine = nominal.fine
         self.durable = [event for event in history if event.kind in DURABLE]
-        self.lost = self.bad_crc = 0
+        self.lost = self.bad_crc = self.repeated = self.invalid = 0
         self.gaps: list[tuple[int, int]] = []
         self.last_event = ""
         self.events: list[Event] = []

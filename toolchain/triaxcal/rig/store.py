@@ -121,6 +121,8 @@ def _sidecar(
         "reference": asdict(session.reference) if session.reference else None,
         "lost_samples": session.lost,
         "bad_crc_frames": session.bad_crc,
+        "repeated_samples": session.repeated,
+        "invalid_values": session.invalid,
         "gaps": [{"after_s": after, "seconds": seconds} for after, seconds in session.gaps],
         "dwells": [
             {**asdict(d), "u_micro_g": [float(v) for v in scale * d.u_code]} for d in dwells
