@@ -137,6 +137,30 @@ def test_what_is_rest(sd_g: float, slope_g: float) -> None:
     assert why == ("" if not slope_g else "not at rest, the samples scatter by 1.16 mg")
 
 
+def test_nobody_answers_the_prompt_for_a_power_cycle(flashed: Bench) -> None:
+    from device.bridge import bridged
+
+    with bridged(flashed.node) as name:
+        with pytest.raises(RefusedError) as caught:
+            run("flash", flashed.file, "--bus", name, "--power-cycle")
+        assert "every CRC is correct" in run("identify", "--bus", name)
+    assert str(caught.value).startswith(
+        "--power-cycle: nobody has answered; expected Enter, at a terminal or piped; "
+        "the new calibration is stored, was read back, and is in use"
+    )
+
+
+def test_piped_prompts_have_a_line_each() -> None:
+    from triaxcal.cli.devicehands import ask_for_position
+
+    with CliRunner().isolation(input="\n\n") as (out, *_):
+        ask_for_position("CP1", "")
+        ask_for_position("CP2", "it moved")
+        lines = [line for line in out.getvalue().decode().splitlines() if line]
+    words = "in check position CP{}, at rest, then press Enter"
+    assert lines == ["Put the unit " + words.format(1), "it moved. Put the unit " + words.format(2)]
+
+
 AN_ID = "expected 0 to 0x7ff, or a 29-bit id with bit 31 set"
 COMMANDS = {
     "identify": ["identify", "--bus", "virtual:ids"],

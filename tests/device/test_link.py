@@ -179,6 +179,28 @@ def interrupted(node: Node, unit: Built, count: int, seed: int) -> dict[str, int
     return found
 
 
+@pytest.mark.parametrize("stop", [100, FLASH_BYTES + 100], ids=["erasing", "writing"])
+def test_power_that_fails_while_it_stores(node: Node, unit: Built, stop: int) -> None:
+    old, new = file_of(unit, "OLD"), file_of(unit, "NEW")
+    with linked(node) as link:
+        flash(link, old, "a file")
+    notes: list[str] = []
+    with linked(node, stop=stop, answer_s=0.02, store_s=0.3) as link:
+        text = refused(lambda: flash(link, new, "a file", "OLD", None, notes.append))
+    assert node.code == POWER_FAILED
+    assert text.endswith(
+        ", node 0x650: has not answered, 0.3 s after the store was ordered; after a power-up the "
+        "calibration before is in use, or the new one, never neither: check power and cable, and "
+        "run the command again"
+    )
+    (note,) = notes
+    assert note.endswith(", node 0x650: no answer; it may be erasing: 0.3 s to wait")
+    with linked(node) as link:
+        assert identify(link).content == old
+        flash(link, new, "a file", "OLD")
+        assert identify(link).content == new
+
+
 def test_interrupted_downloads(node: Node, unit: Built) -> None:
     found = interrupted(node, unit, 8, 1)
     assert found["neither"] == 0

@@ -185,6 +185,18 @@ def test_a_length_beyond_the_limit(bench: Bench, target: Path) -> None:
     assert record.gravity_m_per_s2 == pytest.approx(there)
 
 
+def test_an_earlier_record_stays(bench: Bench, target: Path) -> None:
+    verified(bench, target, 2)
+    before = record_path(target).read_bytes(), (target / "passport.json").read_bytes()
+    place = turning(bench, bench.gravity_g * 1.01)
+    with linked(bench.node) as link:
+        text = refused(lambda: verify_at_positions(link, bench.delivery, target, 2, 32, place))
+    assert text.endswith(
+        "nothing was written; the earlier record, of 2026-03-30, stays, and so does the passport"
+    )
+    assert (record_path(target).read_bytes(), (target / "passport.json").read_bytes()) == before
+
+
 def test_a_delivery_that_is_not_there(bench: Bench, target: Path) -> None:
     (target / "triax_calib.bin").write_bytes(b"other")
     assert "expected the files of AT-SIM as it is now; run `triaxcal calib` first" in unchanged(

@@ -100,8 +100,40 @@ def verify_at_positions(  # noqa: PLR0917
         When the device has another calibration or serial number, a bit differs, or |a| - g is
         beyond the limit; nothing is written then.
     """
-    unit, plan = delivery.unit, delivery.plan
     require_delivered(delivery, target)
+    earlier = read_record(record_path(target))
+    try:
+        record = _verified(link, delivery, count, samples, place, gravity_m_per_s2, day)
+    except RefusedError as error:
+        if earlier is None:
+            raise
+        raise _beside(error, earlier) from error
+    made = passport(delivery, tools_of(target), record)
+    files = all_files(delivery, made)
+    renewed = {name: files[name] for name in (*RENEWED, CERTIFICATE) if name in files}
+    path = record_path(target)
+    renew({path.name: record_bytes(record)}, path.parent)
+    renew(renewed, target)
+    return record
+
+
+def _beside(error: RefusedError, earlier: DeviceRecord) -> RefusedError:
+    """An error that says what it leaves: the passport still states the earlier record."""
+    stays = f"the earlier record, of {earlier.date}, stays, and so does the passport"
+    remedy = f"{error.remedy}; {stays}" if error.remedy else stays
+    return type(error)(error.place, error.found, expected=error.expected, remedy=remedy)
+
+
+def _verified(  # noqa: PLR0917
+    link: Link,
+    delivery: Delivery,
+    count: int,
+    samples: int,
+    place: Callable[[str, str], None],
+    gravity_m_per_s2: float | None,
+    day: datetime.date | None,
+) -> DeviceRecord:
+    unit, plan = delivery.unit, delivery.plan
     image = delivery.files[names_of(plan).file("triax_calib.bin")]
     node = require_in_use(link, image, unit.name)
     gravity_g = unit.gravity_g
@@ -115,7 +147,7 @@ def verify_at_positions(  # noqa: PLR0917
         lambda degc: unit.limits.at(degc, unit.t0_degc)[0],
     )
     found = at_positions(link, expected, CHECK_POSITIONS[:count], samples, place)
-    record = DeviceRecord(
+    return DeviceRecord(
         unit=unit.name,
         serial=unit.serial,
         hardware=node.hardware,
@@ -126,10 +158,3 @@ def verify_at_positions(  # noqa: PLR0917
         largest_difference_lsb=0,  # another one is refused
         positions=tuple(found),
     )
-    made = passport(delivery, tools_of(target), record)
-    files = all_files(delivery, made)
-    renewed = {name: files[name] for name in (*RENEWED, CERTIFICATE) if name in files}
-    path = record_path(target)
-    renew({path.name: record_bytes(record)}, path.parent)
-    renew(renewed, target)
-    return record

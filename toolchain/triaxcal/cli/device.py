@@ -12,6 +12,7 @@ import click
 
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.extras import refuse_missing_packages
+from triaxcal.cli.devicehands import ask_for_position, ask_for_power_cycle
 from triaxcal.cli.options import DELIVERED, HELP, HexNumber, UnitFolder, example, say
 
 if TYPE_CHECKING:
@@ -151,20 +152,15 @@ def flash(opener: Opener, file: Path, power_cycle: bool, replaces: str) -> None:
     except OSError as error:
         raise refused_by_system(file, "read", error) from error
     with opener() as link:
-        asked = _ask_for_power_cycle if power_cycle else None
-        info = store(link, content, str(file), replaces, asked)
+        asked = ask_for_power_cycle if power_cycle else None
+        info = store(link, content, str(file), replaces, asked, _note)
         name = link.name
     again = ", after the power cycle too" if power_cycle else ""
     say(f"{name}: {file} is in use from slot {info.slot}, read back and equal{again}")
 
 
-def _ask_for_power_cycle() -> None:
-    click.prompt(
-        "Switch the unit off and on, then press Enter",
-        default="",
-        show_default=False,
-        prompt_suffix="",
-    )
+def _note(words: str) -> None:
+    click.echo(words, err=True)
 
 
 @device.command(
@@ -229,7 +225,7 @@ def verify(  # noqa: PLR0917
     require_delivered(delivery, target)
     with opener() as link:
         record = verify_at_positions(
-            link, delivery, target, positions, samples, _ask_for_position, gravity_m_per_s2
+            link, delivery, target, positions, samples, ask_for_position, gravity_m_per_s2
         )
         name = link.name
     rows = [
@@ -276,13 +272,6 @@ def _verify_samples(
         f"  samples         {found.samples}, largest difference 0 LSB; "
         f"{found.flagged} with a status other than 0\n"
         f"  |a| - g         {length}"
-    )
-
-
-def _ask_for_position(position: str, why: str) -> None:
-    words = f"Put the unit in check position {position}, at rest, then press Enter"
-    click.prompt(
-        f"{why}. {words}" if why else words, default="", show_default=False, prompt_suffix=""
     )
 
 

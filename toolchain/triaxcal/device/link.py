@@ -203,8 +203,10 @@ class Link:
             remedy="look for a second node or master with these CAN ids",
         )
 
-    def store(self) -> Info:
+    def store(self, note: Callable[[str], None] | None = None) -> Info:
         """Have the RAM page stored in flash, and wait until it is.
+
+        `note` gets a line when the node is silent for long.
 
         Raises
         ------
@@ -217,12 +219,17 @@ class Link:
             self._orders.repeat(
                 "SET_REQUEST", lambda: self._orders.request(Command.SET_REQUEST, request)
             )
-        info = None
+        info: Info | None = None
         while info is None or info.store == BUSY:
             if time.monotonic() > end:
-                raise RefusedError(self.name, f"has not stored within {self._store_s:g} s")
-            with suppress(SilentError):
+                raise self._not_stored("still stores" if info else "has not answered")
+            try:
                 info = self.info()
+            except SilentError:
+                info = None
+                if note:
+                    note(f"{self.name}: no answer; it may be erasing: {self._store_s:g} s to wait")
+                note = None
         if info.store != DONE:
             raise RefusedError(
                 self.name,
@@ -230,6 +237,14 @@ class Link:
                 remedy="the calibration before is still in use",
             )
         return info
+
+    def _not_stored(self, found: str) -> RefusedError:
+        return RefusedError(
+            self.name,
+            f"{found}, {self._store_s:g} s after the store was ordered",
+            remedy="after a power-up the calibration before is in use, or the new one, never "
+            "neither: check power and cable, and run the command again",
+        )
 
     def _read_once(self, extension: int, address: int, size: int) -> bytes:
         data = b""

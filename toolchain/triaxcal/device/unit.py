@@ -83,12 +83,13 @@ def single_part(content: bytes, where: str) -> ImagePart:
     return parts[0]
 
 
-def flash(
+def flash(  # noqa: PLR0917
     link: Link,
     content: bytes,
     where: str,
     replaces: str = "",
     power_cycle: Callable[[], None] | None = None,
+    note: Callable[[str], None] | None = None,
 ) -> Info:
     """Download a calibration, have it stored, and read it back from flash.
 
@@ -104,6 +105,8 @@ def flash(
         Serial number that the node has until now, where it may differ from the file's.
     power_cycle : callable or None
         Switches the node off and on; then the calibration is read once more.
+    note : callable or None
+        Gets what is to be known during a long wait.
 
     Returns
     -------
@@ -113,14 +116,14 @@ def flash(
     Raises
     ------
     RefusedError
-        When file and node do not belong together, or the node does not do it. The calibration that
-        was in use before then still is.
+        When file and node do not belong together, or the node does not do it. In use is then the
+        calibration before, or already the new one; the message says which, where it is known.
     """
     node = identify(link)
     _belongs(node, content, where, link.name, replaces)
     link.choose(RAM_PAGE)
     link.write(content)
-    info = link.store()
+    info = link.store(note)
     _read_back(link, content, "after the store")
     if power_cycle is not None:
         power_cycle()
