@@ -6,10 +6,13 @@ import io
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from many_cases import Run, bench_of, plan_of, refuse_false_records, setup_of
 from rich.console import Console
+from test_cli_rig import triaxcal
 
 from triaxcal.base.errors import RefusedError, UsageError
+from triaxcal.cli.main import main
 from triaxcal.rig.frames import ERR_FLAG, Frames, alike, concatenate
 from triaxcal.rig.journal import read_journal
 from triaxcal.rig.manyreplay import replay_bus
@@ -293,3 +296,37 @@ def drawn(view) -> str:
     console = Console(width=80, height=24, file=io.StringIO(), record=True)
     console.print(view)
     return console.export_text()
+
+
+@pytest.mark.long
+def test_the_command_line_tells_what_became_of_each_unit(tmp_path):
+    path = plan_of(tmp_path, 2, "[20]", "[unattended]\nsilence_max_s = 5\n")
+    options = ("--plan", path, "--bus", "virtual", "--plain", "--fault", "AT-2/linkdown@90:1:9999")
+    done = triaxcal("rig", "run", *options, "--unattended")
+    assert done.returncode == 1
+    lines = done.stdout.splitlines()
+    assert any(line.endswith("AT-2 set aside: no readings for 5 s") for line in lines)
+    assert any(line.endswith("all: DONE - 1 units measured, 1 set aside") for line in lines)
+    assert lines[-1] == f"next: triaxcal batch {tmp_path}/units/AT-1"
+    assert done.stderr.splitlines()[-1].startswith(
+        f"triaxcal: {tmp_path}/many-sessions/001: 1 of 2 units set aside: AT-2; measure each"
+    )
+    assert [(tmp_path / "units" / n / "measurements.csv").exists() for n in ("AT-1", "AT-2")] == [
+        True, False,
+    ]  # fmt: skip
+    alone = triaxcal("rig", "run", *options[:4], "--plain", "--unit", "AT-2")
+    assert alone.returncode == 0, alone.stderr
+    assert (tmp_path / "units" / "AT-2" / "measurements.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "Missing option '--unit', or a '--plan' that lists units."),
+        (("--unit", "AT-SIM-BENCH"), "Missing option '--bus'."),
+    ],
+)
+def test_a_session_needs_a_unit_and_a_bus(arguments, said):
+    done = CliRunner().invoke(main, ["rig", "run", *arguments])
+    assert done.exit_code == 2
+    assert said in done.output
