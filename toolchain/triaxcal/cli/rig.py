@@ -144,29 +144,33 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
     LOG has the frames: frames.log of a session, with its journal beside it, or a recording in any
     format of `rig export` and python-can, also compressed by gzip.
     """
-    from triaxcal.cli.rig_live import show_written  # noqa: PLC0415
+    from triaxcal.cli.rig_live import say_first, show_written  # noqa: PLC0415
     from triaxcal.rig import recording, replay, store  # noqa: PLC0415
+    from triaxcal.rig.whynot import why_not  # noqa: PLC0415
 
     setup.refuse_unfit()
+    target = into or log.parent
+    if not target.is_dir():
+        raise RefusedError(str(target), "no such folder", remedy="make it, or name another one")
     journal = log.with_name(recording.JOURNAL_FILE)
     evidence = log.name == recording.LOG_FILE and journal.exists()
+    say_first(setup.rig)
     played = replay.replay(setup, log, journal if evidence else None)
     for event in played.events:
         if event.kind != "trouble":
             click.echo(event.text)
     for note in played.notes:
         click.echo(note, err=True)
-    if not played.engine.session.done:
-        done = len(played.engine.session.accepted)
-        raise RefusedError(
-            str(log),
-            f"holds {done} accepted dwells of the plan's",
-            expected="a whole session",
-            remedy="go on with `triaxcal rig resume`",
-        )
-    show_written(
-        store.write_records(into or log.parent, played.engine.session, setup.rig, played.log)
-    )
+    session = played.engine.session
+    if not session.done:
+        reason = why_not(setup, log, session, played.events)
+        for line in reason.lines:
+            click.echo(line, err=True)
+        remedy = "go on with `triaxcal rig resume`" if evidence else "see the lines above"
+        raise RefusedError(str(log), reason.found, expected="a whole session", remedy=remedy)
+    for count, first in session.restless.values():
+        click.echo(f"not at rest in {count} s: {first}", err=True)
+    show_written(store.write_records(target, session, setup.rig, played.log))
 
 
 @rig.command(epilog=example("triaxcal rig status --unit AT-7"))
@@ -197,13 +201,13 @@ def status(setup: Setup, sessions: Path | None) -> None:
 @click.option("--seconds", type=click.FloatRange(1.0, 600.0), default=5.0, show_default=True)
 def check(setup: Setup, bus: BusChoice, seconds: float) -> None:
     """Check bus, DBC, unit, rate, noise and instruments."""
-    from triaxcal.rig.check import collect, findings  # noqa: PLC0415
+    from triaxcal.rig.check import collect, findings, judged  # noqa: PLC0415
     from triaxcal.rig.instrumentcheck import instrument_findings  # noqa: PLC0415
 
     source = open_source(setup, bus)
     try:
         frames = collect(source, seconds)
-        found = findings(setup, frames, source.name, source.notes())
+        found = [judged(frames), *findings(setup, frames, source.name, source.notes())]
     finally:
         source.close()
     found += instrument_findings(setup.plan.equipment)

@@ -19,6 +19,7 @@ from triaxcal.cli.rig_hands import hands_of
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.rig import recording, replay, runner, store
 from triaxcal.rig.canbus import Bus, messages_of
+from triaxcal.rig.description import RigDescription
 from triaxcal.rig.engine import Setup
 from triaxcal.rig.events import Agree, Command, Redo
 from triaxcal.rig.forecast import duration
@@ -115,9 +116,7 @@ def _guided(
             "dwells kept"
         )
         click.echo(session.last_event)
-    rig = taken.engine.setup.rig
-    for text in (*rig.warnings, *undetected(rig)):
-        click.echo(f"note: {text}", err=True)
+    say_first(taken.engine.setup.rig)
     keys = Keys(not plain)
     operator = Operator(keys)
     with keys.listening():
@@ -131,6 +130,12 @@ def _guided(
             _on_screen(ticks, taken, source, hands, operator)
     taken.log.flush(sync=True)
     return taken.log.state  # reads the log: while it is open
+
+
+def say_first(rig: RigDescription) -> None:
+    """Say what is wrong in the bus description, and what nothing on the bus would show."""
+    for text in (*rig.warnings, *undetected(rig)):
+        click.echo(f"note: {text}", err=True)
 
 
 def _write(setup: Setup, taken: recording.Recording, log: LogState) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import AXES
+from triaxcal.rig.census import Census
 from triaxcal.rig.engine import Engine, Setup
-from triaxcal.rig.frames import ID_MASK, Frames, concatenate
+from triaxcal.rig.frames import ID_MASK, Frames, concatenate, empty
 from triaxcal.rig.orientation import described, recognised
 from triaxcal.rig.samples import (
     BAD_CRC,
@@ -21,13 +23,15 @@ from triaxcal.rig.samples import (
     ORPHAN,
     Samples,
 )
-from triaxcal.rig.source import Source
+from triaxcal.rig.source import LogEndedError, Source
 from triaxcal.rig.undetected import undetected
 
 _RATE_TOLERANCE = 0.02
 """Of the plan's rate; a few seconds' count is exact to a sample or two."""
 _NOISE_MAX_MICRO_G = 2000.0
 """Above this the rig is being shaken: 100 times the noise of a navigation accelerometer at 1 Hz."""
+_NOISE_WILD_MICRO_G = 50_000.0
+"""Above this no sensor at rest is so noisy: the numbers are not its readings."""
 _NOISE_MAX_CODES = 3.0
 """The same where one code is large."""
 
@@ -41,17 +45,37 @@ class Finding:
 
 
 def collect(source: Source, seconds: float) -> Frames:
-    """Frames of some seconds by their own times; gives up when twice as long has passed."""
-    parts = [source.read()]
+    """Frames of the first seconds by their own times.
+
+    Gives up when twice as long has passed, or a log has ended.
+    """
+    parts: list[Frames] = []
     end = time.monotonic() + 2.0 * seconds
     span_ns = 0
-    first: int | None = None
     while span_ns < seconds * 1e9 and time.monotonic() < end:
-        parts.append(source.read())
-        if len(parts[-1]):
-            first = int(parts[-1].t_ns[0]) if first is None else first
-            span_ns = int(parts[-1].t_ns[-1]) - first
-    return concatenate([p for p in parts if len(p)])
+        try:
+            part = source.read()
+        except LogEndedError:
+            break
+        if len(part):
+            parts.append(part)
+            span_ns = int(part.t_ns[-1]) - int(parts[0].t_ns[0])
+    return beginning(concatenate(parts), seconds) if parts else empty()
+
+
+def beginning(frames: Frames, seconds: float) -> Frames:
+    """Frames of the first seconds of these, one at least."""
+    return frames.take(frames.t_ns <= frames.t_ns[0] + round(seconds * 1e9))
+
+
+def judged(frames: Frames) -> Finding:
+    """Which frames were judged."""
+    if not len(frames):
+        return Finding(None, "judged: no frames")
+    start = datetime.fromtimestamp(int(frames.t_ns[0]) / 1e9, UTC)
+    seconds = (int(frames.t_ns[-1]) - int(frames.t_ns[0])) / 1e9
+    text = f"judged: {seconds:.1f} s from {start:%Y-%m-%d %H:%M:%S} UTC, {len(frames)} frames"
+    return Finding(None, text)
 
 
 def findings(setup: Setup, frames: Frames, where: str, notes: list[str]) -> list[Finding]:
@@ -62,6 +86,9 @@ def findings(setup: Setup, frames: Frames, where: str, notes: list[str]) -> list
         return [*found, Finding(False, f"{where}: no frames at all")]
     plan = setup.plan
     samples = setup.decoder().feed(frames)
+    census = Census(setup.rig)
+    census.add(frames)
+    found += [Finding(False, text) for text in census.faults()]
     found += _bus(setup, frames, samples)
     if setup.rig.serial is not None or setup.rig.rate is not None:
         found.append(_identity(setup, frames, where, samples))
@@ -117,18 +144,33 @@ def _samples(setup: Setup, samples: Samples) -> list[Finding]:
     rate = (len(samples.number) - 1) / max(seconds, 1e-9)
     lost = int(samples.number[-1] - samples.number[0]) + 1 - len(samples.number)
     scale = setup.nominal.micro_g_per_code
-    # Differences of neighbours: a drift does not enter.
-    sd = np.sqrt(np.mean(np.diff(samples.codes, axis=0) ** 2, axis=0) / 2.0) * np.abs(scale)
     seen = recognised(samples.codes.mean(axis=0) - setup.nominal.zero_code, scale)
-    noise_max = np.maximum(_NOISE_MAX_MICRO_G, _NOISE_MAX_CODES * np.abs(scale))
-    fine = np.array(setup.nominal.fine)
-    noise = ", ".join(f"{axis} {v:.0f}" for axis, v in zip(AXES, sd, strict=True))
     codes = samples.temp_code
     temp = setup.unit.temperature_sensor.degc(float(codes.mean())) if len(codes) else None
     return [
         Finding(lost == 0, f"{len(samples.number)} samples, {lost} lost"),
         Finding(abs(rate / plan.rate_hz - 1.0) < _RATE_TOLERANCE, f"{rate:.2f} samples a second"),
-        Finding(bool((sd[fine] > 0.0).all() and (sd < noise_max).all()), f"noise {noise} micro-g"),
+        noise(setup, samples),
         Finding(seen is not None, f"position {described(seen) if seen else 'not recognised'}"),
         Finding(temp is not None, f"temperature {temp:.2f} degC" if temp is not None else "none"),
     ]
+
+
+def noise(setup: Setup, samples: Samples) -> Finding:
+    """Noise of samples, two or more: from 0 to what a unit at rest has."""
+    scale = np.abs(setup.nominal.micro_g_per_code)
+    # Differences of neighbours: a drift does not enter.
+    sd = np.sqrt(np.mean(np.diff(samples.codes, axis=0) ** 2, axis=0) / 2.0) * scale
+    noise_max = np.maximum(_NOISE_MAX_MICRO_G, _NOISE_MAX_CODES * scale)
+    stuck = [a for a, v, fine in zip(AXES, sd, setup.nominal.fine, strict=True) if fine and v == 0]
+    text = "noise " + ", ".join(f"{axis} {v:.0f}" for axis, v in zip(AXES, sd, strict=True))
+    text += " micro-g"
+    wild = [axis for axis, v in zip(AXES, sd, strict=True) if v > _NOISE_WILD_MICRO_G]
+    if stuck:
+        text += f": {', '.join(stuck)} always the same code, a stuck axis or another signal"
+    if wild:
+        text += (
+            f": {', '.join(wild)} jump from sample to sample; is the byte order, the place or the "
+            "sign of the signal another one than the bus description says?"
+        )
+    return Finding(not stuck and bool((sd < noise_max).all()), text)

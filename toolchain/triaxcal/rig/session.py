@@ -57,6 +57,9 @@ class Session(State):
         self.unrest = wrong or motion(
             block, before, self.reference, limits, scale, step_code=self.step_code
         )
+        if self.unrest is not None:
+            count, first = self.restless.get(self.unrest.why, (0, self.unrest))
+            self.restless[self.unrest.why] = count + 1, first
         if found := wrong or complaint(block):
             self.say("trouble", block.t_ns, str(found), reasons=(found,))
         self.look(block)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.base.registry import Registry
 
 if TYPE_CHECKING:
@@ -14,6 +15,11 @@ if TYPE_CHECKING:
     from triaxcal.rig.frames import Frames
     from triaxcal.rig.lines import LineFormat
     from triaxcal.rig.simulator import SimulatedRig
+
+
+class LogEndedError(RefusedError):
+    """A log has no more frames."""
+
 
 FRAMES, LINES, EITHER = "frames", "lines", "either"
 WAIT_S = 0.05

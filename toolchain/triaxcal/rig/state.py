@@ -12,7 +12,7 @@ from triaxcal.rig.events import DURABLE, AcceptedDwell, Event, Kind
 from triaxcal.rig.nominal import Nominal
 from triaxcal.rig.orientation import recognised
 from triaxcal.rig.plan import SessionPlan
-from triaxcal.rig.reasons import Reason
+from triaxcal.rig.reasons import Reason, Why
 from triaxcal.rig.stillness import Reference
 from triaxcal.unit.description import UnitDescription
 
@@ -49,6 +49,8 @@ class State:
         Temperature when the position seen was taken up.
     gaps : list of pair of int
         After which second, and how many.
+    restless : dict
+        By kind of reason, seconds that were not at rest, and the reason of the first.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class State:
         self.durable = [event for event in history if event.kind in DURABLE]
         self.lost = self.bad_crc = self.repeated = self.invalid = 0
         self.gaps: list[tuple[int, int]] = []
+        self.restless: dict[Why, tuple[int, Reason]] = {}
         self.last_event = ""
         self.events: list[Event] = []
         self.restart()

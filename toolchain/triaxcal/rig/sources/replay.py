@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from triaxcal.base.errors import RefusedError
-from triaxcal.rig.source import EITHER, SourceKind, Wanted
+from triaxcal.rig.source import EITHER, LogEndedError, SourceKind, Wanted
 
 if TYPE_CHECKING:
     from triaxcal.rig.busload import BitRates
@@ -34,13 +33,15 @@ class LogSource:
 
         Raises
         ------
+        LogEndedError
+            When the log has ended.
         RefusedError
-            When the log cannot be read, or has ended.
+            When the log cannot be read.
         """
         part = next(self._parts, None)
         if part is None:
             remedy = "`triaxcal rig replay` makes the records of a whole session from its log"
-            raise RefusedError(self.name, "the log has ended", remedy=remedy)
+            raise LogEndedError(self.name, "the log has ended", remedy=remedy)
         self._left.add(part)
         return part.frames
 
