@@ -29,11 +29,15 @@ uint32_t triax_memory_is_storing(const triax_xcp_t *xcp)
 static void write_info(triax_xcp_t *xcp)
 {
     const triax_store_t *store = xcp->store;
+    uint32_t slot = store->active;
 
+    if (slot == TRIAX_STORE_NO_SLOT) {
+        slot += triax_store_written(store);
+    }
     triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_VERSION], 1u);
     triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SHAPE], xcp->config->shape);
     triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SIZE_AT], triax_memory_file_size(xcp));
-    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SLOT], store->active);
+    triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SLOT], slot);
     triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SEQUENCE], store->sequence);
     triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_STORE], store->status);
     triax_store_put_word(&xcp->info[TRIAX_XCP_INFO_SLOT_SIZE], store->config->slot_size);

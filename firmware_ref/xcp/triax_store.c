@@ -108,6 +108,23 @@ const uint8_t *triax_store_file(const triax_store_t *store)
     return (store->active < TRIAX_STORE_NO_SLOT) ? store->config->slot[store->active] : NULL;
 }
 
+uint32_t triax_store_written(const triax_store_t *store)
+{
+    const uint32_t end = store->config->slot_size;
+    uint32_t found = 0u;
+    uint32_t slot;
+    uint32_t i;
+
+    for (slot = 0u; slot < TRIAX_STORE_NO_SLOT; slot++) {
+        for (i = end - TRIAX_STORE_RECORD_SIZE; i < end; i++) {
+            if (store->config->slot[slot][i] != ERASED) {
+                found |= (uint32_t)1u << slot;
+            }
+        }
+    }
+    return found;
+}
+
 /* The slot that a new file goes to. */
 static uint32_t target_of(const triax_store_t *store)
 {

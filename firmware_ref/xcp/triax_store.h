@@ -60,6 +60,9 @@ uint32_t triax_store_open(triax_store_t *store, const triax_store_config_t *conf
 /* The file in use, file_size bytes; NULL where neither slot has one. */
 const uint8_t *triax_store_file(const triax_store_t *store);
 
+/* Slots whose record is not erased, valid or not: bit 0 and bit 1. */
+uint32_t triax_store_written(const triax_store_t *store);
+
 /*
  * Begin to store `file`, which must not change until triax_store_step says another thing than BUSY.
  * Returns the status: BUSY or REFUSED. A store in progress goes on, with BUSY.

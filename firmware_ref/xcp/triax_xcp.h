@@ -88,7 +88,7 @@ typedef struct {
 #define TRIAX_XCP_INFO_VERSION 0u   /* of this layout: 1 */
 #define TRIAX_XCP_INFO_SHAPE 4u     /* TRIAX_SHAPE */
 #define TRIAX_XCP_INFO_SIZE_AT 8u   /* TRIAX_FILE_SIZE */
-#define TRIAX_XCP_INFO_SLOT 12u     /* slot in use, or TRIAX_STORE_NO_SLOT */
+#define TRIAX_XCP_INFO_SLOT 12u     /* in use; TRIAX_STORE_NO_SLOT + triax_store_written without one */
 #define TRIAX_XCP_INFO_SEQUENCE 16u /* its sequence number */
 #define TRIAX_XCP_INFO_STORE 20u    /* status of the last store */
 #define TRIAX_XCP_INFO_SLOT_SIZE 24u

@@ -137,6 +137,35 @@ def test_what_is_rest(sd_g: float, slope_g: float) -> None:
     assert why == ("" if not slope_g else "not at rest, the samples scatter by 1.16 mg")
 
 
+def test_damaged_flash_is_not_blank_flash(bench: Bench, tmp_path: Path) -> None:
+    """One bit of the constants in a slot, or in both, beside flash that was never written."""
+    from dataclasses import replace
+
+    from device.bridge import bridged
+
+    node = replace(bench.node, flash=tmp_path / "flash.bin")
+    with bridged(node) as name:
+        run("flash", bench.file, "--bus", name)
+    one = bytearray(node.flash.read_bytes())
+    with bridged(node) as name:
+        run("flash", bench.file, "--bus", name)
+    both = bytearray(node.flash.read_bytes())
+    for content, slots, words in (
+        (one, [0], "a damaged calibration in slot 0, slot 1 is blank"),
+        (both, [0, 1], "damaged calibrations in both slots"),
+    ):
+        for slot in slots:
+            content[slot * len(content) // 2 + 100] ^= 1
+        node.flash.write_bytes(content)
+        with bridged(node) as name:
+            told = run("identify", "--bus", name)
+            assert f"flash {words}: uses that in its program" in told
+            text = refused("verify", UNITS / "AT-SIM", "--bus", name)
+            assert f"{words} in flash; expected that of AT-SIM" in text
+            assert "slot 0" in run("flash", bench.file, "--bus", name)
+            assert "every CRC is correct" in run("identify", "--bus", name)
+
+
 def test_nobody_answers_the_prompt_for_a_power_cycle(flashed: Bench) -> None:
     from device.bridge import bridged
 

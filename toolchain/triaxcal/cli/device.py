@@ -99,7 +99,7 @@ def _about(name: str, node: Node) -> str:
         ("uses", "the calibration in RAM" if info.page_used else "the calibration in flash"),
     ]
     if node.part is None:
-        rows[-1] = ("flash", "no calibration: uses that in its program")
+        rows[-1] = ("flash", f"{info.without}: uses that in its program")
     lines = [name, *(f"  {key:<15} {value}" for key, value in rows)]
     if node.part is None:
         return "\n".join(lines)
@@ -122,7 +122,7 @@ def read(opener: Opener, file: Path) -> None:
         node = ask(link)
         name = link.name
     if node.part is None:
-        raise RefusedError(name, "no calibration in flash", remedy="nothing was written")
+        raise RefusedError(name, f"{node.info.without} in flash", remedy="nothing was written")
     renew({file.name: node.content}, file.parent)
     say(f"{file} written: {node.serial}, {len(node.content)} bytes, every CRC is correct")
 

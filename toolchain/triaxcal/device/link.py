@@ -31,6 +31,7 @@ from triaxcal.device.orders import ATTEMPTS, AnsweredError, Orders, SilentError
 
 T = TypeVar("T")
 
+NO_SLOT = 2
 BUSY, DONE = 1, 2
 """Status of a store, as triax_store.h has it."""
 ANSWER_S = 0.5
@@ -51,7 +52,11 @@ _STORE_MEANINGS = {
 
 @dataclass(frozen=True)
 class Info:
-    """What a node says of itself: words of address extension 1."""
+    """What a node says of itself: words of address extension 1.
+
+    `slot` is the one in use; without one it is NO_SLOT, plus 1 and 2 for the slots that have a
+    record nevertheless.
+    """
 
     version: int
     shape: int
@@ -61,6 +66,17 @@ class Info:
     store: int
     slot_size: int
     page_used: int
+
+    @property
+    def without(self) -> str:
+        """Why no slot is in use; "" where one is."""
+        if self.slot < NO_SLOT:
+            return ""
+        return {
+            0: "no calibration",
+            1: "a damaged calibration in slot 0, slot 1 is blank",
+            2: "a damaged calibration in slot 1, slot 0 is blank",
+        }.get(self.slot - NO_SLOT, "damaged calibrations in both slots")
 
 
 class Link:

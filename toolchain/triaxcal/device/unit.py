@@ -10,8 +10,6 @@ from triaxcal.codegen.image_parts import ImagePart, image_parts
 from triaxcal.device.layout import FILE, FLASH_PAGE, RAM_PAGE
 from triaxcal.device.link import Info, Link
 
-NO_SLOT = 2
-
 
 @dataclass(frozen=True)
 class Node:
@@ -57,7 +55,7 @@ def identify(link: Link) -> Node:
     """
     info = link.info()
     texts = link.texts()
-    if info.slot == NO_SLOT:
+    if info.without:
         return Node(*texts, info, None, b"")
     link.choose(FLASH_PAGE)
     content = link.read(FILE, 0, info.file_size)
@@ -176,8 +174,8 @@ def require_in_use(link: Link, content: bytes, where: str) -> Node:
             remedy="connect the device of this unit",
         )
     if node.content != content or node.info.page_used != FLASH_PAGE:
-        whose = f"a calibration of {node.serial}" if node.part else "no calibration"
-        found = f"{whose} in flash"
+        found = f"a calibration of {node.serial}" if node.part else node.info.without
+        found += " in flash"
         if node.info.page_used != FLASH_PAGE:
             found = "the node uses the calibration in RAM"
         raise RefusedError(
