@@ -17,11 +17,11 @@ UNITS = Path(__file__).parent.parent / "units"
 PROVENANCE = Provenance("GOLDEN-001", "0123456789abcdef" * 4, ("fixed constants of the tests",))
 
 
-def write_generated(plan: Plan, folder: Path) -> None:
+def write_generated(plan: Plan, folder: Path, provenance: Provenance = PROVENANCE) -> None:
     """Write what a delivery writes for the firmware."""
     folder.mkdir(parents=True, exist_ok=True)
     texts = render_routine(plan)
-    texts |= render_constants(plan, SENSOR, PROVENANCE)
+    texts |= render_constants(plan, SENSOR, provenance)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
 

@@ -306,7 +306,8 @@ def test_a2l_blocks_nest_and_refer_to_each_other(delivered: dict[str, Delivery])
             assert stack.pop() == tokens[i + 1]
     assert stack == []
     assert used == methods
-    assert {name for name, _ in symbols} == {f'"{names_of(delivery.plan).linked}_calib_constants"'}
+    unit = f"{names_of(delivery.plan).linked}_{delivery.inputs_sha256[:8]}"
+    assert {name for name, _ in symbols} == {f'"{unit}_calib_constants"'}
     assert [offset for _, offset in symbols] == [w.offset for w in calib_words(delivery.firmware)]
 
 

@@ -98,7 +98,7 @@ def test_the_values_behind_the_addresses_are_those_of_the_plan(
     made: Firmware, tmp_path: Path, target: str
 ) -> None:
     elf = build(made, tmp_path, TARGETS[target], "-DWITH_EPK")
-    linked = linked_constants(elf, made.plan, made.provenance.epk)
+    linked = linked_constants(elf, made.plan, made.provenance)
     text = calib_a2l(made, linked).decode("ascii")
     content = elf.read_bytes()
     big = target == "s390x"
@@ -134,7 +134,7 @@ def test_the_values_behind_the_addresses_are_those_of_the_plan(
 
 def test_without_the_text_there_is_no_address_of_the_epk(made: Firmware, tmp_path: Path) -> None:
     elf = build(made, tmp_path, TARGETS["host"])
-    linked = linked_constants(elf, made.plan, made.provenance.epk)
+    linked = linked_constants(elf, made.plan, made.provenance)
     assert linked.epk_address is None
     text = calib_a2l(made, linked).decode()
     assert "ADDR_EPK" not in text
@@ -164,7 +164,7 @@ def test_a_variable_that_is_loaded_from_an_image(made: Firmware, tmp_path: Path)
     command = ["gcc", "main.c", "more.c", "triax_comp.c", "-o", "fw.elf"]
     subprocess.run(command, cwd=tmp_path, check=True)
     elf = tmp_path / "fw.elf"
-    linked = linked_constants(elf, made.plan, "", "calib")
+    linked = linked_constants(elf, made.plan, made.provenance, "calib")
     listed = subprocess.run(["nm", elf], capture_output=True, text=True, check=True).stdout
     found = re.search(r"^(\w+) \w calib$", listed, re.MULTILINE)
     assert found is not None
@@ -180,18 +180,18 @@ def test_a_variable_that_is_loaded_from_an_image(made: Firmware, tmp_path: Path)
         ("twice", f"{elf}: twice has 4 bytes; expected the 260 bytes of triax_calib_t of this"),
     ):
         with pytest.raises(triaxcal.RefusedError) as refusal:
-            linked_constants(elf, made.plan, "", variable)
+            linked_constants(elf, made.plan, made.provenance, variable)
         assert str(refusal.value).startswith(told)
     # The size is the same, the conversions are not.
     other_q = replace(made.plan, shape=replace(made.plan.shape, output_q=23))
     with pytest.raises(triaxcal.RefusedError) as refusal:
-        linked_constants(elf, other_q, "", "calib")
+        linked_constants(elf, other_q, made.provenance, "calib")
     shapes = [names_of(plan).shape for plan in (made.plan, other_q)]
     assert f"the routine triax has the shape {shapes[0]}; expected the shape {shapes[1]}" in (
         str(refusal.value)
     )
     with pytest.raises(triaxcal.RefusedError, match="routine left has no name with a shape"):
-        linked_constants(elf, replace(made.plan, prefix="left"), "", "calib")
+        linked_constants(elf, replace(made.plan, prefix="left"), made.provenance, "calib")
 
 
 @pytest.mark.parametrize("extended", [False, True])
@@ -256,7 +256,7 @@ def test_a_prefix_stands_in_every_name(made: Firmware) -> None:
 
 def refusal_of(elf: Path, firmware: Firmware) -> str:
     with pytest.raises(triaxcal.RefusedError) as refusal:
-        linked_constants(elf, firmware.plan, firmware.provenance.epk)
+        linked_constants(elf, firmware.plan, firmware.provenance)
     text = str(refusal.value)
     assert text.startswith(f"{elf}: ")
     return text
@@ -281,6 +281,22 @@ def test_constants_of_another_unit_are_refused(made: Firmware, tmp_path: Path) -
     )
 
 
+def test_constants_of_other_inputs_are_refused_by_their_hash(
+    made: Firmware, tmp_path: Path
+) -> None:
+    """Of one shape, whatever they are: the linker gives the program those of its header."""
+    elf = build(made, tmp_path, TARGETS["host"])
+    provenance = replace(made.provenance, inputs_sha256="5a" * 32)
+    with pytest.raises(triaxcal.RefusedError) as refusal:
+        linked_constants(elf, made.plan, provenance)
+    assert str(refusal.value) == (
+        f"{elf}: the constants triax are of another unit, or of earlier inputs: "
+        f"{made.provenance.inputs_sha256[:8]}; expected those of the inputs 5a5a5a5a, as "
+        "TRIAX_CALIB_INPUTS of this delivery; link the C of this delivery, or name the unit that "
+        "the program was linked for"
+    )
+
+
 def test_another_shape_is_named(
     made: Firmware, delivered: dict[str, Delivery], tmp_path: Path
 ) -> None:
@@ -291,16 +307,19 @@ def test_another_shape_is_named(
         refusal_of(elf, other)
     )
     left = replace(made, plan=replace(made.plan, prefix="left_accel"))
+    unit = f"{shapes[0]}_{made.provenance.inputs_sha256[:8]}"
     assert (
-        f"no symbol left_accel_{shapes[0]}_calib_constants, but triax_{shapes[0]}_calib_constants; "
-        "expected a program that uses the constants of this unit; another prefix"
+        f"no symbol left_accel_{unit}_calib_constants, but triax_{unit}_calib_constants; expected "
+        "a program that uses the constants of this unit; if they are this unit's, say so: "
+        "--prefix triax"
     ) in refusal_of(elf, left)
 
 
 def test_programs_without_the_symbol_are_refused(made: Firmware, tmp_path: Path) -> None:
     elf = build(made, tmp_path, TARGETS["host"])
     subprocess.run(["strip", "-o", "stripped.elf", elf.name], cwd=tmp_path, check=True)
-    symbol = f"{names_of(made.plan).linked}_calib_constants"
+    unit = f"{names_of(made.plan).linked}_{made.provenance.inputs_sha256[:8]}"
+    symbol = f"{unit}_calib_constants"
     # The host's libc leaves dynamic symbols in a stripped file; firmware has none.
     assert f"no symbol {symbol}; expected" in refusal_of(tmp_path / "stripped.elf", made)
     (tmp_path / "none.c").write_text("int main(void) { return 0; }\n", encoding="ascii")
@@ -338,7 +357,7 @@ def test_what_is_no_elf_is_refused(made: Firmware, tmp_path: Path) -> None:
 def test_a_damaged_elf_is_refused_or_read_right(made: Firmware, tmp_path: Path) -> None:
     elf = build(made, tmp_path, TARGETS["host"])
     content = elf.read_bytes()
-    right = linked_constants(elf, made.plan, "")
+    right = linked_constants(elf, made.plan, made.provenance)
     rng = np.random.default_rng(14)
     cuts = [content[: int(n)] for n in rng.integers(4, len(content), 40)]
     flipped = []
@@ -352,7 +371,7 @@ def test_a_damaged_elf_is_refused_or_read_right(made: Firmware, tmp_path: Path) 
     for damaged_file in (*cuts, *flipped):
         path.write_bytes(damaged_file)
         try:
-            found = linked_constants(path, made.plan, "")
+            found = linked_constants(path, made.plan, made.provenance)
         except triaxcal.RefusedError:
             refused += 1
         else:  # the compared bytes are the constants, wherever the damage is
@@ -384,7 +403,7 @@ def test_the_command_writes_beside_the_program(
     )
     assert done.output.split() == [str(elf.parent / "triax_calib.a2l"), "written"]
     made = make_firmware(delivery)
-    linked = linked_constants(elf, made.plan, made.provenance.epk)
+    linked = linked_constants(elf, made.plan, made.provenance)
     wanted = calib_a2l(made, linked, XcpOnCan(0x555, 0x666))
     assert (elf.parent / "triax_calib.a2l").read_bytes() == wanted
     target = tmp_path / "other.a2l"

@@ -26,8 +26,9 @@ extern "C" {
 /* Whose constants these are, for calibration tools: the EPK of the A2L. */
 #define TRIAX_CALIB_EPK "GOLDEN-001 0123456789abcdef"
 
-#define triax_calib_constants triax_85fe3418_calib_constants
-#define triax_calib_in_use triax_85fe3418_calib_in_use
+/* Link names carry the shape and the unit: what was compiled with this header takes these constants or none. */
+#define triax_calib_constants triax_85fe3418_01234567_calib_constants
+#define triax_calib_in_use triax_85fe3418_01234567_in_use
 
 /* The constants by name, for static initialisers and linker scripts. */
 extern const triax_calib_t triax_calib_constants;

@@ -51,7 +51,12 @@ def write_linked_a2l(
             "variable", f"found {', '.join(variables)}", expected=f"one for each of {parts}"
         )
     found = [
-        Triad(plan, sensor, linked_constants(program, plan, provenance.epk, variable))
+        Triad(
+            plan,
+            sensor,
+            provenance.inputs_sha256,
+            linked_constants(program, plan, provenance, variable),
+        )
         for (plan, sensor), variable in zip(triads, variables or (None, None), strict=False)
     ]
     name = names_of(triads[0][0]).file("triax_calib.a2l")

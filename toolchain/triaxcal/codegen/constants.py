@@ -60,12 +60,12 @@ def render_constants(
         "serial": provenance.serial,
         "epk": provenance.epk,
         "summary": provenance.summary,
-        "inputs_word": f"0x{provenance.inputs_sha256[:8].upper()}u",
         "temp_min": _code(plan.temp_min_code, sensor),
         "temp_max": _code(plan.temp_max_code, sensor),
         "segments": [_segment_context(plan, s, sensor) for s in range(len(plan.segments))],
         "rate": _rate_context(plan, sensor),
         **_terms_context(plan),
+        **names.unit_context(provenance.inputs_sha256),
     }
     return dict(render(name, source, names, **context) for name in CONSTANTS_FILES)
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.extras import install_command
+from triaxcal.codegen.constants import Provenance
 from triaxcal.codegen.image import constant_words
 from triaxcal.codegen.names import names_of
 from triaxcal.fixedpoint.plan import Plan
@@ -19,7 +20,9 @@ from triaxcal.fixedpoint.plan import Plan
 if TYPE_CHECKING:
     from elftools.elf.elffile import ELFFile
 
-_CONSTANTS = re.compile(r"(\w+)_([0-9a-f]{8})_calib_constants")
+_CONSTANTS = re.compile(r"(\w+)_([0-9a-f]{8})_([0-9a-f]{8})_calib_constants")
+"""Triad, shape, first digits of the inputs' hash."""
+_OTHER_UNIT = "link the C of this delivery, or name the unit that the program was linked for"
 _LINKED = "ET_EXEC", "ET_DYN"
 _WRITABLE, _LOADED = 1, 2
 """SHF_WRITE and SHF_ALLOC."""
@@ -51,7 +54,9 @@ class Linked:
     epk_address: int | None
 
 
-def linked_constants(path: Path, plan: Plan, epk: str, variable: str | None = None) -> Linked:
+def linked_constants(
+    path: Path, plan: Plan, provenance: Provenance, variable: str | None = None
+) -> Linked:
     """Find the constants of a plan in an ELF file.
 
     Constants that `triax_calib.c` defines are compared with the plan's integers. `variable` names a
@@ -83,7 +88,7 @@ def linked_constants(path: Path, plan: Plan, epk: str, variable: str | None = No
             remedy="not the HEX or the bin that is made of it",
         )
     try:
-        return _found(str(path), ELFFile(io.BytesIO(content)), plan, epk, variable)
+        return _found(str(path), ELFFile(io.BytesIO(content)), plan, provenance, variable)
     except RefusedError:
         raise
     except Exception as error:  # a damaged file makes pyelftools raise errors of many kinds
@@ -94,7 +99,9 @@ def linked_constants(path: Path, plan: Plan, epk: str, variable: str | None = No
         ) from error
 
 
-def _found(place: str, elf: ELFFile, plan: Plan, epk: str, variable: str | None) -> Linked:
+def _found(
+    place: str, elf: ELFFile, plan: Plan, provenance: Provenance, variable: str | None
+) -> Linked:
     if elf["e_type"] not in _LINKED:
         raise RefusedError(
             place,
@@ -105,7 +112,7 @@ def _found(place: str, elf: ELFFile, plan: Plan, epk: str, variable: str | None)
     words = constant_words(plan)
     size = 4 * len(words)
     if variable is None:
-        symbol = _symbol(place, symbols, plan)
+        symbol = _symbol(place, symbols, plan, provenance)
     else:
         _refuse_other_routine(place, symbols, plan)
         symbol = _variable(place, symbols, variable, size)
@@ -121,7 +128,7 @@ def _found(place: str, elf: ELFFile, plan: Plan, epk: str, variable: str | None)
             expected="an address within 32 bits, as ASAP2 has them",
         )
     writable = bool(section["sh_flags"] & _WRITABLE)
-    text_at = _text_address(elf, epk)
+    text_at = _text_address(elf, provenance.epk)
     return Linked(symbol.name, address, size, elf.little_endian, writable, text_at)
 
 
@@ -176,32 +183,50 @@ def _variable(place: str, symbols: list[Any], name: str, size: int) -> Any:
     return symbol
 
 
-def _symbol(place: str, symbols: list[Any], plan: Plan) -> Any:
+def _symbol(place: str, symbols: list[Any], plan: Plan, provenance: Provenance) -> Any:
     """The symbol of the constants; refused with what there is instead."""
     names = names_of(plan)
-    wanted = f"{names.linked}_calib_constants"
+    inputs = provenance.inputs_sha256[:8]
+    wanted = f"{names.unit(inputs)}_calib_constants"
     defined = {s.name: s for s in symbols}
     if wanted in defined:
         return defined[wanted]
     matches = [m for m in map(_CONSTANTS.fullmatch, defined) if m]
-    shapes = sorted({m[2] for m in matches if m[1] == names.triad})
-    if shapes:
+    ours = [m for m in matches if m[1] == names.triad]
+    units = sorted({m[3] for m in ours if m[2] == names.shape})
+    if units:
         raise RefusedError(
             place,
-            f"the constants {names.triad} have the shape {' and '.join(shapes)}",
+            f"the constants {names.triad} are of another unit, or of earlier inputs: "
+            f"{' and '.join(units)}",
+            expected=f"those of the inputs {inputs}, as {names.triad.upper()}_CALIB_INPUTS of this "
+            "delivery",
+            remedy=_OTHER_UNIT,
+        )
+    if ours:
+        raise RefusedError(
+            place,
+            f"the constants {names.triad} have the shape "
+            f"{' and '.join(sorted({m[2] for m in ours}))}",
             expected=f"the shape {names.shape}",
-            remedy="link the C of this delivery, or name the unit that the program was linked for",
+            remedy=_OTHER_UNIT,
         )
     others = sorted(m[0] for m in matches)
     raise RefusedError(
         place,
         f"no symbol {wanted}" + (f", but {', '.join(others)}" if others else ""),
         expected="a program that uses the constants of this unit",
-        remedy="another prefix is another unit.toml"
+        remedy=_prefix_advice(sorted({m[1] for m in matches}))
         if others
         else f"compile {names.file('triax_calib.c')}, and use {names.triad.upper()}_CALIB: "
         "the linker drops what nobody uses",
     )
+
+
+def _prefix_advice(triads: list[str]) -> str:
+    """How to name the constants that a program has."""
+    prefixes = sorted({triad.removesuffix("_gyro") for triad in triads})
+    return f"if they are this unit's, say so: {' or '.join(f'--prefix {p}' for p in prefixes)}"
 
 
 def _symbols(elf: ELFFile) -> Iterator[Any]:
@@ -226,7 +251,7 @@ def _compare(place: str, content: bytes, words: list[int], little_endian: bool) 
             f"{len(wrong)} of {len(words)} constants are not those of the unit, the first at byte "
             f"{4 * first} ({there})",
             expected=f"{words[first]} there",
-            remedy="link the C of this delivery, or name the unit that the program was linked for",
+            remedy=_OTHER_UNIT,
         )
 
 

@@ -100,8 +100,8 @@ def build_imu(
             _check(accel, routines_of(accel.rate, library, reference), random_vectors),
             _check(gyro, (GyroGenerated(library), GyroReference(reference)), random_vectors),
         )
-        for plan in (accel, gyro):
-            check_selftest(plan, library)
+        for plan, provenance in zip((accel, gyro), provenances, strict=True):
+            check_selftest(plan, provenance, library)
         vectors = _check_both(
             accel, gyro, GeneratedImu(library), files[names_of(accel).file(IMU_IMAGE_FILE)]
         )

@@ -1,4 +1,4 @@
-"""The names in the C of a triad, and the shape that its link names carry."""
+"""The names in the C of a triad, and the shape and the unit that its link names carry."""
 
 from __future__ import annotations
 
@@ -43,6 +43,20 @@ class Names:
         """What the link names begin with. The shape stands early: C99 compares 31 characters."""
         return f"{self.triad}_{self.shape}"
 
+    def unit(self, inputs_sha256: str) -> str:
+        """What the link names of a unit's own constants and known answers begin with.
+
+        A linker takes the first library that has a name: units of one shape need their own.
+        """
+        return f"{self.linked}_{inputs_sha256[:8]}"
+
+    def unit_context(self, inputs_sha256: str) -> dict[str, str]:
+        """What the templates of a unit's own files know beside `context`."""
+        return {
+            "unit_linked": self.unit(inputs_sha256),
+            "inputs_word": _word(inputs_sha256[:8]),
+        }
+
     @property
     def context(self) -> dict[str, str]:
         """The names as the templates know them."""
@@ -74,8 +88,8 @@ def imu_context(accel: Plan, gyro: Plan) -> dict[str, str]:
     }
 
 
-def _word(shape: str) -> str:
-    return f"0x{shape.upper()}u"
+def _word(digits: str) -> str:
+    return f"0x{digits.upper()}u"
 
 
 def names_of(plan: Plan) -> Names:

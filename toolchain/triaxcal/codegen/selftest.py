@@ -39,7 +39,7 @@ def render_selftest(plan: Plan, provenance: Provenance) -> dict[str, str]:
     context: dict[str, Any] = {
         "shape": plan.shape,
         "serial": provenance.serial,
-        "inputs_word": f"0x{provenance.inputs_sha256[:8].upper()}u",
+        **names.unit_context(provenance.inputs_sha256),
         "header": header,
         "identity_magic": MAGIC,
         "identity_version": VERSION,
@@ -54,7 +54,7 @@ def render_selftest(plan: Plan, provenance: Provenance) -> dict[str, str]:
     return dict(render(name, source, names, **context) for name in SELFTEST_FILES)
 
 
-def check_selftest(plan: Plan, library: ctypes.CDLL) -> None:
+def check_selftest(plan: Plan, provenance: Provenance, library: ctypes.CDLL) -> None:
     """Run the self-test of a compiled delivery on this machine.
 
     Raises
@@ -63,7 +63,7 @@ def check_selftest(plan: Plan, library: ctypes.CDLL) -> None:
         When it fails: the number that it returned.
     """
     names = names_of(plan)
-    selftest = getattr(library, f"{names.linked}_selftest")
+    selftest = getattr(library, f"{names.unit(provenance.inputs_sha256)}_selftest")
     selftest.restype = ctypes.c_uint32
     failed = int(selftest())
     if failed:

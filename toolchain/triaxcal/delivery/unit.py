@@ -128,7 +128,7 @@ def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delive
         tried = routines_of(plan.rate, ours, theirs)
         check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
         check = replace(check, images=check_images(plan, cases, *tried))
-        check_selftest(plan, ours)
+        check_selftest(plan, firmware.provenance, ours)
         _refuse_wrong_bound(unit, bound, check)
         methods = _on_dwells(fitted, plan, ours, Reference(theirs))
         compiler = Generated(ours).compiler

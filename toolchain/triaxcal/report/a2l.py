@@ -84,12 +84,15 @@ class Triad:
     ----------
     plan : Plan
     sensor : TemperatureSensor
+    inputs_sha256 : str
+        Of the constants: a part of their name.
     place : Linked, Place or None
         Where they stand in a program or a node; None leaves the addresses 0.
     """
 
     plan: Plan
     sensor: TemperatureSensor
+    inputs_sha256: str
     place: Linked | Place | None = None
 
     @property
@@ -107,7 +110,7 @@ class Triad:
         """Name of the constants."""
         if isinstance(self.place, Place):
             return "constants in triax_calib.bin"
-        own = f"{names_of(self.plan).linked}_calib_constants"
+        own = f"{names_of(self.plan).unit(self.inputs_sha256)}_calib_constants"
         return self.place.symbol if self.place else own
 
 
@@ -115,8 +118,9 @@ def calib_a2l(
     firmware: Firmware, linked: Linked | None = None, xcp: XcpOnCan | None = None
 ) -> bytes:
     """Text of the file of a unit; `linked` are its constants in a program."""
-    triad = Triad(firmware.plan, firmware.fitted.unit.temperature_sensor, linked)
-    return linked_a2l((triad,), firmware.provenance, xcp)
+    sensor, provenance = firmware.fitted.unit.temperature_sensor, firmware.provenance
+    triad = Triad(firmware.plan, sensor, provenance.inputs_sha256, linked)
+    return linked_a2l((triad,), provenance, xcp)
 
 
 def linked_a2l(
@@ -151,7 +155,7 @@ def node_a2l(firmware: Firmware, xcp: XcpOnCan) -> bytes:
             "sample_extension": SAMPLE,
         },
     }
-    triads = (Triad(plan, sensor, place_of(plan)),)
+    triads = (Triad(plan, sensor, firmware.provenance.inputs_sha256, place_of(plan)),)
     return _rendered(triads, firmware.provenance, methods, context, xcp)
 
 

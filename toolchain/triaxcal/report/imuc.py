@@ -58,7 +58,8 @@ def imu_c_files(made: ImuDelivery) -> dict[str, bytes]:
 def imu_a2l(c: ImuC) -> bytes:
     """The constants of both triads for calibration tools; addresses are 0 until it is linked."""
     sensor = c.device.temperature_sensor
-    triads = tuple(Triad(plan, sensor) for plan in (c.build.accel, c.build.gyro))
+    inputs = c.fitted.inputs_sha256
+    triads = tuple(Triad(plan, sensor, inputs) for plan in (c.build.accel, c.build.gyro))
     return linked_a2l(triads, c.fitted.provenances[0])
 
 

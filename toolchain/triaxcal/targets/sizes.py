@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,7 +49,7 @@ def flash_of(
     objects = compiled(toolset, sources, include, work)
     linked = "floating" if names is None else names.linked
     roots = [f"{linked}_set_temperature", f"{linked}_apply"]
-    tables_root = "FLOATING_CALIB" if names is None else f"{linked}_calib_in_use"
+    tables_root = "FLOATING_CALIB" if names is None else _constants(toolset, objects, linked)
     code, helpers = _text(toolset, objects, roots, work / "routine.elf")
     _, tables = _text(toolset, objects, [tables_root], work / "tables.elf")
     loader = 0
@@ -56,6 +57,21 @@ def flash_of(
         whole = _text(toolset, objects, [*roots, f"{linked}_calib_load"], work / "whole.elf")
         loader = sum(whole) - code - helpers
     return Flash(code, tables, helpers, loader)
+
+
+def _symbols(toolset: Toolset, file: str) -> list[tuple[str, str]]:
+    """Kinds and names of an object's symbols."""
+    nm = toolset.core.gcc.removesuffix("gcc") + "nm"
+    rows = [line.split() for line in run([nm, file]).splitlines()]
+    return [(row[-2], row[-1]) for row in rows]
+
+
+def _constants(toolset: Toolset, objects: Sequence[str], linked: str) -> str:
+    """Link name of the pointer to the constants, which carries the unit: whichever it is."""
+    wanted = re.compile(rf"{linked}_[0-9a-f]{{8}}_in_use")
+    found = {n for o in objects for _, n in _symbols(toolset, o) if wanted.fullmatch(n)}
+    (name,) = found
+    return name
 
 
 def _text(
@@ -66,11 +82,7 @@ def _text(
     link = [*link_command(core), f"-Wl,-e,{roots[0]}", *(f"-Wl,-u,{r}" for r in roots)]
     run([*link, "-Wl,-z,noexecstack", *objects, "-lgcc", "-o", str(program)])
     prefix = core.gcc.removesuffix("gcc")
-    own = {
-        line.split()[-1]
-        for line in run([f"{prefix}nm", objects[0]]).splitlines()
-        if line.split()[-2] in "tTrR"
-    }
+    own = {name for kind, name in _symbols(toolset, objects[0]) if kind in "tTrR"}
     total = 0
     for line in run([f"{prefix}size", "-A", "-d", str(program)]).splitlines():
         parts = line.split()
