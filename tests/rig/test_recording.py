@@ -18,7 +18,14 @@ from triaxcal.readings.measurements import read_measurements
 from triaxcal.rig.events import Redo
 from triaxcal.rig.journal import Journal, read_journal
 from triaxcal.rig.rawlog import RawLog
-from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, Recording, durable_events
+from triaxcal.rig.recording import (
+    JOURNAL_FILE,
+    LOG_FILE,
+    Recording,
+    durable_events,
+    header,
+    refuse_other_session,
+)
 from triaxcal.rig.replay import replay
 from triaxcal.rig.runner import Robot
 from triaxcal.rig.store import write_records
@@ -311,3 +318,13 @@ def test_a_clock_set_back_does_not_hold_up_decisions(tmp_path, monkeypatch):
     taken.feed(replace(few, t_ns=few.t_ns - 3600 * 10**9))
     assert decided == [8]
     taken.close()
+
+
+def test_a_journal_of_before_rig_descriptions_is_gone_on_with(tmp_path):
+    setup = short_setup(tmp_path, temps="[20]")
+    old = {k: v for k, v in header(setup).items() if k not in {"rig", "rig_sha256", "undetected"}}
+    refuse_other_session(tmp_path / "x", old, setup)
+    with pytest.raises(RefusedError, match="rig_sha256"):
+        refuse_other_session(tmp_path / "x", {**header(setup), "rig_sha256": "0"}, setup)
+    with pytest.raises(RefusedError, match="dbc_sha256"):
+        refuse_other_session(tmp_path / "x", {**old, "dbc_sha256": "0"}, setup)

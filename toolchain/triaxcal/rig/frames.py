@@ -112,7 +112,7 @@ class Frames:
     @property
     def is_error(self) -> BoolArray:
         """Which are error frames."""
-        return self.flags[2]
+        return np.asarray((self.can_id & np.uint32(ERR_FLAG)) != 0, np.bool_)
 
 
 def alike(t_ns: IntArray, can_id: int, length: int, fd: bool, data: ByteArray) -> Frames:

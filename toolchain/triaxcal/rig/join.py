@@ -45,7 +45,19 @@ class Part:
 
     def take(self, index: IntArray | slice) -> Part:
         """Some of the rows."""
-        return Part(*(_taken(getattr(self, f.name), index) for f in fields(self)))
+        return self.at(index, self.place[index], self.t_ns[index])
+
+    def at(self, index: IntArray | slice, place: IntArray, t_ns: IntArray) -> Part:
+        """Some of the rows under the place and time of the samples that they make."""
+        return Part(
+            place,
+            t_ns,
+            None if self.sequence is None else self.sequence[index],
+            None if self.time is None else self.time[index],
+            None if self.status is None else self.status[index],
+            tuple(axis[index] for axis in self.axes),
+            None if self.good is None else self.good[index],
+        )
 
     def after(self, before: Part) -> Part:
         """These rows behind those of another batch."""
@@ -57,12 +69,6 @@ class Part:
         old = before if before.good is not None or good is None else _all_good(before)
         new = Part(self.place, self.t_ns, self.sequence, self.time, self.status, self.axes, good)
         return Part(*(_chained(getattr(old, f.name), getattr(new, f.name)) for f in fields(new)))
-
-
-def _taken(column: Any, index: Any) -> Any:
-    if column is None:
-        return None
-    return tuple(c[index] for c in column) if isinstance(column, tuple) else column[index]
 
 
 def _chained(first: Any, second: Any) -> Any:
@@ -123,16 +129,18 @@ class CounterJoin:
         left = np.flatnonzero(~used)
         orphans = place[order[left[left < tail]]]
         open_rows = left[left >= tail]
-        members = first[:, None] + np.arange(count)
-        found, rests = [], []
-        for i, part in enumerate(parts):
-            mine = members[owner[members] == i]
-            found.append(part.take(row[mine]))
-            rests.append(part.take(row[open_rows[owner[open_rows] == i]]))
-        self._open = rests
+        self._open = None
+        if len(open_rows):
+            mine = [open_rows[owner[open_rows] == i] for i in range(count)]
+            self._open = [part.take(row[at]) for part, at in zip(parts, mine, strict=True)]
         last = order[first + (count - 1)]
         t_ns = np.concatenate([part.t_ns for part in parts])
-        return Joined(found, place[last], t_ns[last], orphans)
+        end, end_ns = place[last], t_ns[last]
+        found = []
+        for i, part in enumerate(parts):
+            at = row[_of_owner(owner, first, count, i)]
+            found.append(part.at(at, end, end_ns))
+        return Joined(found, end, end_ns, orphans)
 
     def _first(self, owner: IntArray, sequence: IntArray) -> IntArray:
         """Where runs of one frame of each part with equal counters begin; none overlap."""
@@ -155,6 +163,14 @@ class CounterJoin:
                 kept.append(start)
                 free = start + count
         return np.array(kept, np.int64)
+
+
+def _of_owner(owner: IntArray, first: IntArray, count: int, which: int) -> IntArray:
+    """Places of one part's frames in runs of `count` that begin at `first`."""
+    if count == 2:
+        return np.asarray(first + (owner[first] != which), np.int64)
+    members = first[:, None] + np.arange(count)
+    return np.asarray(members[owner[members] == which], np.int64)
 
 
 def _sequence(part: Part) -> IntArray:

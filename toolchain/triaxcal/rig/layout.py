@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -86,7 +87,7 @@ class FrameLayout:
         """J1939's source address."""
         return self.frame_id & 0xFF
 
-    @property
+    @cached_property
     def mask(self) -> int:
         """Bits of a frame's ID with flags that must be those of `can_id`.
 
@@ -99,7 +100,7 @@ class FrameLayout:
         destination = 0xFF00 if (self.frame_id >> 16) & 0xFF >= _PDU2 else 0
         return _FLAGS | 0x03FF_0000 | destination | source
 
-    @property
+    @cached_property
     def sent_bytes(self) -> int:
         """Bytes of payload on the bus: CAN FD has not every length."""
         return next((n for n in FD_LENGTHS if n >= self.size), self.size)

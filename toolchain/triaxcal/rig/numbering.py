@@ -104,11 +104,11 @@ class Numbering:
             return Numbered(np.zeros(0, np.int64), nothing, nothing, nothing)
         clocks = self._clocks
         last = self._last or _Last(-1, int(t_ns[0]), int(sequence[0]), int(time[0]))
-        d_host_s = np.diff(t_ns, prepend=last.t_ns) * 1e-9
+        d_host_s: FloatArray = np.multiply(_steps(t_ns, last.t_ns), 1e-9)
         d_host = np.rint(d_host_s * clocks.rate_hz).astype(np.int64)
-        d_time = np.diff(time, prepend=last.time) % max(clocks.time_turn, 1)
+        d_time = _steps(time, last.time) % max(clocks.time_turn, 1)
         if clocks.counter_modulus:
-            d_sequence = np.diff(sequence, prepend=last.sequence)
+            d_sequence = _steps(sequence, last.sequence)
             step, duplicate = self._by_counter(d_sequence, d_host)
             duplicate &= d_time == 0
         elif clocks.time_turn:
@@ -181,3 +181,11 @@ class Numbering:
             crowded[len(crowded) - len(spans) :] = spans < _CROWDED * 1e9
         self._recent = every[-rate_hz:]
         return crowded
+
+
+def _steps(column: IntArray, before: int) -> IntArray:
+    """Steps of a column (n,), the first from the number before it."""
+    steps = np.empty(len(column), np.int64)
+    steps[0] = column[0] - before
+    np.subtract(column[1:], column[:-1], out=steps[1:])
+    return steps

@@ -59,6 +59,9 @@ def rows_of(use: MessageUse, frames: Frames, seen: int) -> tuple[Rows, IntArray]
     places = np.flatnonzero(use.layout.mine(frames.can_id))
     width = use.layout.size
     data = frames.data
+    if not len(places):
+        nothing = np.zeros((0, max(width, _CLASSIC)), np.uint8)
+        return Rows(places, places, nothing), places
     if width <= _CLASSIC < data.shape[1]:
         data = data[:, :_CLASSIC]
     data = data[places]

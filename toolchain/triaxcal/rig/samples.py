@@ -171,14 +171,19 @@ class SampleDecoder:
         temp_number = number_before(temp_place)
         known = temp_number >= 0
         error_at = np.flatnonzero(frames.is_error)
-        kinds = (
-            *((number_before(bad), BAD_CRC) for _, bad in found.values() if len(bad)),
-            (number_before(joined.orphans), ORPHAN),
-            (number[duplicate], DUPLICATE),
-            (number_before(np.concatenate([dropped, no_temp])), INVALID),
-            (number_before(self._lost(rows)), LOST_FRAME),
-            (number[numbered.conflict], CONFLICT),
-        )
+        at_frames = [
+            *((bad, BAD_CRC) for _, bad in found.values()),
+            (joined.orphans, ORPHAN),
+            (dropped, INVALID),
+            (no_temp, INVALID),
+            (self._lost(rows), LOST_FRAME),
+        ]
+        told = [(number_before(place), kind) for place, kind in at_frames if len(place)]
+        at_samples = ((duplicate, DUPLICATE), (numbered.conflict, CONFLICT))
+        told += [(number[which], kind) for which, kind in at_samples if which.any()]
+        trouble_number = [*(numbers for numbers, _ in told), number_before(error_at + seen)]
+        trouble = [np.full(len(numbers), kind, np.int64) for numbers, kind in told]
+        trouble.append(frames.can_id[error_at].astype(np.int64))
         new = ~duplicate
         if not new.all():
             number, codes, status, jump = number[new], codes[new], status[new], jump[new]
@@ -192,15 +197,8 @@ class SampleDecoder:
             temp_code=temp_code[known],
             serials=self._said(rows, rig.serial),
             rates=self._said(rows, rig.rate),
-            trouble_number=np.concatenate(
-                [*(numbers for numbers, _ in kinds), number_before(error_at + seen)]
-            ),
-            trouble=np.concatenate(
-                [
-                    *(np.full(len(numbers), kind, np.int64) for numbers, kind in kinds),
-                    frames.can_id[error_at].astype(np.int64),
-                ]
-            ),
+            trouble_number=np.concatenate(trouble_number),
+            trouble=np.concatenate(trouble),
         )
 
     def _part(self, plan: PartPlan, rows: Rows) -> Part:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -51,14 +52,14 @@ class Signal:
         """First byte of the payload that the signal touches."""
         return self.start // 8
 
-    @property
+    @cached_property
     def _drop(self) -> int:
         """Bits right of the signal in the number made of its bytes."""
         if self.little_endian:
             return self.start % 8
         return 8 * self.byte_count - (7 - self.start % 8) - self.length
 
-    @property
+    @cached_property
     def byte_count(self) -> int:
         """Bytes that the signal touches."""
         before = self.start % 8 if self.little_endian else 7 - self.start % 8
@@ -91,24 +92,29 @@ class Signal:
         Unsigned ones of 64 bits come as uint64, those of a float are its bits.
         """
         if data.shape[1] == _WORD and data.flags.c_contiguous:
-            words, drop = self._words(data)
-        else:
-            words, drop = self._gathered(data), 0
-        if self.signed and not self.is_float:
-            # Up to the sign bit and back: the arithmetic shift extends the sign.
-            up = words if self.length + drop == 64 else words << np.uint64(64 - self.length - drop)
-            return up.view(np.int64) >> (64 - self.length)
-        if self.length == 64:
-            return words  # type: ignore[return-value]  # 64 bits fit no other
-        raw = (words >> np.uint64(drop)) & np.uint64((1 << self.length) - 1)
-        return raw.view(np.int64)
+            order, up = self._in_word
+            words = data.view(order)[:, 0]
+            return self._cut(words if order == "<u8" else words.astype(np.uint64), up)
+        return self._cut(self._gathered(data), np.uint64(64 - self.length))
 
-    def _words(self, data: ByteArray) -> tuple[Word, int]:
-        """Payloads of eight bytes, each as one number, and the bits right of the signal in it."""
+    @cached_property
+    def _in_word(self) -> tuple[str, np.uint64]:
+        """Order of eight bytes taken as one number, and the bits left of the signal in it."""
         if self.little_endian:
-            return data.view("<u8")[:, 0], self.start
-        first_bit = self.start // 8 * 8 + 7 - self.start % 8
-        return data.view(">u8")[:, 0].astype(np.uint64), 64 - first_bit - self.length
+            return "<u8", np.uint64(64 - self.start - self.length)
+        return ">u8", np.uint64(self.start // 8 * 8 + 7 - self.start % 8)
+
+    @cached_property
+    def _down(self) -> np.uint64:
+        return np.uint64(64 - self.length)
+
+    def _cut(self, words: Word, up: np.uint64) -> IntArray:
+        """Up to the top and back: what is left of the signal falls off, or its sign extends."""
+        top = words << up
+        if self.signed and not self.is_float:
+            return top.view(np.int64) >> (64 - self.length)
+        raw = top >> self._down
+        return raw if self.length == 64 else raw.view(np.int64)  # type: ignore[return-value]
 
     def _gathered(self, data: ByteArray) -> Word:
         """Number made of the signal's bytes, its bits at the right; nine bytes of 64 bits too."""
