@@ -335,3 +335,31 @@ def test_arduino_library_runs_on_an_avr(delivered: Path, tmp_path: Path) -> None
     accel, status = firmware.apply([[1845000, -12000, 9000]], [2560])
     expected = [*accel[0].astype(np.uint32), status[0]]
     assert words == [f"{int(w):08x}" for w in expected], done.stdout + done.stderr
+
+
+def test_a_prefix_is_in_every_name_and_the_c_is_that_of_firmware(
+    delivered: Path, tmp_path: Path
+) -> None:
+    build = tmp_path / "build"
+    shutil.copytree(delivered, build / "AT-SIM")
+    command = ["export", str(build / "AT-SIM"), "--build", str(build), "--to", "make"]
+    ran = CliRunner().invoke(main, [*command, "--prefix", "left_accel"])
+    assert ran.exit_code == 0, ran.output
+    assert "7 delivered files and left_accel.mk" in ran.output
+    layout = build / "AT-SIM-left_accel-make"
+    made = triaxcal.delivered_firmware(build / "AT-SIM", prefix="left_accel").write(tmp_path / "c")
+    assert len(made) == 7
+    for path in made:
+        (exported,) = layout.rglob(path.name)
+        assert exported.read_bytes() == path.read_bytes()
+    # A layout, and what `firmware --prefix` writes, are no units; the unit and its prefix are told.
+    for folder in (tmp_path / "c", layout):
+        with pytest.raises(RefusedError) as refusal:
+            triaxcal.export(folder, "make")
+        assert str(refusal.value) == (
+            f"{folder}: no unit.toml in it, but left_accel_calib.h: files that were made of a "
+            "unit; expected that unit, or its delivered folder; name it; where the command has --prefix, "
+            "this folder has the C of --prefix left_accel"
+        )
+    with pytest.raises(RefusedError, match="expected none: ArduPilot gets parameters, no C"):
+        triaxcal.export(delivered, "ardupilot", tmp_path / "p", prefix="left_accel")

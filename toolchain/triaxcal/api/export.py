@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from triaxcal.api.delivered import load_delivered
+from triaxcal.api.delivered import delivered_firmware, load_delivered
 from triaxcal.api.delivery import delivered_file
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.publish import renew
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.exports.registry import TARGETS
-from triaxcal.exports.target import Source
+from triaxcal.exports.target import Source, Target
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ def export(
     to: str,
     into: str | Path | None = None,
     build: str | Path = "build",
+    prefix: str | None = None,
 ) -> ExportedFiles:
     """Write a delivered unit for a build system or an autopilot.
 
@@ -47,22 +48,26 @@ def export(
     to : str
         Name of a target, as `triaxcal export --help` lists them.
     into : path or None
-        Folder for the files; None is `build`/NAME-TO.
+        Folder for the files; None is `build`/NAME-TO, with a prefix `build`/NAME-PREFIX-TO.
     build : path
         Folder with the delivered units.
+    prefix : str or None
+        What names in the C begin with: it is made and checked again. None takes the delivered C.
 
     Raises
     ------
     RefusedError
-        When there is no such target or delivery, a delivered file has changed, or the target cannot
-        hold the calibration.
+        When there is no such target or delivery, a delivered file has changed, the target cannot
+        hold the calibration, the prefix is none, or the target has no C.
     """
     target = TARGETS[to]
     delivered = delivered_file(Path(unit), Path(build)).parent
     done = load_delivered(unit, build).fitted
-    made = target.make(Source(delivered, done))
+    c = None if prefix is None else _checked_c(unit, build, prefix, target)
+    made = target.make(Source(delivered, done, c))
     name = done.unit.name if isinstance(done, Fitted) else done.name
-    folder = Path(into) if into is not None else Path(build) / f"{name}-{to}"
+    parts = (name, to) if prefix is None else (name, prefix, to)
+    folder = Path(into) if into is not None else Path(build) / "-".join(parts)
     if folder.is_file():
         raise RefusedError(str(folder), "a file", expected="a folder")
     for file, content in made.files.items():
@@ -73,3 +78,18 @@ def export(
             raise refused_by_system(str(place.parent), "made", error) from error
         renew({place.name: content}, place.parent)
     return ExportedFiles(folder, tuple(made.files), made.summary)
+
+
+def _checked_c(
+    unit: str | Path, build: str | Path, prefix: str, target: Target
+) -> dict[str, bytes]:
+    """C and image under a prefix, checked as those of a delivery."""
+    if not target.takes_c:
+        raise RefusedError(
+            "prefix",
+            f'found "{prefix}"',
+            expected=f"none: {target.label} gets parameters, no C",
+        )
+    firmware = delivered_firmware(unit, build, prefix)
+    firmware.check()
+    return dict(firmware.files)

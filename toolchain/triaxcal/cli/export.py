@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import DELIVERED, HELP, UnitFolder, example
+from triaxcal.cli.options import DELIVERED, HELP, PREFIX, UnitFolder, example
 
 
 class _WithTargets(click.Command):
@@ -24,22 +24,29 @@ class _WithTargets(click.Command):
     context_settings=HELP,
     cls=_WithTargets,
     epilog=example(
-        "triaxcal export AT-SIM --to cmake", "triaxcal export AT-SIM --to px4 --into out"
+        "triaxcal export AT-SIM --to cmake",
+        "triaxcal export AT-SIM --to cmake --prefix left_accel",
+        "triaxcal export AT-SIM --to px4 --into out",
     ),
 )
 @click.argument("unit", type=UnitFolder(files=True))
 @DELIVERED
 @click.option("--to", required=True, help="What to write, below.")
-@click.option("--into", type=click.Path(path_type=Path), help="Folder; default: build/UNIT-TO.")
-def export(unit: Path, build: Path, to: str, into: Path | None) -> None:
+@PREFIX
+@click.option(
+    "--into",
+    type=click.Path(path_type=Path),
+    help="Folder; default: build/UNIT-TO, with a prefix build/UNIT-PREFIX-TO.",
+)
+def export(unit: Path, build: Path, to: str, prefix: str | None, into: Path | None) -> None:
     """Write a delivered unit for a build system or an autopilot.
 
     UNIT is a unit, whose delivery is build/UNIT, or a delivered folder. A build system gets the C
-    that was checked, byte for byte. An autopilot gets the parameters of its own, simpler model, and
-    what that costs at readings of this unit.
+    that was checked, byte for byte; under another prefix it is made and checked again. An autopilot
+    gets the parameters of its own, simpler model, and what that costs at readings of this unit.
     """
     import triaxcal  # noqa: PLC0415
 
-    made = triaxcal.export(unit, to, into, build)
+    made = triaxcal.export(unit, to, into, build, prefix)
     click.echo(made.summary)
     click.echo(f"\n{len(made.files)} files in {made.folder}/")

@@ -24,10 +24,13 @@ class Source:
         With the C and verification.json.
     fitted : Fitted or FittedImu
         The calibration in its calibration.json.
+    c : dict or None
+        C and image that were made of it since, under another prefix; None: those in the folder.
     """
 
     folder: Path
     fitted: Fitted | FittedImu
+    c: dict[str, bytes] | None = None
 
     @property
     def serial(self) -> str:
@@ -53,6 +56,8 @@ class Source:
         RefusedError
             When one is missing, or is not the one in verification.json.
         """
+        if self.c is not None:
+            return self.c
         path = self.folder / "verification.json"
         try:
             hashes: dict[str, str] = json.loads(path.read_bytes())["files_sha256"]
@@ -88,10 +93,14 @@ class Exported:
 
 @dataclass(frozen=True)
 class Target:
-    """Entry of a target; `make` gives the same for the same delivery."""
+    """Entry of a target; `make` gives the same for the same delivery.
+
+    `takes_c` is False where only parameters are written, in which no prefix stands.
+    """
 
     name: str
     label: str
     doc: str
     make: Callable[[Source], Exported]
     rank: int = 100
+    takes_c: bool = True

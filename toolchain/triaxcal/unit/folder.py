@@ -58,6 +58,7 @@ def find_unit(folder: Path) -> Path:
     check_unit_name(folder.absolute().name, f"unit {shown(str(folder))}")
     if _is_unit(folder):
         return folder / UNIT_FILE
+    _refuse_made_files(folder)
     hint = ""
     for units_dir in (folder, folder.parent, folder.parent.parent):
         if names := list_units(units_dir):
@@ -69,6 +70,20 @@ def find_unit(folder: Path) -> Path:
         remedy = f"`triaxcal init {folder}` writes a first unit.toml"
     found = f"no {UNIT_FILE} in it" if folder.is_dir() else f"no such unit{hint}"
     raise RefusedError(str(folder), found, remedy=remedy)
+
+
+def _refuse_made_files(folder: Path) -> None:
+    """What was made of a unit, as by `firmware --prefix`, is no unit: another one is no help."""
+    made = [p for pattern in ("*_calib.h", "include/*_calib.h") for p in folder.glob(pattern)]
+    if made:
+        first = min((path.name for path in made), key=len)
+        raise RefusedError(
+            str(folder),
+            f"no {UNIT_FILE} in it, but {first}: files that were made of a unit",
+            expected="that unit, or its delivered folder",
+            remedy="name it; where the command has --prefix, this folder has the C of --prefix "
+            + first.removesuffix("_calib.h"),
+        )
 
 
 def _is_unit(folder: Path) -> bool:

@@ -90,4 +90,5 @@ ENTRY = Target(
     "Parameters of ArduPilot: offset, scale, cubic offsets over temperature, gyro offsets.",
     _make,
     rank=11,
+    takes_c=False,
 )

@@ -61,4 +61,5 @@ ENTRY = Target(
     "Offset of Betaflight, the only thing that it calibrates.",
     _make,
     rank=13,
+    takes_c=False,
 )

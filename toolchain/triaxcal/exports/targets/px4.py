@@ -70,4 +70,5 @@ ENTRY = Target(
     "Parameters of PX4: offset, scale, cubic offsets over temperature, gyro offsets.",
     _make,
     rank=12,
+    takes_c=False,
 )
