@@ -358,8 +358,8 @@ def test_a_prefix_is_in_every_name_and_the_c_is_that_of_firmware(
             triaxcal.export(folder, "make")
         assert str(refusal.value) == (
             f"{folder}: no unit.toml in it, but left_accel_calib.h: files that were made of a "
-            "unit; expected that unit, or its delivered folder; name it; where the command has --prefix, "
-            "this folder has the C of --prefix left_accel"
+            "unit; expected that unit, or its delivered folder; name it; where the command has "
+            "--prefix, this folder has the C of --prefix left_accel"
         )
     with pytest.raises(RefusedError, match="expected none: ArduPilot gets parameters, no C"):
         triaxcal.export(delivered, "ardupilot", tmp_path / "p", prefix="left_accel")
