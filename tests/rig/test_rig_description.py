@@ -126,6 +126,12 @@ def change(old, new):
             "[message.J1]\nj1939 = true\n[message.J2]\nj1939 = true\n",
             "its frames cannot be told from those of J1",
         ),
+        (
+            SIGNALS, '[message.IMU]\ncounter = "State"\nstatus = "State"\n',
+            "status: IMU.State is counter already",
+        ),
+        (SIGNALS, '[message.IMU]\ncounter = "AccY"\n', "counter: IMU.AccY is y already"),
+        (SIGNALS + 'serial = "ENV.Plain"\nrate = "ENV.Plain"\n', "", "rate: ENV.Plain is serial"),
         (change("IMU.AccX", "J1.A") + "y2 = 1\n", "", "unknown: [signals] y2"),
     ],
 )  # fmt: skip
@@ -147,6 +153,12 @@ def test_a_signal_beyond_its_message_is_refused(tmp_path):
     dbc = DBC.replace("BO_ 257 ENV: 8", "BO_ 257 ENV: 1")
     with pytest.raises(RefusedError, match=r"ENV\.Temp needs 2 bytes, and the message has 1"):
         read_description(written(tmp_path, dbc=dbc))
+
+
+def test_a_counter_may_be_the_time_of_the_sample(tmp_path):
+    signals = SIGNALS + 'sample_time = "IMU.Count"\nsample_tick_us = 10000\n'
+    rig = read_description(written(tmp_path, signals, '[message.IMU]\ncounter = "Count"\n'))
+    assert rig.sample_time.turn == rig.messages["IMU"].counter_modulus == 16
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,8 @@ def findings(setup: Setup, frames: Frames, where: str, notes: list[str]) -> list
     """What the frames of a few seconds show."""
     found = [Finding(False, note) for note in notes]
     found += [Finding(None, text) for text in (*setup.rig.warnings, *undetected(setup.rig))]
+    recorded = [w for w in (*setup.rig.axes, setup.rig.temperature) if w is not None]
+    found += [Finding(None, f"{w.label}: {w.none_said}") for w in recorded if w.none_said]
     if not len(frames):
         return [*found, Finding(False, f"{where}: no frames at all")]
     plan = setup.plan

@@ -48,6 +48,8 @@ def _faults(
         yield because(Why.GAP, seconds=block.index - previous.index - 1)
     if block.jumps:
         yield because(Why.RESTARTED)
+    if block.lost > limits.gap_max_s * plan.rate_hz and trouble.invalid >= block.lost:
+        yield because(Why.INVALID, count=trouble.invalid)
     if block.lost > limits.gap_max_s * plan.rate_hz:
         yield because(Why.LOST_IN_SECOND, lost=block.lost, expected=plan.rate_hz)
     if block.clipped:

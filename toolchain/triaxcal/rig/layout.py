@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -25,11 +26,17 @@ from triaxcal.rig.signals import Signal
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
+    from cantools.database.can import Signal as CanSignal
 
 _FLAGS = EFF_FLAG | RTR_FLAG | ERR_FLAG
 WHOLE_ID = _FLAGS | ID_MASK
 _PDU2 = 240
 """PDU format from which a PGN is sent to all: its second byte belongs to the PGN (J1939-21)."""
+_NO_VALUE = re.compile(
+    r"^na$|(?<!no)(?:sna|notavailable|unavailable|invalid|notvalid|error|errorindicator|fault|failure"
+    r"|undefined)$"
+)
+"""Ends of the names of values that are none, lower case, letters and digits alone."""
 ANY_SOURCE = 0xFE
 """J1939's null address; descriptions state it where the source address is left open."""
 
@@ -135,6 +142,7 @@ def layout_of(message: Message) -> FrameLayout:
             s.offset,
             s.is_float,
             s.unit or "",
+            _no_values(s),
         )
         for s in message.signals
     }
@@ -153,6 +161,18 @@ def layout_of(message: Message) -> FrameLayout:
                 if s.multiplexer_signal
             }
         ),
+    )
+
+
+def _no_values(signal: CanSignal) -> tuple[tuple[int, str], ...]:
+    """Raw integers whose names (VAL_) say that there is no value."""
+    if signal.is_float:
+        return ()
+    named = ((int(raw), str(name)) for raw, name in (signal.choices or {}).items())
+    return tuple(
+        (raw, name)
+        for raw, name in sorted(named)
+        if _NO_VALUE.search("".join(c for c in name.lower() if c.isalnum()))
     )
 
 

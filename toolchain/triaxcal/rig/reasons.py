@@ -21,6 +21,7 @@ class Why(Enum):
     GAP = "gap of {seconds} s or more without samples"
     RESTARTED = "the counters jumped: the rig restarted"
     LOST_IN_SECOND = "{lost} of {expected} samples lost in 1 s"
+    INVALID = "{count} values in 1 s are no numbers or not available"
     LOST = "{lost} of {expected} samples lost"
     CLIPPED = "clipped: {count} samples at the end of the ADC's range"
     STUCK = "stuck: {axes} gives the same code all the time"

@@ -79,11 +79,21 @@ class Recorded(SignalUnit):
     @property
     def said(self) -> str:
         """What is recorded, in words."""
+        return f"{self.label}: {self._what}" + (f"; {self.none_said}" if self.none_said else "")
+
+    @property
+    def _what(self) -> str:
         if not self.as_value:
-            return f"{self.label}: the raw integer"
+            return "the raw integer"
         if self.is_code:
-            return f"{self.label}: its value, a code"
-        return f"{self.label}: its value in {self.unit}, divided by the reading of one code"
+            return "its value, a code"
+        return f"its value in {self.unit}, divided by the reading of one code"
+
+    @property
+    def none_said(self) -> str:
+        """Which raw integers are taken for no value, in words; empty where none are."""
+        named = ", ".join(f"{raw} ({name})" for raw, name in self.signal.no_values)
+        return f"no value: {named}" if named else ""
 
     @property
     def step(self) -> float:

@@ -57,6 +57,7 @@ def resolved(  # noqa: PLR0917
         names.message(f"{source}, [message.{message}]", message)
     uses = {m: use_of(names, m, messages.get(m, MessageKeys())) for m in dict.fromkeys(used)}
     _refuse_overlaps(names, uses)
+    _refuse_two_roles(names, dict(zip(AXES, axes, strict=True)) | others, uses)
     _refuse_shared_bits(names, [*axes, *others.values()], uses)
     _refuse_idle(names, messages, uses)
     join, at = _joining(names, keys, axes, uses)
@@ -148,6 +149,30 @@ def _refuse_shared_bits(
                     expected="bits of its own",
                     remedy=f"correct {names.files}, or name another signal",
                 )
+
+
+def _refuse_two_roles(
+    names: Names, signals: Mapping[str, SignalUnit], uses: Mapping[str, MessageUse]
+) -> None:
+    """Refuse a signal that two keys name; a counter may be the time of the sample."""
+    every = [(key, where.label) for key, where in signals.items()]
+    for use in uses.values():
+        inner = {
+            "counter": use.counter,
+            "crc": use.guard.signal if use.guard is not None else None,
+            "status": use.status,
+            "mux": use.only[0].selector if use.only else None,
+        }
+        every += [(key, f"{use.name}.{s.name}") for key, s in inner.items() if s is not None]
+    roles: dict[str, str] = {}
+    for role, label in every:
+        other = roles.setdefault(label, role)
+        if other != role and {other, role} != {"sample_time", "counter"}:
+            raise RefusedError(
+                f"{names.source}, {role}",
+                f"{label} is {other} already",
+                expected="a signal of its own",
+            )
 
 
 def _refuse_idle(names: Names, messages: Iterable[str], uses: Mapping[str, MessageUse]) -> None:

@@ -98,7 +98,11 @@ def available(use: MessageUse, signal: Signal, numbers: np.ndarray) -> BoolArray
     if signal.is_float:
         finite = np.isfinite(numbers)
         return None if finite.all() else np.asarray(finite, np.bool_)
+    there: BoolArray | None = None
+    if signal.no_values:
+        none = np.array([raw % 2**64 for raw, _ in signal.no_values], np.uint64)
+        there = ~np.isin(numbers.view(np.uint64), none)
     if use.layout.j1939 and not signal.signed and signal.length >= 8:
-        there = np.asarray(numbers >> (signal.length - 8) <= _J1939_LAST, np.bool_)
-        return None if there.all() else there
-    return None
+        known = np.asarray(numbers >> (signal.length - 8) <= _J1939_LAST, np.bool_)
+        there = known if there is None else there & known
+    return None if there is None or there.all() else there

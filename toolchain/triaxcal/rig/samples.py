@@ -17,6 +17,7 @@ import numpy as np
 
 from triaxcal.model.types import IntArray
 from triaxcal.rig.description import MessageUse, RigDescription
+from triaxcal.rig.framecounters import FrameCounters
 from triaxcal.rig.frames import BoolArray, Frames
 from triaxcal.rig.join import AgeJoin, CounterJoin, Joined, NoJoin, Part
 from triaxcal.rig.nominal import AS_SENT, Coding
@@ -30,6 +31,7 @@ from triaxcal.rig.parts import (
     parts_of,
     status_of_parts,
 )
+from triaxcal.rig.rates import RateWatch
 from triaxcal.rig.recorded import Recorded, SignalUnit
 from triaxcal.rig.rows import Rows, available, rows_of, status_of
 
@@ -76,8 +78,6 @@ BAD_CRC, ORPHAN, DUPLICATE, INVALID, LOST_FRAME, CONFLICT = 1, 2, 3, 4, 5, 6
 """A frame with a wrong CRC, length or kind; one without its partner; a sample sent twice; a value
 that is no number or not available; a frame lost of a message whose counter numbers no samples; an
 equal counter with other values, as two nodes under one ID send."""
-_MOST_LOST = 255
-"""Frames counted for one step of a counter: after a restart it means nothing."""
 
 
 class SampleDecoder:
@@ -107,10 +107,12 @@ class SampleDecoder:
             or ({self._parts[lead].use.name} if numbers else set())
         )  # fmt: skip
         self._join: CounterJoin | AgeJoin | NoJoin = NoJoin()
+        self._rates: RateWatch | None = None
         if rig.join == "counter":
             self._join = CounterJoin(len(self._parts))
         elif rig.join:
             self._join = AgeJoin(lead, rig.age_s)
+            self._rates = RateWatch(rig, self._parts, lead, rate_hz)
         clock = rig.sample_time
         self._numbering = Numbering(
             Clocks(
@@ -120,7 +122,7 @@ class SampleDecoder:
                 clock.tick_us if clock else 1.0,
             )
         )
-        self._counters: dict[str, int] = {}
+        self._counters = FrameCounters(rig, self._counted)
 
     @property
     def _lead(self) -> int:
@@ -134,14 +136,18 @@ class SampleDecoder:
         Raises
         ------
         RefusedError
-            When a message of the rig comes on several channels at once.
+            When a message of the rig comes on several channels at once; when an axis that is
+            joined by age comes in a slower message than the sample.
         """
         rig, seen = self._rig, self._seen
         frames = self._channel.of(frames)
         self._seen += len(frames)
         found = {name: rows_of(use, frames, seen) for name, use in rig.messages.items()}
         rows = {name: good for name, (good, _) in found.items()}
-        joined = self._join.feed([self._part(plan, rows[plan.use.name]) for plan in self._parts])
+        parts = [self._part(plan, rows[plan.use.name]) for plan in self._parts]
+        if self._rates is not None:
+            self._rates.feed(parts)
+        joined = self._join.feed(parts)
         invalid = lacking(joined)
         if invalid is not None:
             fit = np.flatnonzero(~invalid)
@@ -170,13 +176,15 @@ class SampleDecoder:
         temp_place, temp_code, no_temp = self._temperatures(rows)
         temp_number = number_before(temp_place)
         known = temp_number >= 0
+        lost, other = self._counters.feed(rows)
         error_at = np.flatnonzero(frames.is_error)
         at_frames = [
             *((bad, BAD_CRC) for _, bad in found.values()),
             (joined.orphans, ORPHAN),
             (dropped, INVALID),
             (no_temp, INVALID),
-            (self._lost(rows), LOST_FRAME),
+            (lost, LOST_FRAME),
+            (other, CONFLICT),
         ]
         told = [(number_before(place), kind) for place, kind in at_frames if len(place)]
         at_samples = ((duplicate, DUPLICATE), (numbered.conflict, CONFLICT))
@@ -273,19 +281,3 @@ class SampleDecoder:
         if raw[0] == raw[-1] and (raw == raw[0]).all():
             return frozenset((int(raw[0]),))
         return frozenset(np.unique(raw).tolist())
-
-    def _lost(self, rows: Mapping[str, Rows]) -> IntArray:
-        """Places after losses of messages whose counters number no samples, once a frame lost."""
-        places = [np.zeros(0, np.int64)]
-        for name, use in self._rig.messages.items():
-            mine = rows[name]
-            if use.counter is None or name in self._counted or not len(mine):
-                continue
-            counter = use.counter.raw(mine.data)
-            before = self._counters.get(name, (int(counter[0]) - 1) % use.counter_modulus)
-            lost = (np.diff(counter, prepend=before) - 1) % use.counter_modulus
-            lost[np.diff(counter, prepend=before) == 0] = 0
-            self._counters[name] = int(counter[-1])
-            if lost.any():
-                places.append(np.repeat(mine.place, np.minimum(lost, _MOST_LOST)))
-        return places[0] if len(places) == 1 else np.sort(np.concatenate(places))

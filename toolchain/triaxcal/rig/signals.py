@@ -35,6 +35,8 @@ class Signal:
         The bits are an IEEE 754 number (SIG_VALTYPE_) of 16, 32 or 64 bits.
     unit : str
         Of the value, as the description has it.
+    no_values : tuple of (int, str)
+        Raw integers that are no value, and how the description names them, as "SNA".
     """
 
     name: str
@@ -46,6 +48,7 @@ class Signal:
     offset: float = 0
     is_float: bool = False
     unit: str = ""
+    no_values: tuple[tuple[int, str], ...] = ()
 
     @property
     def first_byte(self) -> int:
