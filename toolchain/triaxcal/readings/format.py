@@ -76,6 +76,8 @@ class Source:
         What separates the cells of a text, in words.
     findings : tuple of str
         What was left out, for the report.
+    units : mapping of int to str
+        Units that the file itself states of columns, as unit.toml names them where it can.
     """
 
     names: tuple[str, ...] = ()
@@ -85,6 +87,7 @@ class Source:
     row_word: str = "row"
     separated: str = ""
     findings: tuple[str, ...] = ()
+    units: Mapping[int, str] = MappingProxyType({})
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
         """Blocks of at most `PIECE` rows, in the order of the file; each call starts anew.

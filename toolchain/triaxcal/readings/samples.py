@@ -143,12 +143,14 @@ def read_samples(
     RefusedError
         As `read_table`; for temperatures that cannot be.
     """
-    quantities = [signed(READING, "acceleration", layout.acceleration)]
+    reading = signed(READING, "acceleration", layout.acceleration)
+    quantities = [replace(reading, unit=layout.acceleration_unit)]
     if layout.gyro:
         quantities.append(Quantity(GYRO, "gyro", layout.gyro, needed=False))
     if layout.temperature is not None:
         degc = to_degc(layout.temperature_unit, sensor)
-        quantities.append(Quantity(TEMP, "temperature", (layout.temperature,), degc))
+        unit = layout.temperature_unit
+        quantities.append(Quantity(TEMP, "temperature", (layout.temperature,), degc, unit=unit))
     if layout.angles is not None:
         key, convert = "the angles", to_radians(layout.angles.unit)
         if layout.direction is not None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import shown
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.clock import Clock
 from triaxcal.readings.format import Block
@@ -25,6 +26,9 @@ from triaxcal.unit.recordingfile import ISO, ClockLayout, Column, FileLayout, Si
 TIME, ROW, LABEL = "time_s", "row", "label"
 GAP = 5.0
 """Of the median step: a longer step is a gap, and no pose reaches across it."""
+
+_CODES = ("count", "code")
+"""Units of raw numbers, as unit.toml names them."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class Quantity:
         From the unit of the file, array of shape (n, columns) to the same.
     needed : bool
         Whether a row without it is left out; otherwise what is missing is 0.
+    unit : str
+        Of the values in the file, by unit.toml; "" where nothing states it.
     """
 
     name: str
@@ -49,6 +55,7 @@ class Quantity:
     columns: tuple[Column, ...]
     convert: Callable[[FloatArray], FloatArray] = lambda values: values
     needed: bool = True
+    unit: str = ""
 
 
 def signed(name: str, key: str, columns: Sequence[SignedColumn], scale: float = 1.0) -> Quantity:
@@ -136,6 +143,7 @@ def read_table(
     file = RecordingFile(path, layout, given)
     clock = _clock_of(file, clock, quantities)
     ordered = ordered and clock.columns != ()
+    _refuse_other_units(file, quantities)
     reading = _Reading(file, clock, quantities, label)
     order = Order(str(path), file.source.row_word, layout.table)
     spool = Spool(reading.width)
@@ -162,6 +170,26 @@ def read_table(
         left_out=reading.missing + order.lost,
         findings=findings,
     )
+
+
+def _refuse_other_units(file: RecordingFile, quantities: Sequence[Quantity]) -> None:
+    """Refuse a column of which the file itself states another unit than unit.toml."""
+    for quantity in quantities:
+        expected, by = quantity.unit, f"{quantity.key}_unit"
+        for column in quantity.columns if quantity.unit else ():
+            index = file.index(column, quantity.key)
+            stated = file.source.units.get(index)
+            if stated is None:
+                continue
+            if expected in _CODES:  # of codes the file has some unit, of all axes the same one
+                expected, by = stated, f"as the first of {quantity.key}"
+            if stated != expected:
+                raise RefusedError(
+                    f"{file.path}, {file.source.names[index]}",
+                    f"its unit is {shown(stated)}",
+                    expected=f"{shown(expected)}, {by}",
+                    remedy=f"correct {quantity.key}_unit, or the unit in the bus description",
+                )
 
 
 def _clock_of(

@@ -65,16 +65,20 @@ class Left:
         The first of them, where it can be shown.
     untimed : int
         Frames without a time.
+    frames : int
+        Those that were not left out.
     """
 
     lines: int = 0
     first: str = ""
     untimed: int = 0
+    frames: int = 0
     _said: int = field(default=0, repr=False)
 
     def add(self, parsed: Parsed) -> None:
         """Count those of one more piece."""
         self.lines += parsed.bad_lines
+        self.frames += len(parsed.frames)
         self.untimed += parsed.untimed
         self.first = self.first or parsed.first_bad
 

@@ -16,6 +16,7 @@ from triaxcal.unit.recordingfile import CAN_LOG, FileLayout
 if TYPE_CHECKING:
     from triaxcal.rig.frames import Frames
     from triaxcal.rig.layout import FrameLayout
+    from triaxcal.rig.logfile import Left
 
 _TIME = "time"
 
@@ -43,6 +44,10 @@ class _CanLog(Source):
         times = [k for k, (_, name) in enumerate(self._columns) if name == _TIME]
         self.clocks = {self.tables[k]: (k, "ns") for k in reversed(times)}
         self._warnings = bus.warnings
+        units = {
+            k: _unit(m.signals[n].unit) for k, (m, n) in enumerate(self._columns) if n != _TIME
+        }
+        self.units = {k: unit for k, unit in units.items() if unit}
         self._left: list[str] = []
 
     @property
@@ -64,13 +69,16 @@ class _CanLog(Source):
         pieces = Pieces(str(self._path), self.names, numbers, texts)
         message = self._columns[pieces.wanted[0]][0]
         wanted = [self._columns[k][1] for k in pieces.wanted]
-        left, channels, short, count = Left(), set[bytes](), 0, 0
+        left, channels, short, count, mine_count, empty = Left(), set[bytes](), 0, 0, 0, 0
         for parsed in read_frames(self._path):
             left.add(parsed)
             mine = parsed.frames.take(message.mine(parsed.frames.can_id))
             whole = mine.take(mine.length >= message.size)
+            mine_count += len(mine)
             short += len(mine) - len(whole)
-            frames = _with_all(message, whole, wanted)
+            held = _with_all(message, whole, wanted)
+            frames = _with_numbers(message, held, wanted)
+            empty += len(held) - len(frames)
             channels |= set(np.unique(frames.channel).tolist())
             self._refuse_channels(message, channels)
             count += len(frames)
@@ -78,14 +86,43 @@ class _CanLog(Source):
                 part = frames.take(slice(start, start + PIECE))
                 columns = {k: _values(part, *self._columns[k]) for k in pieces.wanted}
                 yield pieces.block(columns)
-        if not count:
-            raise RefusedError(
-                str(self._path),
-                f"no frame of {message.name} (ID 0x{message.frame_id:X})",
-                expected="the log of the bus that the description is about",
+        name = self._path.name
+        said = [f"{short} frames of {message.name} are too short"] if short else []
+        if empty:
+            said.append(
+                f"{empty} frames of {message.name} hold J1939's error or not available, left out"
             )
-        too_short = [f"{short} frames of {message.name} are too short"] if short else []
-        self._left = [*left.notes(self._path.name), *too_short]
+        if not count:
+            raise self._none(message, wanted, mine_count, said, left)
+        self._left = [*left.notes(name), *said, *_unseen(message, wanted)]
+
+    def _none(
+        self, message: FrameLayout, names: Sequence[str], count: int, said: list[str], left: Left
+    ) -> RefusedError:
+        """Why there is no row."""
+        place, name = str(self._path), f"{message.name} (ID 0x{message.frame_id:X})"
+        selectors = {c.selector.name for n in names for c in message.multiplexed.get(n, ())}
+        if said:
+            return RefusedError(place, f"{name}: none of {count} frames is whole: {said[0]}")
+        if count and selectors:
+            return RefusedError(
+                place,
+                f"{name}: {count} frames, and none holds all of {', '.join(names)}: they are "
+                f"multiplexed by {', '.join(sorted(selectors))}",
+                expected="signals of one frame: a row of [recording] is a frame",
+                remedy="`triaxcal rig` joins multiplexed axes by rig.toml",
+            )
+        if left.lines and not left.frames:
+            return RefusedError(
+                place,
+                f"no frames in it; its first line is {left.first}",
+                expected="a log of CAN frames",
+            )
+        return RefusedError(
+            place,
+            f"no frame of {name}",
+            expected="the log of the bus that the description is about",
+        )
 
     def _refuse_channels(self, message: FrameLayout, channels: set[bytes]) -> None:
         if len(channels) > 1:
@@ -106,6 +143,51 @@ def _with_all(message: FrameLayout, frames: Frames, names: Sequence[str]) -> Fra
     return frames
 
 
+def _with_numbers(message: FrameLayout, frames: Frames, names: Sequence[str]) -> Frames:
+    """Frames of a message whose signals hold numbers, by J1939; the bench drops the same."""
+    from triaxcal.rig.description import MessageUse  # noqa: PLC0415  with the bench
+    from triaxcal.rig.rows import available  # noqa: PLC0415
+
+    use = MessageUse(message)
+    for signal in (message.signals[name] for name in names if name != _TIME):
+        there = None if signal.is_float else available(use, signal, signal.raw(frames.data))
+        if there is not None:
+            frames = frames.take(there)
+    return frames
+
+
+def _unseen(message: FrameLayout, names: Sequence[str]) -> list[str]:
+    """What of a message is not looked at, where it has more than the columns that are read."""
+    others = [name for name in message.signals if name not in names]
+    if not others:
+        return []
+    said = f"{message.name}: not looked at: {', '.join(others)}"
+    return [f"{said}; a CRC, a counter or a status is checked by `triaxcal rig` alone"]
+
+
+def _unit(text: str) -> str:
+    """Unit of a bus description as unit.toml names it; "" where it is none that is known."""
+    from triaxcal.rig.recorded import (  # noqa: PLC0415  with the bench
+        ACCELERATIONS,
+        CODES,
+        TEMPERATURES,
+        VOLTAGES,
+        folded,
+    )
+
+    known = folded(text)
+    names = [
+        *((ACCELERATIONS, name) for name in ("m/s^2", "g", "mg")),
+        *((VOLTAGES, name) for name in ("V", "mV")),
+        *((TEMPERATURES, name) for name in ("degC", "K", "degF")),
+    ]
+    for table, name in names:
+        if known in table and table[known] == table[folded(name)]:
+            return name
+    tables = (ACCELERATIONS, VOLTAGES, TEMPERATURES, CODES)
+    return text if any(known in table for table in tables) else ""
+
+
 def _values(frames: Frames, message: FrameLayout, name: str) -> Any:
     return frames.t_ns if name == _TIME else message.signals[name].value(frames.data)
 
@@ -118,8 +200,9 @@ ENTRY = Format(
     name=CAN_LOG,
     label="a log of CAN frames",
     doc="With `dbc`: a column is a signal, as Message.Signal, in the unit of the bus description. "
-    "The axes are signals of one message, whose clock is the time of arrival. ASC, BLF, CSV, MF4 "
-    "(bus logging), SQLite, TRC and text of candump, also compressed by gzip.",
+    "The axes are signals of one message, whose clock is the time of arrival. J1939's "
+    "reserved values are left out, a CRC, a counter and a status are not looked at. ASC, BLF, "
+    "CSV, MF4 (bus logging), SQLite, TRC and text of candump, also compressed by gzip.",
     open=_open,
     extensions=(".asc", ".blf", ".trc"),
     package="cantools",
