@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from triaxcal.base.errors import RefusedError, reason_of, refused_by_system
 from triaxcal.base.registry import Registry
 from triaxcal.rig.candump import Parsed
@@ -20,6 +22,11 @@ from triaxcal.rig.textlog import ARCHIVE_ERRORS, damaged_archive
 
 _GZIP = ".gz"
 _HEAD_BYTES = 64
+_FALLS = 0.1
+"""Share of the frames with an earlier time than the one before, from which on they are no times."""
+_DIFFERENCES = (
+    "the times begin at 0 and fall again and again: they are differences, as of `candump -t d`"
+)
 
 
 @dataclass(frozen=True)
@@ -67,20 +74,51 @@ class Left:
         Frames without a time.
     frames : int
         Those that were not left out.
+    falls : int
+        Frames with a time before that of the frame before.
     """
 
     lines: int = 0
     first: str = ""
     untimed: int = 0
     frames: int = 0
-    _said: int = field(default=0, repr=False)
+    falls: int = 0
+    _from_zero: bool = field(default=False, repr=False)
+    _last_ns: int = field(default=0, repr=False)
 
     def add(self, parsed: Parsed) -> None:
         """Count those of one more piece."""
         self.lines += parsed.bad_lines
-        self.frames += len(parsed.frames)
+        t_ns = parsed.frames.t_ns
+        if len(t_ns):
+            if not self.frames:
+                self._from_zero, self._last_ns = int(t_ns[0]) == 0, int(t_ns[0])
+            self.falls += int((np.diff(t_ns, prepend=self._last_ns) < 0).sum())
+            self._last_ns = int(t_ns[-1])
+        self.frames += len(t_ns)
         self.untimed += parsed.untimed
         self.first = self.first or parsed.first_bad
+
+    @property
+    def are_differences(self) -> bool:
+        """Whether the times are those since the frame before: from 0 on, up and down."""
+        return self._from_zero and self.falls > _FALLS * self.frames
+
+    def refuse_differences(self, path: Path | str) -> None:
+        """Refuse differences of times in place of times.
+
+        Raises
+        ------
+        RefusedError
+            Where they are.
+        """
+        if self.are_differences:
+            raise RefusedError(
+                str(path),
+                _DIFFERENCES,
+                expected="times",
+                remedy="record with `candump -l` or `candump -t a`",
+            )
 
     def notes(self, path: Path | str) -> list[str]:
         """One line each, for the user."""
@@ -91,6 +129,8 @@ class Left:
             said.append(f"{path}: {self.lines} {what}{first}")
         if self.untimed:
             said.append(f"{path}: {self.untimed} frames have no time, 0 is taken")
+        if self.are_differences:
+            said.append(f"{path}: {_DIFFERENCES}")
         return said
 
 

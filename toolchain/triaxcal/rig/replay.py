@@ -133,6 +133,7 @@ def chunks(log: Path, form: LineFormat | None, cuts: list[int], left: Left) -> I
                 expected="a log with times",
                 remedy="record with `candump -l` or `candump -t a`",
             )
+        left.refuse_differences(log)
         for start, end in pairwise([0, *inner, len(parsed.frames)]):
             yield parsed.frames.take(slice(start, end))
         done += parsed.lines

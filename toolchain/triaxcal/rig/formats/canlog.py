@@ -72,6 +72,7 @@ class _CanLog(Source):
         left, channels, short, count, mine_count, empty = Left(), set[bytes](), 0, 0, 0, 0
         for parsed in read_frames(self._path):
             left.add(parsed)
+            left.refuse_differences(self._path)
             mine = parsed.frames.take(message.mine(parsed.frames.can_id))
             whole = mine.take(mine.length >= message.size)
             mine_count += len(mine)

@@ -19,6 +19,8 @@ from triaxcal.rig.logfile import LogFormat
 
 SUFFIXES = (".asc", ".blf", ".db", ".mf4", ".trc")
 _PIECE = 1 << 14
+_CLASSIC = 8
+"""Bytes of a classic frame."""
 _NO_FRAMES = re.compile(
     r"\s*(|date .*|base .*|(no )?internal events logged.*|//.*|;.*|begin triggerblock.*"
     r"|end triggerblock.*|[\d.]+\s+start of measurement.*)\s*",
@@ -62,6 +64,9 @@ def _pieces(path: Path, relative: bool) -> Generator[Parsed, None, None]:
         while True:
             with _said() as said:
                 piece = list(islice(messages, _PIECE))
+            for message in piece:
+                # A database has no flag of CAN FD.
+                message.is_fd = message.is_fd or len(message.data) > _CLASSIC
             good = [message for message in piece if _is_whole(message)]
             counted = lines.counted if lines is not None else before + len(piece) + len(said)
             bad = max(0, counted - before - len(good))
@@ -78,7 +83,7 @@ def _is_whole(message: Any) -> bool:
     if message.is_remote_frame or message.is_error_frame:
         return True
     size: int = len(message.data)
-    return size == (int(message.dlc) if message.is_fd else min(int(message.dlc), 8))
+    return size == (int(message.dlc) if message.is_fd else min(int(message.dlc), _CLASSIC))
 
 
 @contextmanager
@@ -124,7 +129,8 @@ def _said() -> Iterator[list[str]]:
 ENTRY = LogFormat(
     name="python-can",
     label="a file of ASC, BLF, SQLite (.db), MF4 or TRC",
-    doc="By python-can: .asc, .blf, .db, .mf4 (bus logging) and .trc.",
+    doc="By python-can: .asc, .blf, .db, .mf4 (bus logging) and .trc. A .db has no CAN FD "
+    "flag: frames of more than eight bytes are CAN FD.",
     takes=lambda name, head: name.endswith(SUFFIXES),  # noqa: ARG005
     read=_read,
     rank=20,
