@@ -285,7 +285,7 @@ def test_a_linker_script_can_place_the_constants(
     "prefix",
     [
         "", "1st", "Left", "a b", "left-accel", "_left", "left_", "left__x", "triax_gyro", "string",
-        "memory", "island", "tool", "wcsx", "a" * 21,
+        "memory", "island", "tool", "wcsx", "a" * 21, "sig", "signal_a", "sig_x",
     ],
 )  # fmt: skip
 def test_a_prefix_that_is_no_good_name_is_refused(prefix: str) -> None:
@@ -296,6 +296,6 @@ def test_a_prefix_that_is_no_good_name_is_refused(prefix: str) -> None:
 
 
 def test_a_prefix_is_read() -> None:
-    for prefix in ("x", "left_accel", "imu2_a", "s", "i", "to"):
+    for prefix in ("x", "left_accel", "imu2_a", "s", "i", "to", "sig2", "si", "asig"):
         text = UNIT.read_text() + f'\n[firmware]\nprefix = "{prefix}"\n'
         assert unit_of_text("AT-SIM", text, "unit.toml").prefix == prefix

@@ -21,7 +21,7 @@ def image_text(name: str, content: bytes, parts: tuple[ImagePart, ...]) -> str:
 
 def _identity(identity: Identity | None) -> list[tuple[str, str]]:
     if identity is None:
-        return [("identity", "none: written by triaxcal 0.1.0")]
+        return [("identity", "none: written by triaxcal 0.1.0, or cut behind the constants")]
     per_code, at_zero = identity.degc_per_code, identity.degc_at_zero
     return [
         ("serial number", identity.serial),
