@@ -45,6 +45,21 @@ rig = "rig.toml"
 temperatures_degc = [20]
 take_out_of_order = true
 """
+SHORT = """
+[stillness]
+reference_s = 60
+settle_s = 2
+average_s = 20
+guard_s = 2
+batches = 10
+u_max_micro_g = 1000
+moving_step_micro_g = 20000
+[thermal]
+window_s = 30
+tolerance_k = 2
+slope_max_k_per_min = 5
+span_max_k = 3
+"""
 UNIT = """format = 1
 serial = "W-1"
 [adc]
@@ -167,3 +182,31 @@ def test_j1939_source_addresses_that_came_are_named(folder):
     census.add(frames_of(sent(1, arbitration_id=0x0CFF0081, is_extended_id=True)))
     (said,) = census.faults()
     assert "no frame from source address 0x80; its PGN comes from 0x81" in said
+
+
+def test_frames_of_another_channel_than_that_of_the_rig_are_named(folder):
+    text = RIG.replace('file = "bus.dbc"', 'file = "bus.dbc"\nchannel = "can1"')
+    (folder / "rig.toml").write_text(text)
+    said = str(called(folder, sent(1), "replay").exception)
+    assert "channel can1 of rig.toml is read; frames came on can0 (50)" in said
+
+
+def test_a_table_of_which_no_line_is_a_frame_is_said_to_hold_none(folder):
+    (folder / "x.csv").write_text("time_s,id,length,fd,payload\n1,0xZZ,8,0,00\n")
+    common = ("--unit", str(folder / "W-1"), "--plan", str(folder / "plan.toml"))
+    done = CliRunner().invoke(command, ["replay", *common, str(folder / "x.csv")])
+    assert "no frames in it; its first line is '1,0xZZ,8,0,00" in str(done.exception)
+
+
+def test_dwells_that_were_tried_are_counted_with_their_reasons(folder):
+    """A log that ends in the first dwell, after a shock while it averages."""
+    (folder / "plan.toml").write_text(PLAN + SHORT)
+    messages = sent(82)
+    for message in messages[50 * 76 : 50 * 77]:
+        message.data[0] ^= 0xFF
+        message.data[1] ^= 0x08
+    done = called(folder, messages, "replay")
+    assert "1 refused" in str(done.exception)
+    assert "it ends at: " in str(done.exception)
+    assert "TP1: " in done.output
+    assert "retake" in done.output

@@ -131,10 +131,16 @@ class Census:
         self.frames = 0
         self._counts = [_Count(use) for use in rig.messages.values()]
         self._ids: Counter[int] = Counter()
+        self._channel = rig.channel
+        self._others: Counter[bytes] = Counter()
 
     def add(self, frames: Frames) -> None:
         """Count those of one more piece."""
         self.frames += len(frames)
+        if self._channel is not None:
+            other = (frames.channel != self._channel.encode()) & (frames.channel != b"")
+            self._others.update(frames.channel[other].tolist())
+            frames = frames.take(~other)
         ids, counts = np.unique(frames.can_id, return_counts=True)
         self._ids.update(dict(zip(ids.tolist(), counts.tolist(), strict=True)))
         for count in self._counts:
@@ -143,6 +149,13 @@ class Census:
     def faults(self) -> list[str]:
         """What does not fit the description, a sentence each, what is missing first."""
         missing = [self._missing(count.use) for count in self._counts if not count.frames]
+        if missing and self._others:
+            there = ", ".join(
+                f"{n.decode('ascii', 'replace')} ({c})" for n, c in self._others.items()
+            )
+            missing.insert(
+                0, f"channel {self._channel} of rig.toml is read; frames came on {there}"
+            )
         return [*missing, *(text for count in self._counts for text in count.faults())]
 
     def said(self) -> list[str]:

@@ -12,6 +12,7 @@ from triaxcal.rig.engine import Setup
 from triaxcal.rig.events import Event
 from triaxcal.rig.frames import Frames, concatenate
 from triaxcal.rig.linelog import frames_of_log
+from triaxcal.rig.logfile import Left
 from triaxcal.rig.session import Session
 from triaxcal.rig.view import view
 
@@ -43,7 +44,9 @@ def why_not(setup: Setup, log: Path, session: Session, events: Sequence[Event]) 
         When the log cannot be read.
     """
     census, first = Census(setup.rig), list[Frames]()
+    left = Left()
     for parsed in frames_of_log(log, setup.rig.lines):
+        left.add(parsed)
         census.add(parsed.frames)
         if len(parsed.frames) and not first:
             first.append(beginning(parsed.frames, _BEGINNING_S))
@@ -59,7 +62,7 @@ def why_not(setup: Setup, log: Path, session: Session, events: Sequence[Event]) 
     found = f"holds {len(session.accepted)} accepted dwells of the plan's {to_accept}"
     found += f", {tried} refused" if tried else ""
     if not census.frames:
-        ends = "no frames"
+        ends = "no frames in it" + (f"; its first line is {left.first}" if left.first else "")
     elif session.reference is None:
         ends = (
             f"{setup.plan.stillness.reference_s} s of rest in a row, to learn the noise, never came"
