@@ -128,10 +128,14 @@ def change(old, new):
         ),
         (
             SIGNALS, '[message.IMU]\ncounter = "State"\nstatus = "State"\n',
-            "status: IMU.State is counter already",
+            "[message.IMU] status: IMU.State is [message.IMU] counter already",
         ),
-        (SIGNALS, '[message.IMU]\ncounter = "AccY"\n', "counter: IMU.AccY is y already"),
-        (SIGNALS + 'serial = "ENV.Plain"\nrate = "ENV.Plain"\n', "", "rate: ENV.Plain is serial"),
+        (SIGNALS, '[message.IMU]\ncounter = "AccY"\n', "counter: IMU.AccY is [signals] y"),
+        (SIGNALS + 'serial = "ENV.Plain"\nrate = "ENV.Plain"\n', "", "rate: ENV.Plain is [sig"),
+        (
+            change('"IMU.AccY"', '["IMU.AccY", "IMU.AccX"]'), "",
+            'expected one signal, "Message.Signal"; an axis that is described as several signals',
+        ),
         (change("IMU.AccX", "J1.A") + "y2 = 1\n", "", "unknown: [signals] y2"),
     ],
 )  # fmt: skip

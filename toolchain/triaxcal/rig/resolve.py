@@ -155,7 +155,7 @@ def _refuse_two_roles(
     names: Names, signals: Mapping[str, SignalUnit], uses: Mapping[str, MessageUse]
 ) -> None:
     """Refuse a signal that two keys name; a counter may be the time of the sample."""
-    every = [(key, where.label) for key, where in signals.items()]
+    every = [(f"[signals] {key}", where.label) for key, where in signals.items()]
     for use in uses.values():
         inner = {
             "counter": use.counter,
@@ -163,11 +163,13 @@ def _refuse_two_roles(
             "status": use.status,
             "mux": use.only[0].selector if use.only else None,
         }
-        every += [(key, f"{use.name}.{s.name}") for key, s in inner.items() if s is not None]
+        here = ((f"[message.{use.name}] {key}", s) for key, s in inner.items() if s is not None)
+        every += [(key, f"{use.name}.{s.name}") for key, s in here]
     roles: dict[str, str] = {}
     for role, label in every:
         other = roles.setdefault(label, role)
-        if other != role and {other, role} != {"sample_time", "counter"}:
+        both = {text.rpartition(" ")[2] for text in (other, role)}
+        if other != role and both != {"sample_time", "counter"}:
             raise RefusedError(
                 f"{names.source}, {role}",
                 f"{label} is {other} already",

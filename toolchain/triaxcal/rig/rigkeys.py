@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from triaxcal.base.keys import DESCRIPTION, FORMAT, FileKeys, TableKeys, setting
 from triaxcal.base.kinds import FLAG, line, listed, number, whole, word
@@ -13,6 +13,12 @@ RIG_FILE = "rig.toml"
 JOINS = ("counter", "age")
 SERIALS = ("crc32", "number")
 _NAME = line()
+_AXIS = replace(
+    _NAME,
+    expected='one signal, "Message.Signal"',
+    remedy="an axis that is described as several signals, as its high and low byte: make one "
+    "signal of them in a copy of the bus description",
+)
 _BYTE = whole(0, 255)
 _PROTECTION = "How the CRC is made; required with crc. "
 
@@ -78,9 +84,9 @@ class SignalKeys:
         Message whose arrival makes a sample where axes are joined by age.
     """
 
-    x: str = setting(_NAME, example='"IMU.AccX"')
-    y: str = setting(_NAME, example='"IMU.AccY"')
-    z: str = setting(_NAME, example='"IMU.AccZ"')
+    x: str = setting(_AXIS, example='"IMU.AccX"')
+    y: str = setting(_AXIS, example='"IMU.AccY"')
+    z: str = setting(_AXIS, example='"IMU.AccZ"')
     temperature: str | None = setting(_NAME, None, example='"IMU.Temp"')
     record: str | None = setting(
         word(("raw", "value")), None, words='"raw" of integers, "value" of floats', example='"raw"'
