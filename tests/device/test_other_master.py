@@ -147,7 +147,7 @@ def test_measured_by_pyxcp_and_read_by_asammdf(
     asammdf = pytest.importorskip("asammdf")
     names = (*FORCE, "TRIAX_temp_code", *RAW, "TRIAX_status")
     with bridged(bench.node) as bus, tool(a2l, bus) as master:
-        assert master.identifier(5) == a2l.epk() == "AT-SIM-001 5adf0ba79355d786"
+        assert master.identifier(5) == a2l.epk() == "AT-SIM-001 95afbed2f4389778"
         found = poll(master, a2l, names)
     codes = sensor(bench)[:SAMPLES]
     plan, unit = bench.delivery.plan, bench.delivery.firmware.fitted.unit
