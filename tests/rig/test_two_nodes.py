@@ -110,9 +110,18 @@ def test_one_id_on_two_channels_is_refused_by_name(tmp_path):
     assert "IMU: ID 0x100 comes on several channels: can0, can1" in str(refusal.value)
     assert 'channel = "can0"' in str(refusal.value)
     decode = SampleDecoder(described(tmp_path), RATE)
-    decode.feed(both.take(slice(0, 1)))
+    for i in range(4):
+        decode.feed(both.take(slice(i, i + 1)))
     with pytest.raises(RefusedError, match="several channels"):
-        decode.feed(both.take(slice(1, 2)))
+        decode.feed(both.take(slice(4, 5)))
+
+
+def test_one_line_of_a_log_with_another_channel_is_no_second_sensor(tmp_path):
+    frames = sent(1000, channel="can0")
+    channel = frames.channel.copy()
+    channel[50] = b"ca0"
+    found = SampleDecoder(described(tmp_path), RATE).feed(replace(frames, channel=channel))
+    assert len(found.number) == 4 * RATE
 
 
 @pytest.mark.parametrize(("channel", "z"), [("can0", 1000), ("can1", 1026)])

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.model.types import IntArray
 from triaxcal.rig.description import MessageUse, RigDescription
 from triaxcal.rig.frames import Frames
 
 _TOGETHER_NS = 1_000_000_000
 """Channels that change within this time are used at once; a cable takes longer to change over."""
+_CHANGES = 4
+"""As many in a second come from two sensors; one line of a log with a flipped bit makes two."""
 
 
 class OneChannel:
@@ -19,6 +22,7 @@ class OneChannel:
         self._rig = rig
         self._chosen = rig.channel.encode() if rig.channel is not None else None
         self._last: dict[str, tuple[bytes, int]] = {}
+        self._changed_ns: dict[str, IntArray] = {}
 
     def of(self, frames: Frames) -> Frames:
         """Frames of the chosen channel and of none; all where none is chosen.
@@ -26,7 +30,7 @@ class OneChannel:
         Raises
         ------
         RefusedError
-            When a message comes on two channels within a second.
+            When a message comes on two channels in turn within a second.
         """
         if self._chosen is not None:
             mine = (frames.channel == self._chosen) | (frames.channel == b"")
@@ -47,7 +51,13 @@ class OneChannel:
         earlier = np.concatenate([np.array([before], np.bytes_), channel[:-1]])
         pause_ns = np.diff(t_ns, prepend=before_ns)
         at = np.flatnonzero((earlier != channel) & (pause_ns < _TOGETHER_NS))
-        if len(at):
+        if not len(at):
+            return
+        known_ns = self._changed_ns.get(name, t_ns[:0])
+        changed_ns = np.concatenate([known_ns, t_ns[at]])
+        self._changed_ns[name] = changed_ns[1 - _CHANGES :]
+        apart_ns = changed_ns[_CHANGES - 1 :] - changed_ns[: 1 - _CHANGES]
+        if (apart_ns < _TOGETHER_NS).any():
             both = sorted(c.decode("ascii", "replace") for c in (earlier[at[0]], channel[at[0]]))
             raise RefusedError(
                 f"{self._rig.name}, {name}",
