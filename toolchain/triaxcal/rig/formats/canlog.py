@@ -91,7 +91,7 @@ class _CanLog(Source):
         said = [f"{short} frames of {message.name} are too short"] if short else []
         if empty:
             said.append(
-                f"{empty} frames of {message.name} hold J1939's error or not available, left out"
+                f"{empty} frames of {message.name} hold no value (error, not available), left out"
             )
         if not count:
             raise self._none(message, wanted, mine_count, said, left)
