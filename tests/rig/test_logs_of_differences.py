@@ -23,15 +23,20 @@ STEPS = 0.01 + RNG.uniform(-0.001, 0.001, 200)
 TIMES = np.concatenate([[0.0], np.cumsum(STEPS)])
 
 
-def test_differences_are_refused_as_a_session_and_noted_elsewhere(tmp_path):
-    path = shown([0.0, *STEPS], tmp_path / "x.log")
+EVEN = np.full(5000, 0.01)
+EVEN[2500:] += 1e-6
+
+
+@pytest.mark.parametrize("steps", [STEPS, np.full(50, 0.01), EVEN])
+def test_differences_are_refused_as_a_session_and_noted_elsewhere(tmp_path, steps):
+    path = shown([0.0, *steps], tmp_path / "x.log")
     with pytest.raises(RefusedError, match="differences, as of `candump -t d`; expected times"):
         list(chunks(path, None, [], Left()))
     left = Left()
     for parsed in read_frames(path):
         left.add(parsed)
     (note,) = left.notes(path)
-    assert note.startswith(f"{path}: the times begin at 0 and fall")
+    assert note.startswith(f"{path}: the times begin at 0 and do not rise")
 
 
 @pytest.mark.parametrize("start", [0.0, 5.0])
@@ -39,6 +44,12 @@ def test_times_since_the_start_are_times(tmp_path, start):
     path = shown(start + TIMES, tmp_path / "x.log")
     (frames,) = chunks(path, None, [], Left())
     np.testing.assert_allclose(frames.t_ns / 1e9, start + TIMES, atol=1e-6)
+
+
+def test_a_coarse_clock_gives_times(tmp_path):
+    times = np.floor(TIMES * 5) / 5
+    (frames,) = chunks(shown(times, tmp_path / "x.log"), None, [], Left())
+    assert len(np.unique(frames.t_ns)) > 5
 
 
 def test_some_frames_out_of_order_are_no_differences(tmp_path):

@@ -24,9 +24,10 @@ _GZIP = ".gz"
 _HEAD_BYTES = 64
 _FALLS = 0.1
 """Share of the frames with an earlier time than the one before, from which on they are no times."""
-_DIFFERENCES = (
-    "the times begin at 0 and fall again and again: they are differences, as of `candump -t d`"
-)
+_FRAMES_PER_S = 200_000
+"""More than the shortest frames of several buses."""
+_FRAMES_MIN = 20
+_DIFFERENCES = "the times begin at 0 and do not rise: they are differences, as of `candump -t d`"
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,8 @@ class Left:
     falls: int = 0
     _from_zero: bool = field(default=False, repr=False)
     _last_ns: int = field(default=0, repr=False)
+    _latest_ns: int = field(default=0, repr=False)
+    _rises: int = field(default=0, repr=False)
 
     def add(self, parsed: Parsed) -> None:
         """Count those of one more piece."""
@@ -95,14 +98,24 @@ class Left:
                 self._from_zero, self._last_ns = int(t_ns[0]) == 0, int(t_ns[0])
             self.falls += int((np.diff(t_ns, prepend=self._last_ns) < 0).sum())
             self._last_ns = int(t_ns[-1])
+            latest_ns = np.maximum.accumulate(np.maximum(t_ns, self._latest_ns))
+            self._rises += int((np.diff(latest_ns, prepend=self._latest_ns) > 0).sum())
+            self._latest_ns = int(latest_ns[-1])
         self.frames += len(t_ns)
         self.untimed += parsed.untimed
         self.first = self.first or parsed.first_bad
 
     @property
     def are_differences(self) -> bool:
-        """Whether the times are those since the frame before: from 0 on, up and down."""
-        return self._from_zero and self.falls > _FALLS * self.frames
+        """Whether the times are those since the frame before.
+
+        They begin at 0, and then they fall again and again, are all the same, or leave no time for
+        so many frames.
+        """
+        if not self._from_zero or self.untimed or not self._latest_ns or self.frames < _FRAMES_MIN:
+            return False
+        crowded = self.frames > _FRAMES_PER_S * self._latest_ns * 1e-9
+        return self._rises == 1 or crowded or self.falls > _FALLS * self.frames
 
     def refuse_differences(self, path: Path | str) -> None:
         """Refuse differences of times in place of times.

@@ -94,7 +94,8 @@ class _CanLog(Source):
                 f"{empty} frames of {message.name} hold no value (error, not available), left out"
             )
         if not count:
-            raise self._none(message, wanted, mine_count, said, left)
+            signals = [name for name in wanted if name != _TIME]
+            raise self._none(message, signals, mine_count, said, left)
         self._left = [*left.notes(name), *said, *_unseen(message, wanted)]
 
     def _none(
