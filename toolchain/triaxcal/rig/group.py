@@ -3,9 +3,9 @@
 Each unit has a session of its own, which decides by the unit's frames alone. The group decides
 what all of them wait for: the temperature of the slowest, and the position. A visit to a position
 ends when every unit that needs it has been accepted, or must leave it, or the time of two dwells
-has passed. A unit that failed `attempts` visits in a row is set aside
-with its reason; the others go on. What happens to most units alike is the chamber's or the tilter's
-fault, and sets nobody aside.
+has passed. A unit that failed `attempts` visits in a row is set aside with its reason; the others
+go on. What happens to most units alike is the fault of the chamber or the tilter, and sets nobody
+aside.
 """
 
 from __future__ import annotations
@@ -18,66 +18,14 @@ from typing import Literal
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.engine import Engine
-from triaxcal.rig.events import Event
-from triaxcal.rig.manysetup import Place
-from triaxcal.rig.orientation import described
+from triaxcal.rig.member import Aside, Member, Told
 from triaxcal.rig.phases import Learning, Warming
 from triaxcal.rig.plan import SessionPlan
-from triaxcal.rig.session import Session
 
 GroupStage = Literal["reference", "temperature", "turn", "dwell", "done"]
 _VISIT = "visit"
 _SLACK_S = 15.0
 """Beyond two dwells: blocks of one second, and the first of them after a turn."""
-
-
-@dataclass
-class Member:
-    """One unit of a session of many.
-
-    Attributes
-    ----------
-    aside : str
-        Why it takes no further part; "" while it does.
-    last : str
-        What was refused last.
-    heard_s, temp_s : float or None
-        When readings and temperatures came last.
-    failed : Counter
-        Failures so far, by step and what failed: "visit" those in a row, "temperature", a position
-        those that were superseded.
-    """
-
-    place: Place
-    engine: Engine
-    aside: str = ""
-    last: str = ""
-    heard_s: float | None = None
-    temp_s: float | None = None
-    failed: Counter[tuple[int, str]] = field(default_factory=Counter)
-    index: int | None = None
-
-    @property
-    def name(self) -> str:
-        """Name of the unit."""
-        return self.place.name
-
-    @property
-    def session(self) -> Session:
-        """Session of the unit."""
-        return self.engine.session
-
-    @property
-    def active(self) -> bool:
-        """Still to be measured."""
-        return not self.aside and not self.session.done
-
-    def takes(self, position: str) -> bool:
-        """Whether it can be measured in a position that is wanted of it."""
-        session = self.session
-        left = session.reseat is not None and session.reseat.position == position
-        return position in session.pending and not left
 
 
 @dataclass
@@ -93,10 +41,6 @@ class _Visit:
     position: str
     arrived_s: float | None = None
     refused: dict[str, str] = field(default_factory=dict)
-
-
-Told = tuple[Member, Event]
-Aside = tuple[Member, str]
 
 
 class Group:
@@ -317,7 +261,7 @@ class Group:
         if len(late) == len(self.active):
             self.stop = what
             return []
-        return [(m, what + _unrest(m)) for m in late]
+        return [(m, what + m.unrest) for m in late]
 
     def _visited(self, now_s: float) -> list[Aside]:
         """Go on with the visit, or end it; units that failed for good."""
@@ -340,7 +284,7 @@ class Group:
         for member in behind:
             refused = visit.refused.get(member.name)
             if member in waiting or (refused and visit.position in member.session.pending):
-                reason = refused or f"{visit.position}: {_why_not(member, visit.position)}"
+                reason = refused or f"{visit.position}: {member.why_not(visit.position)}"
                 asides += self._fail(member, member.session.step, _VISIT, reason)
         self._visit = None
         gone = {m.name for m, _ in asides}
@@ -371,17 +315,3 @@ class Group:
         behind = self.behind
         takes = (p for p in order if any(m.takes(p) for m in behind))
         return next(takes, next((p for p in order if p != self.position), first))
-
-
-def _unrest(member: Member) -> str:
-    unrest = member.session.unrest
-    return f": {unrest}" if unrest else ""
-
-
-def _why_not(member: Member, position: str) -> str:
-    """Why a unit has not been accepted in a position, where nothing was refused."""
-    session = member.session
-    if session.seen != position:
-        shown = f"the readings show {described(session.seen)}" if session.seen else "no position"
-        return f"not in it: {shown}"
-    return f"not at rest in time{_unrest(member)}"

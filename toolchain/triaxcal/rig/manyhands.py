@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from triaxcal.base.errors import RefusedError
 from triaxcal.rig.attendant import Attendant
 from triaxcal.rig.forecast import duration
-from triaxcal.rig.group import Group, Member, Told
+from triaxcal.rig.group import Group
+from triaxcal.rig.member import Member, Told
 
 
 class ManyAttendant:

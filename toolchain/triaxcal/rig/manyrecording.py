@@ -11,10 +11,11 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.rig.engine import Engine
 from triaxcal.rig.events import Command, Event
 from triaxcal.rig.frames import Frames, concatenate
-from triaxcal.rig.group import Group, Member
+from triaxcal.rig.group import Group
 from triaxcal.rig.journal import Journal, Record, disk_refusal, read_journal
 from triaxcal.rig.lock import Lock
 from triaxcal.rig.manysetup import ManySetup
+from triaxcal.rig.member import Member
 from triaxcal.rig.rawlog import RawLog
 from triaxcal.rig.reasons import Reason
 from triaxcal.rig.recording import (

@@ -9,8 +9,9 @@ from typing import Protocol
 
 from triaxcal.rig.events import Command, Event
 from triaxcal.rig.gather import Gathered
-from triaxcal.rig.group import Group, Member
+from triaxcal.rig.group import Group
 from triaxcal.rig.manyrecording import ManyRecording
+from triaxcal.rig.member import Member
 from triaxcal.rig.simbench import SimulatedBench
 
 

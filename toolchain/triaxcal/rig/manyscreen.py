@@ -10,8 +10,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from triaxcal.rig.group import Group, Member
+from triaxcal.rig.group import Group
 from triaxcal.rig.manyrunner import ManyTick
+from triaxcal.rig.member import Member
 from triaxcal.rig.orientation import described
 from triaxcal.rig.phases import Turning
 from triaxcal.rig.screen import ALARM, COLOURS, BigText, Fitted
