@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             outcomes.append(Outcome(name, name, NOT_DONE, str(missing)))
     share = max(1, given.seconds // max(1, len(targets)))
     outcomes += [_fuzz(target, work, share, given.keep) for target in targets]
-    print(table(outcomes))
+    print(table({"": outcomes}))
     return int(any(o.result == FAILED for o in outcomes))
 
 
