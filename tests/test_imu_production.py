@@ -223,6 +223,7 @@ int main(void) {
 @pytest.fixture(scope="module")
 def program(delivered: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Linked by the make fragment."""
+    pytest.importorskip("elftools")
     folder = tmp_path_factory.mktemp("program")
     triaxcal.export(delivered, "make", folder / "imu")
     (folder / "main.c").write_text(USER)
