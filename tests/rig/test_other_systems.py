@@ -42,11 +42,17 @@ held = {}
 console = types.ModuleType("msvcrt")
 console.__spec__ = importlib.machinery.ModuleSpec("msvcrt", None)
 console.LK_NBLCK, console.kbhit, console.getwch = 2, lambda: False, lambda: ""
+def is_open(file, place):
+    # Closing gives the lock back; a new file may get the number of one that is gone.
+    try:
+        return os.fstat(file).st_ino == place
+    except OSError:
+        return False
 def locking(file, mode, count):
     assert (mode, count) == (2, 1)
     assert os.lseek(file, 0, os.SEEK_CUR) > 4096  # what others read is not locked
     place = os.fstat(file).st_ino
-    if place in held:
+    if held.get(place, file) != file and is_open(held[place], place):
         raise PermissionError(13, "Permission denied")
     held[place] = file
 console.locking = locking
