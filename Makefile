@@ -54,10 +54,10 @@ simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated un
 test: $(DEVELOPER)  ## Tests (under 3 minutes)
 	@$(PYTEST) -m "not slow and not long" --ignore tests/verify
 
-test-long: $(DEVELOPER)  ## The longer ones: whole sessions, series, cores, coverage (2 minutes)
+test-long: $(DEVELOPER)  ## The longer ones: whole sessions, series, cores, coverage (8 minutes)
 	@$(PYTEST) -m "long and not slow" --ignore tests/verify
 
-test-verify: $(DEVELOPER)  ## That every check of `make verify` passes, and can fail (2 minutes)
+test-verify: $(DEVELOPER)  ## That every check of `make verify` passes, and can fail (3 minutes)
 	@$(PYTEST) -m "not slow" tests/verify
 
 check: lint types test  ## What CI runs: lint, types, tests
@@ -89,7 +89,7 @@ bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
 	@$(BIN)/python bench/rig_stillness.py
 	@$(BIN)/python bench/rig_kill.py
 
-test-can: $(DEVELOPER)  ## The bench on real SocketCAN: this machine's vcan, or QEMU (2 minutes)
+test-can: $(DEVELOPER)  ## The bench on real SocketCAN: this machine's vcan, or QEMU (3 minutes)
 	@rig/test-can.sh
 
 rig-demo: $(DEVELOPER)  ## A whole session on the simulated rig, to a header (2 minutes)
