@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.rig.engine import Engine
@@ -17,11 +15,12 @@ from triaxcal.rig.lock import Lock
 from triaxcal.rig.manysetup import ManySetup
 from triaxcal.rig.member import Member
 from triaxcal.rig.rawlog import RawLog
-from triaxcal.rig.reasons import Reason
 from triaxcal.rig.recording import (
     FORMAT,
     JOURNAL_FILE,
     LOCK_FILE,
+    Troubles,
+    command_record,
     durable_events,
     event_record,
     frames_ns,
@@ -116,7 +115,7 @@ class ManyRecording:
             log = RawLog(self.folder / log_file(number), bus, known_log(seen))
             self.buses[bus] = BusLog(log, here)
         self.group = Group(setup.plan, members, follow)
-        self._trouble: dict[str, tuple[Reason, ...]] = {}
+        self._troubles = {member.name: Troubles() for member in self.group.members}
         if not records:
             self.journal.append(_header(setup))
             return
@@ -151,12 +150,11 @@ class ManyRecording:
             When the disk refuses.
         """
         told = [each for here in self.buses.values() for each in self._decide(here)]
-        said = {"name": type(command).__name__, **asdict(command), "t_ns": t_ns}
         for member in self.group.members:
             if member.aside:
                 continue
             self._log(member).flush(sync=True)
-            self._append(member, {"kind": "command", "command": said})
+            self._append(member, command_record(command, t_ns))
             told += self._acknowledge(member, member.engine.command(command, t_ns))
         return told
 
@@ -228,16 +226,13 @@ class ManyRecording:
 
     def _acknowledge(self, member: Member, events: list[Event]) -> list[tuple[Member, Event]]:
         for event in events:
-            trouble = event.reasons if event.kind == "trouble" else ()
-            repeated = trouble and trouble == self._trouble.get(member.name)
-            self._trouble[member.name] = trouble
-            if repeated:
+            if self._troubles[member.name].repeated(event):
                 continue
             self._log(member).flush(sync=True)
             self._append(member, {"kind": "event", "event": event_record(event)})
         return [(member, event) for event in events]
 
-    def _append(self, member: Member, record: dict[str, Any], hashed: bool = True) -> None:
+    def _append(self, member: Member, record: Record, hashed: bool = True) -> None:
         log = self._log(member)
         place = {"bus": member.place.bus, "log": log.state if hashed else log.place}
         self.journal.append({**record, "unit": member.name, **place})

@@ -1,6 +1,6 @@
 """A damaged journal made usable again, without losing what is good.
 
-Every record is checked by itself, so those behind the damage are known to be whole. What the lost
+Every record has a check of its own, so those behind the damage are known to be whole. What the lost
 ones held, the log gives again, unless a lost one was a word of the operator or a restart.
 """
 

@@ -75,7 +75,7 @@ class Recording:
         else:
             self.journal.append({**header(setup), "channel": channel})
         self.engine = Engine(setup, channel, history)
-        self._trouble: tuple[Reason, ...] = ()
+        self._troubles = Troubles()
         self._waiting: list[Frames] = []
 
     def feed(self, frames: Frames) -> list[Event]:
@@ -104,8 +104,7 @@ class Recording:
         """
         events = self._decide()
         self.log.flush(sync=True)
-        said = {"name": type(command).__name__, **asdict(command), "t_ns": t_ns}
-        self.journal.append({"kind": "command", "command": said, **self._place()})
+        self.journal.append({**command_record(command, t_ns), **self._place()})
         return [*events, *self._acknowledge(self.engine.command(command, t_ns))]
 
     def note(self, text: str, t_ns: int) -> None:
@@ -139,11 +138,8 @@ class Recording:
 
     def _acknowledge(self, events: list[Event]) -> list[Event]:
         for event in events:
-            trouble = event.reasons if event.kind == "trouble" else ()
-            repeated = trouble and trouble == self._trouble
-            self._trouble = trouble
-            if repeated:
-                continue  # the same trouble every second would bury the rest
+            if self._troubles.repeated(event):
+                continue
             # A journal that knows more of the log than the disk has would be no witness.
             self.log.flush(sync=True)
             self.journal.append({"kind": "event", "event": event_record(event), **self._place()})
@@ -151,6 +147,25 @@ class Recording:
 
     def _place(self) -> dict[str, Any]:
         return {"log": self.log.state}
+
+
+class Troubles:
+    """Of one unit: the same trouble every second would bury the rest of a journal."""
+
+    def __init__(self) -> None:
+        self._last: tuple[Reason, ...] = ()
+
+    def repeated(self, event: Event) -> bool:
+        """Whether an event is the trouble of the one before it."""
+        trouble = event.reasons if event.kind == "trouble" else ()
+        before, self._last = self._last, trouble
+        return bool(trouble) and trouble == before
+
+
+def command_record(command: Command, t_ns: int) -> Record:
+    """Record of a word of the operator, without its place."""
+    said = {"name": type(command).__name__, **asdict(command), "t_ns": t_ns}
+    return {"kind": "command", "command": said}
 
 
 def frames_ns(parts: list[Frames]) -> int:

@@ -150,10 +150,7 @@ def _axioms(work: Workspace, program: str, certificate: Certificate) -> frozense
 def _judged(work: Workspace, accepted: Sequence[Certificate], axioms: Sequence[str]) -> Outcome:
     per_axis = [max(c.bound_lsb for c in accepted if c.axis == axis) for axis in range(3)]
     exact = work.bound.lsb
-    good = all(
-        found >= least * (1 - gappa.ROUNDED_UP)
-        for found, least in zip(per_axis, work.bound.per_axis_lsb, strict=True)
-    )
+    good = gappa.not_below(per_axis, work.bound.per_axis_lsb)
     finding = f"{max(per_axis):.3f} LSB, {len(accepted)} theorems accepted; exact {exact:.3f} LSB"
     if not good:
         finding = f"{max(per_axis):.3f} LSB lies below the exact {exact:.3f}: one is wrong"

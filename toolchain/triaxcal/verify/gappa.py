@@ -65,7 +65,7 @@ def check(work: Workspace) -> Outcome:
     if image.quadratic:
         per_axis = [b + e for b, e in zip(per_axis, _quadratic(work, image, per_axis), strict=True)]
     exact = work.bound.per_axis_lsb
-    good = all(found >= e * (1 - ROUNDED_UP) for found, e in zip(per_axis, exact, strict=True))
+    good = not_below(per_axis, exact)
     ratio = max(per_axis) / work.bound.lsb
     finding = (
         f"{max(per_axis):.3f} LSB, {abs(100 * (ratio - 1)):.1f} % above the exact "
@@ -82,6 +82,13 @@ def check(work: Workspace) -> Outcome:
         "ratio_to_exact": ratio,
     }
     return judged(_KEY, _TITLE, good=good, finding=finding, figures=figures)
+
+
+def not_below(found_lsb: Sequence[float], exact_lsb: Sequence[float]) -> bool:
+    """Whether bounds of the axes leave room for the exact ones; if not, one is wrong."""
+    return all(
+        found >= exact * (1 - ROUNDED_UP) for found, exact in zip(found_lsb, exact_lsb, strict=True)
+    )
 
 
 def _bound(work: Workspace, image: Image, axis: int, s: int) -> float:
