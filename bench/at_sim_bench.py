@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.rigfile import read_description
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.session.engine import Setup
 from triaxcal.unit.description import read_unit
 
 REPO = Path(__file__).resolve().parents[1]

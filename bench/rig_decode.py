@@ -16,15 +16,15 @@ from pathlib import Path
 import can
 from at_sim_bench import setup_at
 
-from triaxcal.rig.busfile import read_bus_file
-from triaxcal.rig.candump import format_frames, parse
-from triaxcal.rig.dbc import default_dbc
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.replay import replay
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.samples import SampleDecoder
-from triaxcal.rig.shippedrigs import find_description
-from triaxcal.rig.simulator import RigSettings, SimulatedRig
+from triaxcal.rig.description.busfile import read_bus_file
+from triaxcal.rig.description.dbc import default_dbc
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.description.shippedrigs import find_description
+from triaxcal.rig.logs.candump import format_frames, parse
+from triaxcal.rig.records.replay import replay
+from triaxcal.rig.samples.samples import SampleDecoder
+from triaxcal.rig.session.engine import Setup
+from triaxcal.rig.simulated.simulator import RigSettings, SimulatedRig
 from triaxcal.simulation.truth import read_truth
 
 FRAMES = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000

@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "rig"))
 from kill_campaign import raw_frames_killed
 from rig_cases import BENCH, play, rig_of, short_setup
 
-from triaxcal.rig.candump import format_frames
-from triaxcal.rig.recording import LOG_FILE, Recording
+from triaxcal.rig.logs.candump import format_frames
+from triaxcal.rig.records.recording import LOG_FILE, Recording
 
 KILLS = int(sys.argv[1]) if len(sys.argv) > 1 else 100
 LOG_BYTES = 1 << 30

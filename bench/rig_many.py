@@ -20,11 +20,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "rig"))
 
 from many_cases import bench_of, setup_of
 
-from triaxcal.rig.canbus import frames_of, messages_of
-from triaxcal.rig.frames import Frames
-from triaxcal.rig.manyrecording import ManyRecording
-from triaxcal.rig.manyscreen import many_screen
-from triaxcal.rig.simbench import SimulatedBench
+from triaxcal.rig.bus.frames import Frames
+from triaxcal.rig.bus.messages import frames_of, messages_of
+from triaxcal.rig.many.recording import ManyRecording
+from triaxcal.rig.many.screen import many_screen
+from triaxcal.rig.many.simbench import SimulatedBench
 
 _BATCHES = 40
 """A second: the receiver looks every 25 ms or so."""

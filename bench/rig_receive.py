@@ -17,12 +17,12 @@ from pathlib import Path
 from at_sim_bench import setup_at
 from can.interfaces.socketcan.socketcan import capture_message
 
-from triaxcal.rig.busfile import read_bus_file
-from triaxcal.rig.dbc import default_dbc
-from triaxcal.rig.recording import Recording
-from triaxcal.rig.simulator import RigSettings, SimulatedRig
-from triaxcal.rig.socketcan import SocketSource, packed
-from triaxcal.rig.source import PACE_S
+from triaxcal.rig.description.busfile import read_bus_file
+from triaxcal.rig.description.dbc import default_dbc
+from triaxcal.rig.records.recording import Recording
+from triaxcal.rig.simulated.simulator import RigSettings, SimulatedRig
+from triaxcal.rig.sources.socketcan import SocketSource, packed
+from triaxcal.rig.sources.source import PACE_S
 from triaxcal.simulation.truth import read_truth
 
 SECONDS = int(sys.argv[1]) if len(sys.argv) > 1 else 8

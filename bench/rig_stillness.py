@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "rig"))
 
 from still_cases import SETTINGS, creep, reference, seconds, slip, verdict
 
-from triaxcal.rig.equilibrium import trend, window_s
-from triaxcal.rig.plan import Thermal
+from triaxcal.rig.plan.plan import Thermal
+from triaxcal.rig.session.equilibrium import trend, window_s
 
 DWELLS = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
 

@@ -29,7 +29,7 @@ from triaxcal.design.words import comparison, rig_plan
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.positions import TEST_POSITIONS
-from triaxcal.rig.plan import read_plan
+from triaxcal.rig.plan.plan import read_plan
 from triaxcal.simulation.dwells import simulate
 from triaxcal.simulation.truth import Imperfections, Plan, read_truth
 from triaxcal.uncertainty.orientation import DIRECTIONS

@@ -24,7 +24,7 @@ from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.reference import reference_markdown
 from triaxcal.keytable.schema import json_schema
 from triaxcal.keytable.starter import starter_text, write_starter
-from triaxcal.rig.plan import read_plan
+from triaxcal.rig.plan.plan import read_plan
 from triaxcal.simulation.truth import read_truth
 from triaxcal.simulation.unit import write_simulated_unit
 from triaxcal.uncertainty.rig_sources import (

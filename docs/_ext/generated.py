@@ -24,10 +24,10 @@ from triaxcal.keytable.reference import reference_markdown
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
 from triaxcal.readings.format import FORMATS, Format
-from triaxcal.rig.instrument import DRIVERS
-from triaxcal.rig.logfile import LOG_FORMATS
-from triaxcal.rig.protection import PROTECTIONS
-from triaxcal.rig.source import SOURCES
+from triaxcal.rig.description.protection import PROTECTIONS
+from triaxcal.rig.hands.instrument import DRIVERS
+from triaxcal.rig.logs.logfile import LOG_FORMATS
+from triaxcal.rig.sources.source import SOURCES
 
 DOCS = Path(__file__).parent.parent
 _REGION = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -16,7 +16,7 @@ import can
 
 from device.node import _FRAME, REQUEST, RESPONSE, Node, frame
 from triaxcal.device.link import Link
-from triaxcal.rig.openbus import open_bus
+from triaxcal.rig.bus.openbus import open_bus
 
 CHANNELS = itertools.count()
 Fault = Callable[[int, bytes], list[bytes]]

@@ -31,7 +31,7 @@ from triaxcal.device.compare import compare, take_samples
 from triaxcal.device.layout import FILE, RAM_PAGE
 from triaxcal.device.link import Link
 from triaxcal.device.unit import flash, identify, require_in_use
-from triaxcal.rig.openbus import open_bus
+from triaxcal.rig.bus.openbus import open_bus
 
 FLASH_BYTES = 4096
 LATE_S = 0.03

@@ -19,10 +19,10 @@ from triaxcal.codegen.identity import with_identity
 from triaxcal.codegen.image import image_bytes
 from triaxcal.delivery.unit import Delivery, deliver
 from triaxcal.device import link  # noqa: F401  what is missing is noticed here, not in the guest
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.fil import BATCH, vectors
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.rigfile import read_description
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.node.fil import BATCH, vectors
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.session.engine import Setup
 from triaxcal.unit.description import read_unit
 
 SAMPLES = 5000

@@ -22,7 +22,7 @@ from device.bridge import Bridge, both, running
 from device.node import POWER_FAILED, Node
 from realcan.conftest import WORK, ip
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.openbus import open_bus
+from triaxcal.rig.bus.openbus import open_bus
 
 pytestmark = pytest.mark.skipif(not WORK, reason="`make test-can` runs these on real SocketCAN")
 

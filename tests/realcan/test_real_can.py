@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 from realcan.conftest import WORK, ip
-from triaxcal.rig import socketcan
-from triaxcal.rig.dbc import default_dbc, read_dbc
-from triaxcal.rig.fil import exchange
-from triaxcal.rig.frames import Frames, concatenate
-from triaxcal.rig.plan import LAYOUTS
-from triaxcal.rig.port import SocketPort
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.shippedrigs import find_description
-from triaxcal.rig.simframes import FrameMaker
-from triaxcal.rig.source import Wanted, kind_of
+from triaxcal.rig.bus.frames import Frames, concatenate
+from triaxcal.rig.description.dbc import default_dbc, read_dbc
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.description.shippedrigs import find_description
+from triaxcal.rig.node.fil import exchange
+from triaxcal.rig.plan.plan import LAYOUTS
+from triaxcal.rig.simulated.simframes import FrameMaker
+from triaxcal.rig.sources import socketcan
+from triaxcal.rig.sources.port import SocketPort
+from triaxcal.rig.sources.source import Wanted, kind_of
 
 pytestmark = pytest.mark.skipif(not WORK, reason="`make test-can` runs these on real SocketCAN")
 LIMIT_S = 60.0

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from rig_cases import FAST, SHORT_PLAN
 
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.simorders import read_fault
-from triaxcal.rig.simulator import RigSettings, SimulatedRig
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.session.engine import Setup
+from triaxcal.rig.simulated.simorders import read_fault
+from triaxcal.rig.simulated.simulator import RigSettings, SimulatedRig
 from triaxcal.simulation.truth import read_truth
 from triaxcal.unit.description import read_unit
 

@@ -14,7 +14,7 @@ from many_cases import Run, bench_of, setup_of
 from rich.console import Console
 from rich.screen import Screen
 
-from triaxcal.rig.manyscreen import Recent, many_screen
+from triaxcal.rig.many.screen import Recent, many_screen
 
 MOMENTS = {"reference": 31, "average": 90, "slip": 96, "dead": 232, "warming": 460}
 ORDERS = ("AT-2/linkdown@150:1:99999", "AT-3/slip@84:150")

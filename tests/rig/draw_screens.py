@@ -14,11 +14,11 @@ from rich.console import Console, RenderableType
 from rich.screen import Screen
 from rig_cases import rig_of, short_setup
 
-from triaxcal.rig.engine import Engine
-from triaxcal.rig.events import View
-from triaxcal.rig.runner import Robot
-from triaxcal.rig.screen import About, BusView, Faults, faults_page, help_page, screen
-from triaxcal.rig.view import view
+from triaxcal.rig.live.runner import Robot
+from triaxcal.rig.screen.screen import About, BusView, Faults, faults_page, help_page, screen
+from triaxcal.rig.screen.view import view
+from triaxcal.rig.session.engine import Engine
+from triaxcal.rig.session.events import View
 
 BUS = BusView("can0", 211.0, 0.026, 0)
 ABOUT = About("AT-SIM-BENCH", "AT-SIM-BENCH-001", "003", "16:42")

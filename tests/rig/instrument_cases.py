@@ -10,8 +10,8 @@ from pathlib import Path
 
 from rig_cases import BENCH, SHORT_PLAN, bench_unit, description
 
-from triaxcal.rig.engine import Engine, Setup
-from triaxcal.rig.plan import SessionPlan, read_plan
+from triaxcal.rig.plan.plan import SessionPlan, read_plan
+from triaxcal.rig.session.engine import Engine, Setup
 
 SIMULATED = f"{Path(__file__).parent / 'instruments.yaml'}@sim"
 

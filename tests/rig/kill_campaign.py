@@ -19,14 +19,14 @@ import numpy as np
 from rig_cases import BENCH, rig_of, short_setup
 
 from triaxcal.cli.rig_live import guide
-from triaxcal.rig.canbus import SimulatedSource
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.frames import concatenate
-from triaxcal.rig.journal import read_journal
-from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, Recording, durable_events
-from triaxcal.rig.replay import replay
-from triaxcal.rig.runner import live
-from triaxcal.rig.socketcan import SocketSource, packed
+from triaxcal.rig.bus.frames import concatenate
+from triaxcal.rig.live.runner import live
+from triaxcal.rig.records.journal import read_journal
+from triaxcal.rig.records.recording import JOURNAL_FILE, LOG_FILE, Recording, durable_events
+from triaxcal.rig.records.replay import replay
+from triaxcal.rig.session.engine import Setup
+from triaxcal.rig.sources.canbus import SimulatedSource
+from triaxcal.rig.sources.socketcan import SocketSource, packed
 from triaxcal.simulation.tilts import truth_force_g
 from triaxcal.simulation.truth import read_truth
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 from rig_cases import BENCH, FAST, SHORT_PLAN
 
-from triaxcal.rig.canbus import VirtualSource
-from triaxcal.rig.gather import Gathered
-from triaxcal.rig.manyhands import ManyAttendant
-from triaxcal.rig.manyrecording import ManyRecording
-from triaxcal.rig.manyrunner import ManyRobot, live_many
-from triaxcal.rig.manysetup import ManySetup, many_of_plan
-from triaxcal.rig.simbench import SimulatedBench, simulated_bench
-from triaxcal.rig.simhands import simulated_attendant
-from triaxcal.rig.simulator import RigSettings
+from triaxcal.rig.live.simhands import simulated_attendant
+from triaxcal.rig.many.hands import ManyAttendant
+from triaxcal.rig.many.recording import ManyRecording
+from triaxcal.rig.many.runner import ManyRobot, live_many
+from triaxcal.rig.many.setup import ManySetup, many_of_plan
+from triaxcal.rig.many.simbench import SimulatedBench, simulated_bench
+from triaxcal.rig.simulated.simulator import RigSettings
+from triaxcal.rig.sources.canbus import VirtualSource
+from triaxcal.rig.sources.gather import Gathered
 from triaxcal.simulation.tilts import truth_force_g
 from triaxcal.simulation.truth import read_truth
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from triaxcal.rig.dbc import default_dbc, read_dbc
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.runner import Robot
-from triaxcal.rig.simorders import read_fault
-from triaxcal.rig.simulator import RigSettings, SimulatedRig
+from triaxcal.rig.description.dbc import default_dbc, read_dbc
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.live.runner import Robot
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.session.engine import Setup
+from triaxcal.rig.simulated.simorders import read_fault
+from triaxcal.rig.simulated.simulator import RigSettings, SimulatedRig
 from triaxcal.simulation.truth import read_truth
 from triaxcal.unit.description import read_unit
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.rig.blocks import Block, Trouble
-from triaxcal.rig.plan import Stillness
-from triaxcal.rig.stillness import make_reference, motion, refusals
+from triaxcal.rig.plan.plan import Stillness
+from triaxcal.rig.session.blocks import Block, Trouble
+from triaxcal.rig.session.stillness import make_reference, motion, refusals
 
 SETTINGS = Stillness()
 RATE = 100

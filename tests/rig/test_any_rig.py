@@ -10,14 +10,21 @@ from any_rig_cases import KINDS, any_rig, any_setup
 from rig_cases import play
 
 from recordings import recording
-from triaxcal.rig.blocks import BlockBuilder
-from triaxcal.rig.busfile import read_bus_file
-from triaxcal.rig.check import findings
-from triaxcal.rig.engine import Engine
-from triaxcal.rig.frames import ID_MASK, Frames, concatenate
-from triaxcal.rig.logfile import read_frames
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.samples import BAD_CRC, DUPLICATE, INVALID, LOST_FRAME, ORPHAN, SampleDecoder
+from triaxcal.rig.bus.frames import ID_MASK, Frames, concatenate
+from triaxcal.rig.check.check import findings
+from triaxcal.rig.description.busfile import read_bus_file
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.logs.logfile import read_frames
+from triaxcal.rig.samples.samples import (
+    BAD_CRC,
+    DUPLICATE,
+    INVALID,
+    LOST_FRAME,
+    ORPHAN,
+    SampleDecoder,
+)
+from triaxcal.rig.session.blocks import BlockBuilder
+from triaxcal.rig.session.engine import Engine
 
 NAMES = sorted(KINDS)
 

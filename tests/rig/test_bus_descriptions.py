@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.busfile import read_bus_file
-from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG
-from triaxcal.rig.simpack import Packer
+from triaxcal.rig.bus.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG
+from triaxcal.rig.description.busfile import read_bus_file
+from triaxcal.rig.simulated.simpack import Packer
 
 FRAMES = 60
 ONE = ' SG_ A : 0|8@1+ (1,0) [0|0] "" E\n'

@@ -15,8 +15,8 @@ from can.typechecking import BitTimingDict, BitTimingFdDict
 from rig_cases import REPO
 
 from triaxcal.base.errors import RefusedError, UsageError
-from triaxcal.rig.openbus import bus_name, open_bus
-from triaxcal.rig.source import kind_of
+from triaxcal.rig.bus.openbus import bus_name, open_bus
+from triaxcal.rig.sources.source import kind_of
 
 PAGE = (REPO / "docs/reference/can.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^\| `([a-z_]+:[^`]+)` \| [^|]*\|", PAGE, re.MULTILINE)

@@ -8,9 +8,9 @@ import subprocess
 import numpy as np
 import pytest
 
-from triaxcal.rig.busload import BitRates, bits_of, rates_of_device, rates_of_options
-from triaxcal.rig.frames import BRS, EFF_FLAG, RTR_FLAG, Frames
-from triaxcal.rig.openbus import settings_of
+from triaxcal.rig.bus.busload import BitRates, bits_of, rates_of_device, rates_of_options
+from triaxcal.rig.bus.frames import BRS, EFF_FLAG, RTR_FLAG, Frames
+from triaxcal.rig.bus.openbus import settings_of
 
 
 def frame(can_id, length, fd=False, marks=0):

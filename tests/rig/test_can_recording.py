@@ -12,8 +12,8 @@ from test_logs import logged
 from recordings import recording
 from triaxcal.base.errors import RefusedError
 from triaxcal.readings.opened import RecordingFile
-from triaxcal.rig.canbus import frames_of
-from triaxcal.rig.candump import format_frames
+from triaxcal.rig.bus.messages import frames_of
+from triaxcal.rig.logs.candump import format_frames
 from triaxcal.unit.description import read_unit
 from triaxcal.unit.recordingfile import FileLayout
 

@@ -7,8 +7,8 @@ import pytest
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.readings.samples import read_samples
-from triaxcal.rig.canbus import frames_of
-from triaxcal.rig.candump import format_frames
+from triaxcal.rig.bus.messages import frames_of
+from triaxcal.rig.logs.candump import format_frames
 from triaxcal.unit.description import read_unit
 
 DBC = """VERSION ""

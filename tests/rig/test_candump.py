@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from rig_cases import rig_of, short_setup
 
-from triaxcal.rig.canbus import frames_of, messages_of
-from triaxcal.rig.candump import format_frames, parse, read_log
-from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG, Frames, concatenate, widened
+from triaxcal.rig.bus.frames import EFF_FLAG, ERR_FLAG, RTR_FLAG, Frames, concatenate, widened
+from triaxcal.rig.bus.messages import frames_of, messages_of
+from triaxcal.rig.logs.candump import format_frames, parse, read_log
 
 
 def mixed(seed=1, count=400):
@@ -132,5 +132,5 @@ def test_a_log_is_read_alike_in_any_chunks(tmp_path, monkeypatch):
     path = tmp_path / "x.log"
     path.write_bytes(format_frames(frames, "vcan0"))
     for size in (10, 97, 4096):
-        monkeypatch.setattr("triaxcal.rig.candump._CHUNK_BYTES", size)
+        monkeypatch.setattr("triaxcal.rig.logs.candump._CHUNK_BYTES", size)
         same(concatenate([p.frames for p in read_log(path)]), frames)

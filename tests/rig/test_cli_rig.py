@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from rig_cases import BENCH, REPO, rig_of, short_setup
 
-from triaxcal.rig.candump import format_frames, read_log
-from triaxcal.rig.journal import read_journal
-from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, durable_events
-from triaxcal.rig.replay import replay
-from triaxcal.rig.simulator import EPOCH_NS
+from triaxcal.rig.logs.candump import format_frames, read_log
+from triaxcal.rig.records.journal import read_journal
+from triaxcal.rig.records.recording import JOURNAL_FILE, LOG_FILE, durable_events
+from triaxcal.rig.records.replay import replay
+from triaxcal.rig.simulated.simulator import EPOCH_NS
 
 
 def triaxcal(*arguments, cwd=REPO):

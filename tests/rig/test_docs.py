@@ -6,10 +6,10 @@ from click import Group
 from rig_cases import REPO
 
 from triaxcal.cli.rig import rig
-from triaxcal.rig.dbc import REQUIRED
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.simorders import KINDS
+from triaxcal.rig.description.dbc import REQUIRED
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.simulated.simorders import KINDS
 from triaxcal.unit.description import read_unit
 
 PAGE = (REPO / "docs/how-to/bench.md").read_text(encoding="utf-8")

@@ -16,9 +16,9 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.cli.init import init
 from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.reference import reference_markdown
-from triaxcal.rig.check import Finding
-from triaxcal.rig.instrument import DRIVERS, Driver, Order, numbers_in
-from triaxcal.rig.instrumentcheck import instrument_findings
+from triaxcal.rig.check.check import Finding
+from triaxcal.rig.check.instrumentcheck import instrument_findings
+from triaxcal.rig.hands.instrument import DRIVERS, Driver, Order, numbers_in
 
 OWN = "import sys, pathlib; p = pathlib.Path(sys.argv[1]); "
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from triaxcal.rig.equilibrium import Trend, time_left_s, trend, window_s
-from triaxcal.rig.plan import Thermal
+from triaxcal.rig.plan.plan import Thermal
+from triaxcal.rig.session.equilibrium import Trend, time_left_s, trend, window_s
 
 T = np.arange(300.0)
 

@@ -13,11 +13,11 @@ from rig_cases import rig_of, short_setup
 from test_candump import mixed, same
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.canbus import frames_of
-from triaxcal.rig.candump import format_frames
-from triaxcal.rig.dbc import default_dbc
-from triaxcal.rig.export import WRITERS, export_log
-from triaxcal.rig.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, Frames, widened
+from triaxcal.rig.bus.frames import EFF_FLAG, ERR_FLAG, ID_MASK, RTR_FLAG, Frames, widened
+from triaxcal.rig.bus.messages import frames_of
+from triaxcal.rig.description.dbc import default_dbc
+from triaxcal.rig.logs.candump import format_frames
+from triaxcal.rig.logs.export import WRITERS, export_log
 
 WITHOUT = "not installed: .venv/bin/pip install -c constraints.txt -e '.[export]'"
 """Not among the developers' tools: python-can imports asammdf, and that pandas, at every start."""
@@ -122,7 +122,7 @@ def test_parquet_is_the_frames_column_by_column(tmp_path):
 def test_chunks_make_one_file(tmp_path, suffix, monkeypatch):
     _installed_for(suffix)
     whole = exported(_made(tmp_path / "a"), mixed(24), suffix)
-    monkeypatch.setattr("triaxcal.rig.candump._CHUNK_BYTES", 4096)
+    monkeypatch.setattr("triaxcal.rig.logs.candump._CHUNK_BYTES", 4096)
     parts = exported(_made(tmp_path / "b"), mixed(24), suffix)
     if suffix == ".mf4":
         same(by_python_can(parts), by_python_can(whole))

@@ -19,13 +19,13 @@ from triaxcal.cli.main import main
 from triaxcal.cli.rig_fil import build_node, firmware_in_the_loop, node_on
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.delivery.unit import Delivery, deliver
-from triaxcal.rig import fil
-from triaxcal.rig.busport import BusPort
-from triaxcal.rig.fil import vectors
-from triaxcal.rig.frames import Frames, concatenate, empty
-from triaxcal.rig.identity import serial_crc
-from triaxcal.rig.listen import Pairing, listen
-from triaxcal.rig.port import SocketPort
+from triaxcal.rig.bus.frames import Frames, concatenate, empty
+from triaxcal.rig.description.identity import serial_crc
+from triaxcal.rig.node import fil
+from triaxcal.rig.node.fil import vectors
+from triaxcal.rig.node.listen import Pairing, listen
+from triaxcal.rig.sources.busport import BusPort
+from triaxcal.rig.sources.port import SocketPort
 
 CHANNELS = itertools.count()
 ROWS, RATE = 300, "2000"
@@ -259,7 +259,7 @@ def test_another_unit_is_refused() -> None:
 
 
 def test_a_node_that_sends_no_results(monkeypatch: pytest.MonkeyPatch) -> None:
-    from triaxcal.rig import listen as module
+    from triaxcal.rig.node import listen as module
 
     monkeypatch.setattr(module, "ANSWER_S", 0.05)
     text = refused(one("RIG_TEMP", TempCode=1), *sample(1, 1, 2, 3))

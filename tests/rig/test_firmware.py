@@ -14,11 +14,11 @@ from triaxcal.cli.rig_fil import build_node, firmware_in_the_loop, node_on
 from triaxcal.codegen.compiler import compile_library
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.delivery.unit import deliver
-from triaxcal.rig.dbc import REQUIRED
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.fil import exchange, packing_source, vectors
-from triaxcal.rig.port import SocketPort
-from triaxcal.rig.protection import PROTECTIONS
+from triaxcal.rig.description.dbc import REQUIRED
+from triaxcal.rig.description.protection import PROTECTIONS
+from triaxcal.rig.node.fil import exchange, packing_source, vectors
+from triaxcal.rig.session.engine import Setup
+from triaxcal.rig.sources.port import SocketPort
 from triaxcal.unit.description import read_unit
 
 FIRMWARE = REPO / "rig" / "firmware"

@@ -11,12 +11,12 @@ from rig_cases import dbc
 
 from recordings import recording
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.busfile import read_bus_file
-from triaxcal.rig.candump import read_log
-from triaxcal.rig.crc import CRC8_2F, CRC32_P4
-from triaxcal.rig.dbc import REQUIRED, default_dbc, read_dbc
-from triaxcal.rig.frames import Frames
-from triaxcal.rig.signals import Signal
+from triaxcal.rig.bus.frames import Frames
+from triaxcal.rig.description.busfile import read_bus_file
+from triaxcal.rig.description.crc import CRC8_2F, CRC32_P4
+from triaxcal.rig.description.dbc import REQUIRED, default_dbc, read_dbc
+from triaxcal.rig.description.signals import Signal
+from triaxcal.rig.logs.candump import read_log
 
 DATABASE = read_bus_file(default_dbc()).database
 

@@ -9,11 +9,11 @@ from scipy.stats import chi2
 
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.readings.measurements import read_measurements
-from triaxcal.rig.engine import Engine, Setup
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.simorders import read_fault
-from triaxcal.rig.simulator import RigSettings, SimulatedRig
-from triaxcal.rig.store import write_records
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.records.store import write_records
+from triaxcal.rig.session.engine import Engine, Setup
+from triaxcal.rig.simulated.simorders import read_fault
+from triaxcal.rig.simulated.simulator import RigSettings, SimulatedRig
 from triaxcal.simulation.truth import read_truth
 
 # The slip falls into the first average; one that comes while the unit waits cannot be seen.

@@ -9,9 +9,9 @@ import can
 import pytest
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.canbus import BusSource
-from triaxcal.rig.frames import empty
-from triaxcal.rig.gather import Gathered
+from triaxcal.rig.bus.frames import empty
+from triaxcal.rig.sources.canbus import BusSource
+from triaxcal.rig.sources.gather import Gathered
 
 
 def bus(name):

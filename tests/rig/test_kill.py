@@ -14,9 +14,9 @@ from kill_campaign import accepted_lines, raw_frames_killed
 from rig_cases import short_setup
 from test_cli_rig import bench_copy, triaxcal
 
-from triaxcal.rig.journal import read_journal
-from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, durable_events
-from triaxcal.rig.replay import replay
+from triaxcal.rig.records.journal import read_journal
+from triaxcal.rig.records.recording import JOURNAL_FILE, LOG_FILE, durable_events
+from triaxcal.rig.records.replay import replay
 
 HERE = Path(__file__).parent
 

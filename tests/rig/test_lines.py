@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from instrument_cases import SIMULATED
 
 from triaxcal.base.errors import RefusedError, UsageError
-from triaxcal.rig.frames import concatenate
-from triaxcal.rig.linelog import log_text, parsed
-from triaxcal.rig.lines import LineFormat, frames_of_lines
-from triaxcal.rig.source import Wanted, kind_of
+from triaxcal.rig.bus.frames import concatenate
+from triaxcal.rig.description.lines import LineFormat, frames_of_lines
+from triaxcal.rig.logs.linelog import log_text, parsed
+from triaxcal.rig.sources.source import Wanted, kind_of
 
 XYZT = LineFormat(columns=("x", "y", "z", "temperature"))
 NS = 1_700_000_000_123_456_000
@@ -205,7 +205,7 @@ class Plug:
 
 
 def test_a_port_that_goes_away_and_comes_back():
-    from triaxcal.rig.linesource import LineSource
+    from triaxcal.rig.sources.linesource import LineSource
 
     plug = Plug()
     source = LineSource("tty0", XYZT, plug.connect)

@@ -14,14 +14,14 @@ from rig_cases import BENCH, SHORT_PLAN, bench_unit, play, rig_of, short_setup
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.rig import rig as rig_command
-from triaxcal.rig.check import findings
-from triaxcal.rig.engine import Engine, Setup
-from triaxcal.rig.linelog import frames_of_log
-from triaxcal.rig.lines import frames_of_lines
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.recording import JOURNAL_FILE, LOG_FILE, Recording
-from triaxcal.rig.replay import replay
-from triaxcal.rig.rigfile import read_description
+from triaxcal.rig.check.check import findings
+from triaxcal.rig.description.lines import frames_of_lines
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.logs.linelog import frames_of_log
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.records.recording import JOURNAL_FILE, LOG_FILE, Recording
+from triaxcal.rig.records.replay import replay
+from triaxcal.rig.session.engine import Engine, Setup
 
 VOLTS = """
 format = 1

@@ -23,14 +23,15 @@ from test_cli_rig import bench_copy, triaxcal
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.rig import rig
-from triaxcal.rig.canbus import BusSource, messages_of
-from triaxcal.rig.candump import parse
-from triaxcal.rig.check import findings
-from triaxcal.rig.frames import empty
-from triaxcal.rig.journal import read_journal
-from triaxcal.rig.openbus import open_bus
-from triaxcal.rig.recording import JOURNAL_FILE, Recording
-from triaxcal.rig.runner import live
+from triaxcal.rig.bus.frames import empty
+from triaxcal.rig.bus.messages import messages_of
+from triaxcal.rig.bus.openbus import open_bus
+from triaxcal.rig.check.check import findings
+from triaxcal.rig.live.runner import live
+from triaxcal.rig.logs.candump import parse
+from triaxcal.rig.records.journal import read_journal
+from triaxcal.rig.records.recording import JOURNAL_FILE, Recording
+from triaxcal.rig.sources.canbus import BusSource
 
 ENTRY = "from triaxcal.cli.entry import entry; entry()"
 CHANNELS = count(1)
@@ -221,7 +222,7 @@ def under_other_ids(frames):
 
 
 def test_frames_of_another_dbc_are_told_in_a_session(tmp_path, monkeypatch):
-    monkeypatch.setattr("triaxcal.rig.runner._NOT_DECODED_S", 0.0)
+    monkeypatch.setattr("triaxcal.rig.live.runner._NOT_DECODED_S", 0.0)
     setup = short_setup(tmp_path)
     taken = Recording(setup, tmp_path / "001", "given")
     source = Given(under_other_ids(rig_of(setup).advance()))

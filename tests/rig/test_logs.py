@@ -20,10 +20,7 @@ from test_export import installed
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.rig import rig as command
-from triaxcal.rig.canbus import messages_of
-from triaxcal.rig.candump import format_frames, parse
-from triaxcal.rig.export import export_log
-from triaxcal.rig.frames import (
+from triaxcal.rig.bus.frames import (
     BRS,
     DLC_SHIFT,
     EFF_FLAG,
@@ -34,9 +31,12 @@ from triaxcal.rig.frames import (
     Frames,
     concatenate,
 )
-from triaxcal.rig.logfile import LOG_FORMATS, Left, LogFormat, read_frames
-from triaxcal.rig.rawlog import RawLog
-from triaxcal.rig.socketcan import frames_of_rows, packed
+from triaxcal.rig.bus.messages import messages_of
+from triaxcal.rig.logs.candump import format_frames, parse
+from triaxcal.rig.logs.export import export_log
+from triaxcal.rig.logs.logfile import LOG_FORMATS, Left, LogFormat, read_frames
+from triaxcal.rig.records.rawlog import RawLog
+from triaxcal.rig.sources.socketcan import frames_of_rows, packed
 
 T0_NS = 1_700_000_000_000_000_000
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.logfile import Left, read_frames
-from triaxcal.rig.replay import chunks
+from triaxcal.rig.logs.logfile import Left, read_frames
+from triaxcal.rig.records.replay import chunks
 
 
 def shown(times, path):

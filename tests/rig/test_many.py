@@ -13,16 +13,16 @@ from test_cli_rig import triaxcal
 
 from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.cli.main import main
-from triaxcal.rig.frames import ERR_FLAG, Frames, alike, concatenate
-from triaxcal.rig.journal import read_journal
-from triaxcal.rig.manyreplay import replay_bus
-from triaxcal.rig.manyscreen import group_line, many_screen
-from triaxcal.rig.manysetup import many_of_plan, one_of_plan
-from triaxcal.rig.phases import Turning
-from triaxcal.rig.recording import JOURNAL_FILE
-from triaxcal.rig.replay import replay
-from triaxcal.rig.split import Splitter
-from triaxcal.rig.store import write_records
+from triaxcal.rig.bus.frames import ERR_FLAG, Frames, alike, concatenate
+from triaxcal.rig.many.replay import replay_bus
+from triaxcal.rig.many.screen import group_line, many_screen
+from triaxcal.rig.many.setup import many_of_plan, one_of_plan
+from triaxcal.rig.records.journal import read_journal
+from triaxcal.rig.records.recording import JOURNAL_FILE
+from triaxcal.rig.records.replay import replay
+from triaxcal.rig.records.store import write_records
+from triaxcal.rig.samples.split import Splitter
+from triaxcal.rig.session.phases import Turning
 
 J1939_UNIT = """
 format = 1

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from many_cases import Run, bench_of, refuse_false_records, setup_of
 
-from triaxcal.rig.manyreplay import replay_bus
-from triaxcal.rig.store import write_records
+from triaxcal.rig.many.replay import replay_bus
+from triaxcal.rig.records.store import write_records
 
 TEMPS = "[-40, -10, 20, 45, 70]"
 SHARED = ("halt@150:1:20", "deaf@40:1:15", "runaway@330:3:60")

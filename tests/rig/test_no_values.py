@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.frames import Frames
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.samples import CONFLICT, INVALID, LOST_FRAME, SampleDecoder
+from triaxcal.rig.bus.frames import Frames
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.samples.samples import CONFLICT, INVALID, LOST_FRAME, SampleDecoder
 
 DBC = """VERSION ""
 NS_ :

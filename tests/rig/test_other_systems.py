@@ -135,7 +135,7 @@ def test_two_sessions_on_windows(tmp_path):
         + """
 from pathlib import Path
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.lock import Lock
+from triaxcal.rig.records.lock import Lock
 path = Path(os.environ["LOCK"])
 first = Lock(path, "a session")
 try:

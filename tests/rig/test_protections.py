@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from triaxcal.rig import crc
-from triaxcal.rig.protection import PROTECTIONS, Guard
-from triaxcal.rig.signals import Signal
+from triaxcal.rig.description import crc
+from triaxcal.rig.description.protection import PROTECTIONS, Guard
+from triaxcal.rig.description.signals import Signal
 
 
 @pytest.mark.parametrize(

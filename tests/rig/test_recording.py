@@ -15,10 +15,10 @@ from rig_cases import play, rig_of, short_setup
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.readings.measurements import read_measurements
-from triaxcal.rig.events import Redo
-from triaxcal.rig.journal import Journal, read_journal
-from triaxcal.rig.rawlog import RawLog
-from triaxcal.rig.recording import (
+from triaxcal.rig.live.runner import Robot
+from triaxcal.rig.records.journal import Journal, read_journal
+from triaxcal.rig.records.rawlog import RawLog
+from triaxcal.rig.records.recording import (
     JOURNAL_FILE,
     LOG_FILE,
     Recording,
@@ -26,9 +26,9 @@ from triaxcal.rig.recording import (
     header,
     refuse_other_session,
 )
-from triaxcal.rig.replay import replay
-from triaxcal.rig.runner import Robot
-from triaxcal.rig.store import write_records
+from triaxcal.rig.records.replay import replay
+from triaxcal.rig.records.store import write_records
+from triaxcal.rig.session.events import Redo
 
 
 def session(setup, folder, *orders):
@@ -152,7 +152,7 @@ def test_a_resumed_session_notices_a_log_that_was_cut_or_changed(recorded, tmp_p
 def test_an_event_after_a_resume_waits_for_no_hash(tmp_path, monkeypatch):
     path = tmp_path / LOG_FILE
     path.write_bytes(b"(1.000000) test 123#00\n" * 200_000)  # 4.4 MB, four reads
-    monkeypatch.setattr("triaxcal.rig.rawlog._HASH_BYTES", 1 << 20)
+    monkeypatch.setattr("triaxcal.rig.records.rawlog._HASH_BYTES", 1 << 20)
     log = RawLog(path, "test")
     states = [log.state for _ in range(5)]
     assert ["sha256" in s for s in states] == [False, False, False, False, True]
@@ -173,7 +173,7 @@ def test_a_log_cut_while_it_is_open_is_told(tmp_path):
 @pytest.mark.parametrize("size", [1, 1000, 1 << 20])
 def test_the_hash_of_a_log_is_that_of_its_bytes(tmp_path, monkeypatch, size):
     """Also when it is made little by little, and from a known beginning."""
-    monkeypatch.setattr("triaxcal.rig.rawlog._HASH_BYTES", size)
+    monkeypatch.setattr("triaxcal.rig.records.rawlog._HASH_BYTES", size)
     rig = rig_of(short_setup(tmp_path))
     path, known = tmp_path / LOG_FILE, None
     for _ in range(3):
@@ -279,7 +279,7 @@ def test_a_full_disk_ends_the_session_with_an_intact_prefix(tmp_path, limit):
     script = (
         "import resource, signal, sys; from pathlib import Path\n"
         "sys.path[:0] = [sys.argv[3]]\n"
-        "from rig_cases import *; from triaxcal.rig.recording import Recording\n"
+        "from rig_cases import *; from triaxcal.rig.records.recording import Recording\n"
         "from triaxcal.base.errors import RefusedError\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "folder = Path(sys.argv[1]); setup = short_setup(folder, temps='[20]')\n"

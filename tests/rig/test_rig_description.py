@@ -8,10 +8,10 @@ import pytest
 from any_rig_cases import KINDS, any_setup
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.shippedrigs import find_description, shipped_descriptions
-from triaxcal.rig.undetected import undetected
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.description.shippedrigs import find_description, shipped_descriptions
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.samples.undetected import undetected
 from triaxcal.unit.adc import whole_adc
 from triaxcal.unit.description import read_unit
 

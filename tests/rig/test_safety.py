@@ -18,16 +18,22 @@ from test_cli_rig import bench_copy, triaxcal
 from triaxcal.base import durable
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import publish, publish_beside
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.events import Redo
-from triaxcal.rig.journal import Journal, read_journal
-from triaxcal.rig.lock import Lock
-from triaxcal.rig.mend import damage, mend
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.recording import JOURNAL_FILE, LOCK_FILE, LOG_FILE, Recording, durable_events
-from triaxcal.rig.replay import replay
-from triaxcal.rig.runner import Robot
-from triaxcal.rig.store import write_records
+from triaxcal.rig.live.runner import Robot
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.records.journal import Journal, read_journal
+from triaxcal.rig.records.lock import Lock
+from triaxcal.rig.records.mend import damage, mend
+from triaxcal.rig.records.recording import (
+    JOURNAL_FILE,
+    LOCK_FILE,
+    LOG_FILE,
+    Recording,
+    durable_events,
+)
+from triaxcal.rig.records.replay import replay
+from triaxcal.rig.records.store import write_records
+from triaxcal.rig.session.engine import Setup
+from triaxcal.rig.session.events import Redo
 
 # ---- One process a folder ----
 
@@ -36,7 +42,7 @@ import sys
 for name in {absent}:
     sys.modules[name] = None
 from pathlib import Path
-from triaxcal.rig.lock import Lock
+from triaxcal.rig.records.lock import Lock
 lock = Lock(Path(sys.argv[1]), "a session")
 print(lock.left_by, flush=True)
 sys.stdin.read()

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from rig_cases import rig_of, short_setup
 
-from triaxcal.rig.blocks import BlockBuilder
-from triaxcal.rig.frames import concatenate
-from triaxcal.rig.samples import BAD_CRC, DUPLICATE, ORPHAN
+from triaxcal.rig.bus.frames import concatenate
+from triaxcal.rig.samples.samples import BAD_CRC, DUPLICATE, ORPHAN
+from triaxcal.rig.session.blocks import BlockBuilder
 
 
 def frames_of_seconds(setup, seconds, *orders):

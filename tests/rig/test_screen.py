@@ -14,11 +14,9 @@ from rich.style import Style
 from rig_cases import rig_of, short_setup
 
 from triaxcal.cli.rig_live import Operator, clock_of_end
-from triaxcal.rig.bigtext import big
-from triaxcal.rig.engine import Engine
-from triaxcal.rig.events import Agree, Redo
-from triaxcal.rig.runner import Robot
-from triaxcal.rig.screen import (
+from triaxcal.rig.live.runner import Robot
+from triaxcal.rig.screen.bigtext import big
+from triaxcal.rig.screen.screen import (
     ALARM,
     COLOURS,
     HELP,
@@ -30,7 +28,9 @@ from triaxcal.rig.screen import (
     plain_status,
     screen,
 )
-from triaxcal.rig.view import view
+from triaxcal.rig.screen.view import view
+from triaxcal.rig.session.engine import Engine
+from triaxcal.rig.session.events import Agree, Redo
 
 PHASES = {"reference", "temperature", "turn", "still", "settle", "average", "guard", "done"}
 BUS = BusView("can0", 211.0, 0.026, 3)

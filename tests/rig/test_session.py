@@ -10,12 +10,12 @@ import pytest
 from rig_cases import bench_unit, play, rig_of, short_setup
 
 from triaxcal.base.errors import RefusedError, UsageError
-from triaxcal.rig.engine import Engine, Setup
-from triaxcal.rig.events import Agree, Redo
-from triaxcal.rig.orientation import recognised
-from triaxcal.rig.plan import read_plan
-from triaxcal.rig.simorders import read_fault
-from triaxcal.rig.view import view
+from triaxcal.rig.hands.orientation import recognised
+from triaxcal.rig.plan.plan import read_plan
+from triaxcal.rig.screen.view import view
+from triaxcal.rig.session.engine import Engine, Setup
+from triaxcal.rig.session.events import Agree, Redo
+from triaxcal.rig.simulated.simorders import read_fault
 from triaxcal.simulation.tilts import truth_force_g
 
 # Of the short plan: the noise is learned in 60 s, then TP1 rests from about 65 s on.

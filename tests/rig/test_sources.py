@@ -13,12 +13,12 @@ from rig_cases import rig_of, short_setup
 
 from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.cli.rig import rig
-from triaxcal.rig.canbus import SimulatedSource
-from triaxcal.rig.frames import concatenate
-from triaxcal.rig.openbus import open_bus
-from triaxcal.rig.rawlog import RawLog
-from triaxcal.rig.socketcan import SocketSource, open_refusal, packed
-from triaxcal.rig.source import SOURCES, SourceKind, Wanted, kind_of
+from triaxcal.rig.bus.frames import concatenate
+from triaxcal.rig.bus.openbus import open_bus
+from triaxcal.rig.records.rawlog import RawLog
+from triaxcal.rig.sources.canbus import SimulatedSource
+from triaxcal.rig.sources.socketcan import SocketSource, open_refusal, packed
+from triaxcal.rig.sources.source import SOURCES, SourceKind, Wanted, kind_of
 
 
 def same(a, b, names=("can_id", "length", "fd")):

@@ -20,9 +20,9 @@ from still_cases import (
     verdict,
 )
 
-from triaxcal.rig.reasons import Why
-from triaxcal.rig.rounding import rounding
-from triaxcal.rig.stillness import average, make_reference, motion, slope_micro_g_per_min
+from triaxcal.rig.session.reasons import Why
+from triaxcal.rig.session.rounding import rounding
+from triaxcal.rig.session.stillness import average, make_reference, motion, slope_micro_g_per_min
 
 
 def at_most(share, count):

@@ -9,13 +9,13 @@ from click.testing import CliRunner
 from recordings import recording
 from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.cli.main import main
-from triaxcal.rig.busfile import read_bus_file
-from triaxcal.rig.candump import format_frames
-from triaxcal.rig.frames import Frames, concatenate
-from triaxcal.rig.logfile import read_frames
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.shippedrigs import descriptions_folder
-from triaxcal.rig.survey import survey
+from triaxcal.rig.bus.frames import Frames, concatenate
+from triaxcal.rig.description.busfile import read_bus_file
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.description.shippedrigs import descriptions_folder
+from triaxcal.rig.description.survey import survey
+from triaxcal.rig.logs.candump import format_frames
+from triaxcal.rig.logs.logfile import read_frames
 
 IMU = descriptions_folder() / "automotive-imu" / "imu.dbc"
 FLOAT = descriptions_folder() / "canopen-float" / "accelerometer.dbc"

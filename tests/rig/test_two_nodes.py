@@ -10,13 +10,13 @@ import pytest
 from rig_cases import rig_of, short_setup
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.blocks import BlockBuilder
-from triaxcal.rig.engine import Engine
-from triaxcal.rig.faults import fault
-from triaxcal.rig.frames import Frames, concatenate
-from triaxcal.rig.reasons import Why, because
-from triaxcal.rig.rigfile import read_description
-from triaxcal.rig.samples import CONFLICT, DUPLICATE, SampleDecoder
+from triaxcal.rig.bus.frames import Frames, concatenate
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.samples.samples import CONFLICT, DUPLICATE, SampleDecoder
+from triaxcal.rig.session.blocks import BlockBuilder
+from triaxcal.rig.session.engine import Engine
+from triaxcal.rig.session.faults import fault
+from triaxcal.rig.session.reasons import Why, because
 
 DBC = """VERSION ""
 NS_ :

@@ -10,13 +10,13 @@ from instrument_cases import SIMULATED, setup_with, walk
 from rig_cases import rig_of, short_setup
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.rig.attendant import Attendant, attendant
-from triaxcal.rig.forecast import duration, settle_s
-from triaxcal.rig.link import Link
-from triaxcal.rig.orientation import UP
-from triaxcal.rig.runner import Robot
-from triaxcal.rig.simhands import SimulatedChamber, SimulatedTable, simulated_attendant
-from triaxcal.rig.view import view
+from triaxcal.rig.hands.link import Link
+from triaxcal.rig.hands.orientation import UP
+from triaxcal.rig.live.attendant import Attendant, attendant
+from triaxcal.rig.live.runner import Robot
+from triaxcal.rig.live.simhands import SimulatedChamber, SimulatedTable, simulated_attendant
+from triaxcal.rig.screen.view import view
+from triaxcal.rig.session.forecast import duration, settle_s
 
 LEARNED = 61
 """Seconds after which the noise of the short plan is known."""

@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 from triaxcal.cli.rig import rig as command
-from triaxcal.rig.canbus import frames_of
-from triaxcal.rig.candump import format_frames
-from triaxcal.rig.census import Census
-from triaxcal.rig.rigfile import read_description
+from triaxcal.rig.bus.messages import frames_of
+from triaxcal.rig.check.census import Census
+from triaxcal.rig.description.rigfile import read_description
+from triaxcal.rig.logs.candump import format_frames
 
 DBC = """VERSION ""
 BS_:

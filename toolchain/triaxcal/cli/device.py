@@ -70,7 +70,7 @@ def _node_options(command: Callable[..., None]) -> Callable[..., None]:
 def _connected(bus: str, request_id: int, response_id: int) -> Iterator[Link]:
     refuse_missing_packages("triaxcal device", _NEEDED, "device")
     from triaxcal.device.link import Link  # noqa: PLC0415
-    from triaxcal.rig.openbus import open_bus  # noqa: PLC0415
+    from triaxcal.rig.bus.openbus import open_bus  # noqa: PLC0415
 
     opened = open_bus(bus if ":" in bus else f"socketcan:{bus}", fd=False)
     with contextlib.closing(Link(opened, bus, request_id, response_id)) as link:

@@ -14,7 +14,7 @@ from triaxcal.cli.options import command, example
 from triaxcal.keytable.catalogue import FILES
 
 if TYPE_CHECKING:
-    from triaxcal.rig.busfile import BusFile
+    from triaxcal.rig.description.busfile import BusFile
 
 
 @command(
@@ -74,8 +74,8 @@ def _rig(folder: Path, bus_file: Path, signals: dict[str, str | None]) -> None:
     from triaxcal.cli.rig_options import refuse_missing_bench  # noqa: PLC0415
 
     refuse_missing_bench()
-    from triaxcal.rig.busfile import read_bus_file  # noqa: PLC0415
-    from triaxcal.rig.firstrig import chosen, write_rig  # noqa: PLC0415
+    from triaxcal.rig.description.busfile import read_bus_file  # noqa: PLC0415
+    from triaxcal.rig.description.firstrig import chosen, write_rig  # noqa: PLC0415
 
     file = read_bus_file(bus_file)
     for warning in file.warnings:
@@ -93,8 +93,8 @@ def at_a_terminal() -> bool:
 
 def _asked(file: BusFile, key: str, guess: str) -> str:
     """Name of a signal, asked for until there is one of it; the temperature may be left out."""
-    from triaxcal.rig.buslookup import nearest  # noqa: PLC0415
-    from triaxcal.rig.firstrig import names_of  # noqa: PLC0415
+    from triaxcal.rig.description.buslookup import nearest  # noqa: PLC0415
+    from triaxcal.rig.description.firstrig import names_of  # noqa: PLC0415
 
     known = names_of(file)
     if guess == "" and key == "x":

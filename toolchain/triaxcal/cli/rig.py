@@ -27,8 +27,8 @@ from triaxcal.cli.rig_options import (
 from triaxcal.cli.rig_signals import signals
 
 if TYPE_CHECKING:
-    from triaxcal.rig.engine import Setup
-    from triaxcal.rig.manysetup import ManySetup
+    from triaxcal.rig.many.setup import ManySetup
+    from triaxcal.rig.session.engine import Setup
 
 _SAID = {True: "good ", False: "WRONG", None: "note "}
 
@@ -61,8 +61,8 @@ def run(
     """
     from triaxcal.cli.rig_live import guide  # noqa: PLC0415
     from triaxcal.cli.rig_many import guide_many  # noqa: PLC0415
-    from triaxcal.rig.manysetup import ManySetup  # noqa: PLC0415
-    from triaxcal.rig.recording import next_folder  # noqa: PLC0415
+    from triaxcal.rig.many.setup import ManySetup  # noqa: PLC0415
+    from triaxcal.rig.records.recording import next_folder  # noqa: PLC0415
 
     folder = next_folder(sessions or setup.sessions)
     if isinstance(setup, ManySetup):
@@ -91,7 +91,7 @@ def resume(
     """Go on with the last session, whatever ended it."""
     from triaxcal.cli.rig_live import guide  # noqa: PLC0415
     from triaxcal.cli.rig_many import guide_many  # noqa: PLC0415
-    from triaxcal.rig.manysetup import ManySetup  # noqa: PLC0415
+    from triaxcal.rig.many.setup import ManySetup  # noqa: PLC0415
 
     folder = _last_session(sessions or setup.sessions)
     if isinstance(setup, ManySetup):
@@ -103,7 +103,7 @@ def resume(
 
 def _mend(setup: Setup, folder: Path, agreed: bool) -> None:
     """Mend a damaged journal when the operator agrees."""
-    from triaxcal.rig import mend  # noqa: PLC0415
+    from triaxcal.rig.records import mend  # noqa: PLC0415
 
     found = mend.damage(folder)
     if found is None:
@@ -120,7 +120,7 @@ def _mend(setup: Setup, folder: Path, agreed: bool) -> None:
 
 
 def _last_session(root: Path) -> Path:
-    from triaxcal.rig.recording import session_folders  # noqa: PLC0415
+    from triaxcal.rig.records.recording import session_folders  # noqa: PLC0415
 
     there = session_folders(root)
     if not there:
@@ -145,8 +145,8 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
     format of `rig export` and python-can, also compressed by gzip.
     """
     from triaxcal.cli.rig_live import say_first, show_written  # noqa: PLC0415
-    from triaxcal.rig import recording, replay, store  # noqa: PLC0415
-    from triaxcal.rig.whynot import why_not  # noqa: PLC0415
+    from triaxcal.rig.check.whynot import why_not  # noqa: PLC0415
+    from triaxcal.rig.records import recording, replay, store  # noqa: PLC0415
 
     setup.refuse_unfit()
     target = into or log.parent
@@ -178,8 +178,8 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
 @SESSIONS
 def status(setup: Setup, sessions: Path | None) -> None:
     """List the sessions of a unit and what they hold."""
-    from triaxcal.rig.journal import read_journal  # noqa: PLC0415
-    from triaxcal.rig.recording import JOURNAL_FILE, durable_events, session_folders  # noqa: PLC0415
+    from triaxcal.rig.records.journal import read_journal  # noqa: PLC0415
+    from triaxcal.rig.records.recording import JOURNAL_FILE, durable_events, session_folders  # noqa: PLC0415
 
     root = sessions or setup.sessions
     for folder in session_folders(root):
@@ -201,8 +201,8 @@ def status(setup: Setup, sessions: Path | None) -> None:
 @click.option("--seconds", type=click.FloatRange(1.0, 600.0), default=5.0, show_default=True)
 def check(setup: Setup, bus: BusChoice, seconds: float) -> None:
     """Check bus, DBC, unit, rate, noise and instruments."""
-    from triaxcal.rig.check import collect, findings, judged  # noqa: PLC0415
-    from triaxcal.rig.instrumentcheck import instrument_findings  # noqa: PLC0415
+    from triaxcal.rig.check.check import collect, findings, judged  # noqa: PLC0415
+    from triaxcal.rig.check.instrumentcheck import instrument_findings  # noqa: PLC0415
 
     source = open_source(setup, bus)
     try:
@@ -225,7 +225,7 @@ def check(setup: Setup, bus: BusChoice, seconds: float) -> None:
 @click.argument("log", type=click.Path(path_type=Path))
 def record(setup: Setup, bus: BusChoice, seconds: float | None, log: Path) -> None:
     """Append every frame on the bus to LOG."""
-    from triaxcal.rig.rawlog import RawLog  # noqa: PLC0415
+    from triaxcal.rig.records.rawlog import RawLog  # noqa: PLC0415
 
     source = open_source(setup, bus)
     evidence = RawLog(log, source.name)
@@ -255,7 +255,7 @@ def simulate(setup: Setup, bus: BusChoice, seconds: float | None, hold: int) -> 
     It turns through the plan's positions.
     """
     from triaxcal.cli.rig_live import simulate_on  # noqa: PLC0415
-    from triaxcal.rig.openbus import open_bus  # noqa: PLC0415
+    from triaxcal.rig.bus.openbus import open_bus  # noqa: PLC0415
 
     name = bus.name if ":" in bus.name else f"socketcan:{bus.name}"
     sender = open_bus(name, setup.rig.fd)
@@ -272,7 +272,7 @@ def export(log: Path, target: Path) -> None:
     .parquet.
     """
     refuse_missing_bench()
-    from triaxcal.rig.export import export_log  # noqa: PLC0415
+    from triaxcal.rig.logs.export import export_log  # noqa: PLC0415
 
     shows = sys.stderr.isatty()
 

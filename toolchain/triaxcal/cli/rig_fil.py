@@ -15,9 +15,8 @@ from triaxcal.codegen.compiler import FLAGS, find_compiler
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.codegen.shim import write_shim
 from triaxcal.delivery.unit import deliver
-from triaxcal.rig.dbc import read_dbc
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.fil import (
+from triaxcal.rig.description.dbc import read_dbc
+from triaxcal.rig.node.fil import (
     CODE_BITS,
     NODE_SOURCES,
     Agreement,
@@ -26,8 +25,9 @@ from triaxcal.rig.fil import (
     packing_source,
     vectors,
 )
-from triaxcal.rig.listen import listen
-from triaxcal.rig.port import Port, SocketPort
+from triaxcal.rig.node.listen import listen
+from triaxcal.rig.session.engine import Setup
+from triaxcal.rig.sources.port import Port, SocketPort
 
 
 def firmware_in_the_loop(
@@ -61,7 +61,7 @@ def firmware_in_the_loop(
             node = build_node(Path(folder), delivery.files, setup)
             port: Port = SocketPort(stack.enter_context(node_on(node)))
         else:
-            from triaxcal.rig.busport import port_of  # noqa: PLC0415  imports python-can
+            from triaxcal.rig.sources.busport import port_of  # noqa: PLC0415  imports python-can
 
             port = stack.enter_context(port_of(bus, fd=layout == "fd"))
         if own_sensor:

@@ -9,12 +9,12 @@ from collections.abc import Iterator
 
 import click
 
-from triaxcal.rig.attendant import Attendant, attendant
-from triaxcal.rig.canbus import SimulatedSource
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.runner import Hands, Robot
-from triaxcal.rig.simhands import simulated_attendant
-from triaxcal.rig.source import Source
+from triaxcal.rig.live.attendant import Attendant, attendant
+from triaxcal.rig.live.runner import Hands, Robot
+from triaxcal.rig.live.simhands import simulated_attendant
+from triaxcal.rig.session.engine import Setup
+from triaxcal.rig.sources.canbus import SimulatedSource
+from triaxcal.rig.sources.source import Source
 
 
 @contextlib.contextmanager

@@ -17,15 +17,14 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.cli.keys import Keys
 from triaxcal.cli.rig_hands import hands_of
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
-from triaxcal.rig import recording, replay, runner, store
-from triaxcal.rig.canbus import Bus, messages_of
-from triaxcal.rig.description import RigDescription
-from triaxcal.rig.engine import Setup
-from triaxcal.rig.events import Agree, Command, Redo
-from triaxcal.rig.forecast import duration
-from triaxcal.rig.plan import SessionPlan
-from triaxcal.rig.rawlog import LogState
-from triaxcal.rig.screen import (
+from triaxcal.rig.bus.messages import messages_of
+from triaxcal.rig.description.description import RigDescription
+from triaxcal.rig.live import runner
+from triaxcal.rig.plan.plan import SessionPlan
+from triaxcal.rig.records import recording, replay, store
+from triaxcal.rig.records.rawlog import LogState
+from triaxcal.rig.samples.undetected import undetected
+from triaxcal.rig.screen.screen import (
     About,
     BusView,
     Faults,
@@ -34,11 +33,14 @@ from triaxcal.rig.screen import (
     plain_status,
     screen,
 )
-from triaxcal.rig.simulator import SimulatedRig
-from triaxcal.rig.socketcan import SocketSource
-from triaxcal.rig.source import Source
-from triaxcal.rig.undetected import undetected
-from triaxcal.rig.view import view
+from triaxcal.rig.screen.view import view
+from triaxcal.rig.session.engine import Setup
+from triaxcal.rig.session.events import Agree, Command, Redo
+from triaxcal.rig.session.forecast import duration
+from triaxcal.rig.simulated.simulator import SimulatedRig
+from triaxcal.rig.sources.canbus import Bus
+from triaxcal.rig.sources.socketcan import SocketSource
+from triaxcal.rig.sources.source import Source
 
 _REFRESH_S = 0.25
 _ABOVE_PAGE = 15

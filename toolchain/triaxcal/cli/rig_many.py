@@ -18,25 +18,25 @@ from triaxcal.cli.keys import Keys
 from triaxcal.cli.rig_hands import made_safe
 from triaxcal.cli.rig_live import Operator, Stop, clock_of_end, show_written
 from triaxcal.cli.rig_options import BusChoice, refuse_other_kind
-from triaxcal.rig import store
-from triaxcal.rig.attendant import attendant
-from triaxcal.rig.canbus import VirtualSource
-from triaxcal.rig.forecast import duration
-from triaxcal.rig.gather import Gathered
-from triaxcal.rig.group import Group
-from triaxcal.rig.manyhands import ManyAttendant
-from triaxcal.rig.manyrecording import ManyRecording, log_file
-from triaxcal.rig.manyreplay import replay_bus
-from triaxcal.rig.manyrunner import ManyHands, ManyRobot, ManyTick, live_many
-from triaxcal.rig.manyscreen import Recent, group_line, many_screen
-from triaxcal.rig.manysetup import ManySetup
-from triaxcal.rig.rawlog import LogState
-from triaxcal.rig.session import Session
-from triaxcal.rig.simbench import SimulatedBench, simulated_bench
-from triaxcal.rig.simhands import simulated_attendant
-from triaxcal.rig.simulator import SimulatedRig
-from triaxcal.rig.source import Source, Wanted, kind_of
-from triaxcal.rig.undetected import undetected
+from triaxcal.rig.live.attendant import attendant
+from triaxcal.rig.live.simhands import simulated_attendant
+from triaxcal.rig.many.group import Group
+from triaxcal.rig.many.hands import ManyAttendant
+from triaxcal.rig.many.recording import ManyRecording, log_file
+from triaxcal.rig.many.replay import replay_bus
+from triaxcal.rig.many.runner import ManyHands, ManyRobot, ManyTick, live_many
+from triaxcal.rig.many.screen import Recent, group_line, many_screen
+from triaxcal.rig.many.setup import ManySetup
+from triaxcal.rig.many.simbench import SimulatedBench, simulated_bench
+from triaxcal.rig.records import store
+from triaxcal.rig.records.rawlog import LogState
+from triaxcal.rig.samples.undetected import undetected
+from triaxcal.rig.session.forecast import duration
+from triaxcal.rig.session.session import Session
+from triaxcal.rig.simulated.simulator import SimulatedRig
+from triaxcal.rig.sources.canbus import VirtualSource
+from triaxcal.rig.sources.gather import Gathered
+from triaxcal.rig.sources.source import Source, Wanted, kind_of
 
 _REFRESH_S = 0.25
 _QUIET = {"found"}

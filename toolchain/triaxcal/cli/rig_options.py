@@ -13,12 +13,12 @@ import click
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.extras import refuse_missing_packages
 from triaxcal.cli.options import UnitFolder
-from triaxcal.rig.source import SOURCES, Wanted, kind_of
+from triaxcal.rig.sources.source import SOURCES, Wanted, kind_of
 
 if TYPE_CHECKING:
-    from triaxcal.rig.engine import Setup
-    from triaxcal.rig.manysetup import ManySetup
-    from triaxcal.rig.source import Source, SourceKind
+    from triaxcal.rig.many.setup import ManySetup
+    from triaxcal.rig.session.engine import Setup
+    from triaxcal.rig.sources.source import Source, SourceKind
 
 _DEFAULT_PLAN = "five-temperatures.toml"
 _NEEDED = ("can", "cantools", "rich")
@@ -105,8 +105,8 @@ def _one_or_many(
     unit: Path | None, plan: Path | None, dbc: Path | None, bus: str | None
 ) -> tuple[Setup | ManySetup, str]:
     """Setup of a session, and its bus."""
-    from triaxcal.rig.manysetup import many_of_plan  # noqa: PLC0415
-    from triaxcal.rig.plan import list_planned  # noqa: PLC0415
+    from triaxcal.rig.many.setup import many_of_plan  # noqa: PLC0415
+    from triaxcal.rig.plan.plan import list_planned  # noqa: PLC0415
 
     planned = list_planned(plan) if plan is not None else {}
     if unit is None and plan is not None and planned:
@@ -166,10 +166,10 @@ SECONDS = click.option("--seconds", type=float, help="Stop after this time; by d
 
 def _setup(folder: Path, plan: Path | None, dbc: Path | None) -> Setup:
     from triaxcal.base.shipped import shipped  # noqa: PLC0415
-    from triaxcal.rig.engine import Setup  # noqa: PLC0415
-    from triaxcal.rig.manysetup import one_of_plan  # noqa: PLC0415
-    from triaxcal.rig.plan import list_planned, read_plan  # noqa: PLC0415
-    from triaxcal.rig.rigfile import read_description  # noqa: PLC0415
+    from triaxcal.rig.description.rigfile import read_description  # noqa: PLC0415
+    from triaxcal.rig.many.setup import one_of_plan  # noqa: PLC0415
+    from triaxcal.rig.plan.plan import list_planned, read_plan  # noqa: PLC0415
+    from triaxcal.rig.session.engine import Setup  # noqa: PLC0415
     from triaxcal.unit.description import read_unit  # noqa: PLC0415
 
     if plan is not None and list_planned(plan):
@@ -217,8 +217,8 @@ def refuse_other_kind(setup: Setup, kind: SourceKind) -> None:
 
 def simulated(setup: Setup, bus: BusChoice) -> Any:
     """Rig that does not exist, from the unit's truth.toml."""
-    from triaxcal.rig.simorders import read_fault  # noqa: PLC0415
-    from triaxcal.rig.simulator import RigSettings, SimulatedRig  # noqa: PLC0415
+    from triaxcal.rig.simulated.simorders import read_fault  # noqa: PLC0415
+    from triaxcal.rig.simulated.simulator import RigSettings, SimulatedRig  # noqa: PLC0415
     from triaxcal.simulation.truth import TRUTH_FILE, read_truth  # noqa: PLC0415
 
     if not (setup.folder / TRUTH_FILE).is_file():

@@ -12,7 +12,7 @@ from triaxcal.cli.options import example
 from triaxcal.cli.rig_options import refuse_missing_bench
 
 if TYPE_CHECKING:
-    from triaxcal.rig.survey import Survey, Triad
+    from triaxcal.rig.description.survey import Survey, Triad
 
 
 @click.command(epilog=example("triaxcal rig signals frames.log imu.dbc"))
@@ -26,9 +26,9 @@ def signals(log: Path, bus_file: Path, most: int) -> None:
     ARXML. Three signals are an accelerometer when the length of their vector at rest is g.
     """
     refuse_missing_bench()
-    from triaxcal.rig.busfile import read_bus_file  # noqa: PLC0415
-    from triaxcal.rig.logfile import read_frames  # noqa: PLC0415
-    from triaxcal.rig.survey import survey  # noqa: PLC0415
+    from triaxcal.rig.description.busfile import read_bus_file  # noqa: PLC0415
+    from triaxcal.rig.description.survey import survey  # noqa: PLC0415
+    from triaxcal.rig.logs.logfile import read_frames  # noqa: PLC0415
 
     file = read_bus_file(bus_file)
     found = survey(file.layouts(), (part.frames for part in read_frames(log)))

@@ -8,8 +8,8 @@ from types import MappingProxyType
 from triaxcal.base.keys import FileKeys
 from triaxcal.design.problem import PROBLEM
 from triaxcal.dynamic.description import imu_file
-from triaxcal.rig.plan import session_plan_file
-from triaxcal.rig.rigkeys import rig_file
+from triaxcal.rig.description.rigkeys import rig_file
+from triaxcal.rig.plan.plan import session_plan_file
 from triaxcal.simulation.imu_unit import IMU_TRUTH
 from triaxcal.simulation.published import TABLES
 from triaxcal.simulation.truth import TRUTH

@@ -14,9 +14,9 @@ from triaxcal.readings.format import PIECE, Block, Format, Source
 from triaxcal.unit.recordingfile import CAN_LOG, FileLayout
 
 if TYPE_CHECKING:
-    from triaxcal.rig.frames import Frames
-    from triaxcal.rig.layout import FrameLayout
-    from triaxcal.rig.logfile import Left
+    from triaxcal.rig.bus.frames import Frames
+    from triaxcal.rig.description.layout import FrameLayout
+    from triaxcal.rig.logs.logfile import Left
 
 _TIME = "time"
 
@@ -25,7 +25,7 @@ class _CanLog(Source):
     """A table is a message, a column a signal's physical value; each has its time of arrival."""
 
     def __init__(self, path: Path, layout: FileLayout) -> None:
-        from triaxcal.rig.busfile import read_bus_file  # noqa: PLC0415  cantools takes its time
+        from triaxcal.rig.description.busfile import read_bus_file  # noqa: PLC0415  cantools takes its time
 
         if layout.dbc is None:
             raise RefusedError(
@@ -64,7 +64,7 @@ class _CanLog(Source):
             When the log cannot be read, has no frame of the message, or has some of several
             channels.
         """
-        from triaxcal.rig.logfile import Left, read_frames  # noqa: PLC0415
+        from triaxcal.rig.logs.logfile import Left, read_frames  # noqa: PLC0415
 
         pieces = Pieces(str(self._path), self.names, numbers, texts)
         message = self._columns[pieces.wanted[0]][0]
@@ -147,8 +147,8 @@ def _with_all(message: FrameLayout, frames: Frames, names: Sequence[str]) -> Fra
 
 def _with_numbers(message: FrameLayout, frames: Frames, names: Sequence[str]) -> Frames:
     """Frames of a message whose signals hold numbers, by J1939; the bench drops the same."""
-    from triaxcal.rig.description import MessageUse  # noqa: PLC0415  with the bench
-    from triaxcal.rig.rows import available  # noqa: PLC0415
+    from triaxcal.rig.description.description import MessageUse  # noqa: PLC0415  with the bench
+    from triaxcal.rig.description.rows import available  # noqa: PLC0415
 
     use = MessageUse(message)
     for signal in (message.signals[name] for name in names if name != _TIME):
@@ -169,7 +169,7 @@ def _unseen(message: FrameLayout, names: Sequence[str]) -> list[str]:
 
 def _unit(text: str) -> str:
     """Unit of a bus description as unit.toml names it; "" where it is none that is known."""
-    from triaxcal.rig.recorded import (  # noqa: PLC0415  with the bench
+    from triaxcal.rig.description.recorded import (  # noqa: PLC0415  with the bench
         ACCELERATIONS,
         CODES,
         TEMPERATURES,

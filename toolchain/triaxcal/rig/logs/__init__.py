@@ -1,1 +1,1 @@
-"""Formats of logs, a file each: a module here that defines `ENTRY` is one."""
+"""Logs of a bus: read, and written in the forms of other programs."""

@@ -1,1 +1,1 @@
-"""Signal sources of the bench, a file each; `triaxcal.rig.source` has what they share."""
+"""Where frames come from: buses, serial ports, instruments, logs."""

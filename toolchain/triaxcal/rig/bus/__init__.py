@@ -1,0 +1,1 @@
+"""Frames of a CAN bus, and buses by their names."""

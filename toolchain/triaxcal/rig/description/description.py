@@ -1,0 +1,157 @@
+"""The rig description, rig.toml: which signals of which bus are x, y, z and the temperature.
+
+The seam: `rigfile.read_description` gives a `RigDescription`, which is data only. Whatever decodes
+(`samples.SampleDecoder`), simulates (`simframes.FrameMaker`) or checks reads that alone; nothing
+else in the bench knows a message by its name. A description is made once and shared; a decoder of
+its own for each unit costs some kilobytes. `moved` gives the description of another unit of the
+same make on the same bus, by the offset of its IDs or by its J1939 source address.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from triaxcal.rig.description.layout import Condition, FrameLayout
+from triaxcal.rig.description.lines import LineFormat
+from triaxcal.rig.description.protection import Guard, Protection
+from triaxcal.rig.description.recorded import Recorded, SignalUnit
+from triaxcal.rig.description.signals import Signal
+
+
+@dataclass(frozen=True)
+class MessageUse:
+    """One message that the bench reads.
+
+    Attributes
+    ----------
+    layout : FrameLayout
+    counter : Signal or None
+    counter_modulus : int
+        Number of the counter's values.
+    guard, protection : Guard and Protection, or None
+        The CRC, and how it is made.
+    status : Signal or None
+    status_good : tuple of int
+        Raw values of the status that are good.
+    only : tuple of Condition
+        Frames of the message for which these do not hold are not looked at.
+    """
+
+    layout: FrameLayout
+    counter: Signal | None = None
+    counter_modulus: int = 0
+    guard: Guard | None = None
+    protection: Protection | None = None
+    status: Signal | None = None
+    status_good: tuple[int, ...] = (0,)
+    only: tuple[Condition, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the message."""
+        return self.layout.name
+
+    def moved(self, frame_id: int) -> MessageUse:
+        """The same under another ID."""
+        guard = self.guard and replace(self.guard, frame_id=frame_id)
+        return replace(self, layout=replace(self.layout, frame_id=frame_id), guard=guard)
+
+
+@dataclass(frozen=True)
+class SampleTime:
+    """Time of a sample by the unit's own clock."""
+
+    signal: SignalUnit
+    tick_us: float
+
+    @property
+    def turn(self) -> int:
+        """Steps after which it is 0 again."""
+        return 1 << self.signal.signal.length
+
+
+@dataclass(frozen=True)
+class RigDescription:
+    """What a rig sends, resolved.
+
+    Attributes
+    ----------
+    name : str
+        Of a shipped description, else the path of rig.toml.
+    sha256, bus_sha256 : str
+        Of rig.toml, and of the bus description.
+    bus_files : tuple of Path
+        The first is the rig's.
+    messages : mapping
+        Those that are read, by name: of the axes in the order x, y, z, then the others.
+    axes : tuple of three Recorded
+    temperature : Recorded or None
+    join : str
+        "counter", "age", or "" where one frame has all axes.
+    age_s : float
+        Greatest age of an axis, where they are joined by age.
+    sample_at : str
+        Message whose arrival makes a sample.
+    warnings : tuple of str
+        What breaks the letter of the bus description's format.
+    lines : LineFormat or None
+        Format of the lines that it sends in place of frames.
+    channel : str or None
+        Channel of a log whose frames count; None: that of all.
+    """
+
+    name: str
+    sha256: str
+    bus_files: tuple[Path, ...]
+    bus_sha256: str
+    messages: Mapping[str, MessageUse]
+    axes: tuple[Recorded, Recorded, Recorded]
+    temperature: Recorded | None = None
+    sample_time: SampleTime | None = None
+    serial: SignalUnit | None = None
+    serial_is: str = "crc32"
+    rate: SignalUnit | None = None
+    join: str = ""
+    age_s: float = 0.0
+    sample_at: str = ""
+    warnings: tuple[str, ...] = field(default=())
+    lines: LineFormat | None = None
+    channel: str | None = None
+
+    @property
+    def bus_file(self) -> Path:
+        """Bus description of the rig."""
+        return self.bus_files[0]
+
+    @property
+    def fd(self) -> bool:
+        """Whether any of its frames is CAN FD."""
+        return any(use.layout.fd for use in self.messages.values())
+
+    @property
+    def axis_messages(self) -> tuple[str, ...]:
+        """Messages of the axes, each once."""
+        return tuple(dict.fromkeys(axis.message for axis in self.axes))
+
+    def moved(self, id_offset: int = 0, source_address: int | None = None) -> RigDescription:
+        """Description of another unit of this make.
+
+        Parameters
+        ----------
+        id_offset : int
+            Added to the IDs that are not J1939's.
+        source_address : int, optional
+            Of the IDs that are J1939's.
+        """
+        moved = {}
+        for name, use in self.messages.items():
+            frame_id = use.layout.frame_id
+            if not use.layout.j1939:
+                moved[name] = use.moved(frame_id + id_offset)
+            elif source_address is not None:
+                moved[name] = use.moved((frame_id & ~0xFF) | source_address)
+            else:
+                moved[name] = use
+        return replace(self, messages=moved)

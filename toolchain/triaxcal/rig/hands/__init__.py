@@ -1,0 +1,1 @@
+"""Chambers, tables and other instruments: what is ordered, and what they answer."""

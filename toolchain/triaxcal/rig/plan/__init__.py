@@ -1,0 +1,1 @@
+"""plan.toml: the temperatures and positions of a session."""

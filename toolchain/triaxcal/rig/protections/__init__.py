@@ -1,1 +1,0 @@
-"""Ways of end-to-end protection, a file each; `triaxcal.rig.protection` has what they share."""

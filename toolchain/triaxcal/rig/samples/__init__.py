@@ -1,0 +1,1 @@
+"""From frames to numbered samples of a triad."""

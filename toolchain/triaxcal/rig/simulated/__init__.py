@@ -1,0 +1,1 @@
+"""The simulated rig: exact physics, frames and faults."""

@@ -1,0 +1,1 @@
+"""Signal sources of the bench, a file each; `triaxcal.rig.sources.source` has what they share."""
