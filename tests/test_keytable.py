@@ -79,7 +79,7 @@ def faults(kind: str, text: str) -> list[str]:
 def uncommented(file: FileKeys) -> str:
     """A starter whose every key stands."""
     names = "|".join(key.name for table in file.tables for key in table.keys)
-    return re.sub(rf"(?m)^# (?=\[[\w.]+\]$|({names}) = )", "", starter_text(file))
+    return re.sub(rf"(?m)^# (?=\[?\[[\w.]+\]\]?$|({names}) = )", "", starter_text(file))
 
 
 @pytest.mark.parametrize("kind", FILES)
@@ -87,11 +87,11 @@ def test_the_reference_names_every_key_with_its_documentation(kind: str) -> None
     file = FILES[kind]()
     page = reference_markdown(file)
     for table in file.tables:
-        assert f"`[{table.header}]`" in page or not table.name
+        assert f"`{table.header}`" in page or not table.name
         for key in table.keys:
             (row,) = [
                 row
-                for row in page.split(f"`[{table.header}]`")[-1 if table.name else 0].splitlines()
+                for row in page.split(f"`{table.header}`")[-1 if table.name else 0].splitlines()
                 if row.startswith(f"| `{key.name}` |")
             ][:1]
             assert key.doc.replace("|", "\\|") in row
@@ -107,7 +107,7 @@ def test_every_example_is_of_its_kind(kind: str) -> None:
     document = tomllib.loads(text, parse_float=Decimal)
     for table in file.tables:
         found = document[table.name] if table.name else document
-        found = found[table.each] if table.each else found
+        found = found[table.each] if table.each else found[0] if table.many else found
         for key in table.keys:
             key.kind.parse(found[key.name])
     assert faults(kind, text) == []

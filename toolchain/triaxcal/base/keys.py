@@ -193,6 +193,8 @@ class TableKeys:
     each : str
         What the tables of this kind are named after, "MESSAGE" where the file has one
         [name.MESSAGE] for each message, any number of them; "" for a single table.
+    many : bool
+        Whether the file has any number of them without names, each as [[name]].
     """
 
     name: str
@@ -200,22 +202,26 @@ class TableKeys:
     keys: tuple[Key[Any], ...]
     optional: bool = False
     each: str = ""
+    many: bool = False
 
     @classmethod
     def of(cls, record: type[Any], optional: bool = False) -> TableKeys:
         """Table of a dataclass of keys, whose docstring begins with "[name]: what it is.".
 
-        "[name.EACH]: what it is." makes a table for each of something.
+        "[name.EACH]: what it is." makes a table for each of something, "[[name]]: what it is." any
+        number of tables without names.
         """
         name, _, doc = (record.__doc__ or "").partition("\n")[0].partition("]: ")
-        name, _, each = name[1:].partition(".")
+        many = name.startswith("[[")
+        name, _, each = name.strip("[]").partition(".")
         made = doc[:1].upper() + doc[1:]
-        return cls(name, made, keys_of(record), optional or bool(each), each)
+        return cls(name, made, keys_of(record), optional or bool(each) or many, each, many)
 
     @property
     def header(self) -> str:
-        """Name as it stands in brackets in the file, an example where there are several."""
-        return f"{self.name}.{self.each}" if self.each else self.name
+        """Name in brackets as it stands in the file, an example where there are several."""
+        inner = f"{self.name}.{self.each}" if self.each else self.name
+        return f"[[{inner}]]" if self.many else f"[{inner}]"
 
     def but(self, *others: Key[Any], **changes: Mapping[str, Any]) -> TableKeys:
         """Same table with more keys, or with attributes of its keys changed, by name of the key."""
@@ -251,7 +257,8 @@ class FileKeys:
     def read(self, path: Path) -> Mapping[str, Values]:
         """Checked tables of a file by name; absent ones are empty.
 
-        Of tables for each of something, those that the file has: "message.X" for [message.X].
+        Of tables for each of something, those that the file has: "message.X" for [message.X],
+        "equipment#2" for the second [[equipment]].
 
         Raises
         ------
@@ -273,22 +280,29 @@ class FileKeys:
         kinds: dict[str, TableKeys] = {}
         for table in self.tables:
             values = document.get(table.name, {}) if table.name else top
-            if not isinstance(values, dict):
-                raise file.refuse(table.name, f"a table [{table.header}]")
-            if not table.each:
-                given[table.name], kinds[table.name] = values, table
-                continue
-            for name, inner in values.items():
-                if not isinstance(inner, dict):
-                    outer = Values(source, table.name, values)
-                    raise outer.refuse(name, f"a table [{table.header}]")
-                full = f"{table.name}.{name}"
+            for full, inner in self._places(file, table, values).items():
                 given[full], kinds[full] = inner, table
         self._refuse_wrong_keys(source, given, kinds, document)
         return {
             name: Values(source, name, given[name], {k.name: k for k in table.keys})
             for name, table in kinds.items()
         }
+
+    def _places(self, file: Values, table: TableKeys, values: object) -> dict[str, dict[str, Any]]:
+        """Tables of a kind that a file has, by where they stand in it."""
+        if table.many:
+            rows = values or []
+            if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+                raise file.refuse(table.name, f"a table {table.header} for each")
+            return {f"{table.name}#{i}": row for i, row in enumerate(rows, 1)}
+        if not isinstance(values, dict):
+            raise file.refuse(table.name, f"a table {table.header}")
+        if not table.each:
+            return {table.name: values}
+        for name, inner in values.items():
+            if not isinstance(inner, dict):
+                raise Values(file.file, table.name, values).refuse(name, f"a table {table.header}")
+        return {f"{table.name}.{name}": inner for name, inner in values.items()}
 
     def _refuse_wrong_keys(
         self,
@@ -302,7 +316,8 @@ class FileKeys:
             lacking = [k.name for k in table.keys if k.required and k.name not in given[place]]
             if table.optional and table.name not in document:
                 lacking = []
-            without = f" (or leave [{place}] out)" if table.optional and lacking else ""
+            out = "it" if table.many else f"[{place}]"
+            without = f" (or leave {out} out)" if table.optional and lacking else ""
             missing += [key_name(place, name) for name in lacking]
             missing[-1:] = [last + without for last in missing[-1:]]
             known = {k.name for k in table.keys}
@@ -319,7 +334,7 @@ class FileKeys:
         """Hint for an unknown key: the table where it belongs, or a near miss in its own."""
         for other in self.tables:
             if other.name != table.name and any(k.name == name for k in other.keys):
-                place = f"[{other.header}]" if other.name else "the top of the file"
+                place = other.header if other.name else "the top of the file"
                 return f" (it belongs to {place})"
         tables = [] if table.name else [t.name for t in self.tables if t.name]
         return did_you_mean(name, [k.name for k in table.keys] + tables)
@@ -329,3 +344,8 @@ def each_of(tables: Mapping[str, Values], name: str) -> dict[str, Values]:
     """Tables [name.X] of a file by X."""
     start = f"{name}."
     return {n.removeprefix(start): v for n, v in tables.items() if n.startswith(start)}
+
+
+def many_of(tables: Mapping[str, Values], name: str) -> list[Values]:
+    """Tables [[name]] of a file, in their order."""
+    return [v for n, v in tables.items() if n.startswith(f"{name}#")]

@@ -213,6 +213,20 @@ def interval(low: float, high: float) -> Kind[tuple[float, float]]:
     return Kind(two.expected, parse, two.schema, example=two.example)
 
 
+def span(low: float, high: float) -> Kind[tuple[float, float]]:
+    """Lowest and highest of a quantity, from `low` to `high`; both may be equal."""
+    expected = f"a list of lowest and highest, numbers from {low:g} to {high:g}"
+    numbers = listed(number(low, high), range(2, 3), expected)
+
+    def parse(value: Any) -> tuple[float, float]:
+        first, last = numbers.parse(value)
+        if last < first:
+            raise ValueError
+        return first, last
+
+    return Kind(expected, parse, numbers.schema, example=f"[{low:g}, {high:g}]")
+
+
 def three(
     item: Kind[T], expected: str, good: Callable[[T], bool] = lambda _: True
 ) -> Kind[tuple[T, T, T]]:

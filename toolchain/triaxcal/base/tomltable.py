@@ -110,6 +110,9 @@ def toml_document(where: str, content: bytes) -> dict[str, object]:
 
 
 def key_name(table: str, key: str) -> str:
-    """A key as messages name it, as "[adc] bits"."""
+    """A key as messages name it, as "[adc] bits", "[[equipment]] number 2, due"."""
     shown_key = key if key.isprintable() and len(key) <= 40 else ascii(key)[:40]
+    name, _, number = table.partition("#")
+    if number:
+        return f"[[{name}]] number {number}, {shown_key}"
     return f"[{table}] {shown_key}" if table else shown_key

@@ -20,7 +20,7 @@ def reference_markdown(file: FileKeys) -> str:
 
 
 def _table(table: TableKeys) -> str:
-    title = f"**`[{table.header}]`**" if table.name else "**The top of the file**"
+    title = f"**`{table.header}`**" if table.name else "**The top of the file**"
     optional = " The table may be left out." if table.optional else ""
     rows = "\n".join(_row(key) for key in table.keys)
     return f"{title} {table.doc}{optional}\n\n{HEAD}\n{rows}".replace(" \n", "\n")

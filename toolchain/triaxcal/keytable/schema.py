@@ -29,7 +29,9 @@ def json_schema(file: FileKeys) -> dict[str, Any]:
 
 
 def _tables(table: TableKeys) -> dict[str, Any]:
-    """Schema of a table, or of one for each of something."""
+    """Schema of a table, or of several."""
+    if table.many:
+        return {"type": "array", "items": _table(table)}
     if not table.each:
         return _table(table)
     return {"type": "object", "additionalProperties": _table(table)}

@@ -73,7 +73,7 @@ def _table(table: TableKeys, first: tuple[str, ...]) -> str:
     stand = [] if table.optional else [k for k in table.keys if k.required or k.name in first]
     head = f"\n{_comment(table.doc)}" if table.name else ""
     if table.name:
-        head += f"{'' if stand else '# '}[{table.header}]\n"
+        head += f"{'' if stand else '# '}{table.header}\n"
     return head + "".join(_key(key, key in stand) for key in table.keys)
 
 

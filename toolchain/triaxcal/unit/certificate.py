@@ -1,4 +1,4 @@
-"""What only the laboratory knows of a calibration: [certificate] in unit.toml, for the DCC."""
+"""What only the laboratory knows of a calibration: [certificate] in unit.toml."""
 
 from __future__ import annotations
 
@@ -6,12 +6,17 @@ import datetime
 from dataclasses import dataclass
 
 from triaxcal.base.keys import TableKeys, Values, setting
-from triaxcal.base.kinds import DATE, line, pattern
+from triaxcal.base.kinds import DATE, line, pattern, word
+
+PLACES = ("laboratory", "customer", "laboratoryBranch", "customerBranch", "other")
+"""Where a calibration may be performed, in the words of the Digital Calibration Certificate."""
+_LONGEST = 200
+"""Of a text, so that it fits a page. Keys of version 0.1.0 keep theirs of any length."""
 
 
 @dataclass(frozen=True)
 class CertificateDetails:
-    """[certificate]: what only the laboratory knows, for the Digital Calibration Certificate.
+    """[certificate]: who calibrated the unit for whom, for the Digital Calibration Certificate.
 
     Attributes
     ----------
@@ -19,20 +24,40 @@ class CertificateDetails:
         The certificate's own number.
     laboratory
         Who calibrated.
+    laboratory_address
+        Street and number, or post box, of the laboratory.
     city
         City of the laboratory.
     country
         Country of the laboratory.
+    laboratory_contact
+        E-mail address or telephone number of the laboratory.
+    accreditation
+        Number of the laboratory's accreditation, and the body that gave it.
     customer
         For whom.
+    customer_address
+        Address of the customer.
     signer
         Who is responsible for the certificate.
+    signer_role
+        Role of the signer in the laboratory.
+    second_signer
+        Who signs besides.
+    second_signer_role
+        Role of the second signer.
     manufacturer
         Who made the unit.
+    model
+        The manufacturer's name of the type.
     begin
         First day of the measurements.
     end
         Last day of the measurements.
+    issued
+        Day on which the certificate is issued.
+    performed_at
+        Where the calibration was performed: laboratory and customer, or a branch of either.
     """
 
     identifier: str = setting(line(), example='"CAL-2026-001"')
@@ -44,6 +69,16 @@ class CertificateDetails:
     manufacturer: str = setting(line(), example='"Manufacturer"')
     begin: datetime.date = setting(DATE, example="2026-03-30")
     end: datetime.date = setting(DATE, example="2026-03-31")
+    issued: datetime.date | None = setting(DATE, None, example="2026-04-02")
+    laboratory_address: str | None = setting(line(_LONGEST), None, example='"1 Street"')
+    laboratory_contact: str | None = setting(line(_LONGEST), None, example='"lab@example.org"')
+    accreditation: str | None = setting(line(_LONGEST), None, example='"Body, number 1234"')
+    customer_address: str | None = setting(line(_LONGEST), None, example='"2 Street, 10000 City"')
+    signer_role: str | None = setting(line(_LONGEST), None, example='"head of the laboratory"')
+    second_signer: str | None = setting(line(_LONGEST), None, example='"B. Person"')
+    second_signer_role: str | None = setting(line(_LONGEST), None, example='"technician"')
+    model: str | None = setting(line(_LONGEST), None, example='"Type 1"')
+    performed_at: str = setting(word(PLACES), "laboratory")
 
 
 CERTIFICATE = TableKeys.of(CertificateDetails, optional=True)
@@ -55,11 +90,18 @@ def certificate_details(values: Values) -> CertificateDetails | None:
     Raises
     ------
     RefusedError
-        When a value is no text, country or date, or the last day is before the first.
+        When a value is no text, country or date; the last day is before the first, or the day of
+        issue before the last day; a role has no person.
     """
     if not values:
         return None
     details = values.record(CertificateDetails)
     if details.end < details.begin:
         raise values.refuse("end", f"{details.begin} (begin) or later")
+    if details.issued is not None and details.issued < details.end:
+        raise values.refuse("issued", f"{details.end} (end) or later")
+    if details.second_signer is None and details.second_signer_role is not None:
+        raise values.refuse(
+            "second_signer_role", "second_signer beside it", "state the person, or remove the role"
+        )
     return details

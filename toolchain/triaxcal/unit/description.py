@@ -9,11 +9,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from triaxcal.base.keys import DESCRIPTION, FileKeys, TableKeys, Values
+from triaxcal.base.keys import DESCRIPTION, FileKeys, TableKeys, Values, many_of
 from triaxcal.base.tomltable import content_of, shown, text_of, toml_document
 from triaxcal.unit.adc import ADC, RECORDED_ADC, Adc, adc_of, recorded_adc
 from triaxcal.unit.certificate import CERTIFICATE, CertificateDetails, certificate_details
 from triaxcal.unit.choices import FIT, SENSOR, Compensation, Fit, Sensor, compensation_table
+from triaxcal.unit.equipment import (
+    EQUIPMENT,
+    Equipment,
+    days_of,
+    equipment_of,
+    refuse_other_day,
+)
 from triaxcal.unit.folder import (
     SERIAL,
     TOP,
@@ -44,7 +51,7 @@ from triaxcal.unit.uncertainty import UNCERTAINTY, StatedUncertainty
 
 def _common() -> tuple[TableKeys, ...]:
     compensation = compensation_table()
-    more = UNCERTAINTY, CERTIFICATE, MEASURED, QUADRATIC
+    more = UNCERTAINTY, CERTIFICATE, MEASURED, EQUIPMENT, QUADRATIC
     return FIT, PRIORS, SENSOR, compensation, FIRMWARE, *more
 
 
@@ -142,6 +149,7 @@ class UnitDescription:
     nominal_tolerance: float = 0.2
     gravity_difference_m_per_s2: float | None = None
     measured: Measured = field(default_factory=Measured)
+    equipment: tuple[Equipment, ...] = ()
     toml: str = field(default="", repr=False, compare=False)
     source: str = field(default=UNIT_FILE, compare=False)
 
@@ -190,6 +198,11 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
     firmware = tables["firmware"].record(FirmwareChoice)
     sensor = tables["sensor"].record(Sensor)
     _refuse_inapplicable(tables, sensor)
+    details, measured = (
+        certificate_details(tables["certificate"]),
+        tables["measured"].record(Measured),
+    )
+    refuse_other_day(tables["measured"], measured, details)
     return UnitDescription(
         name=name,
         serial=tables[""][SERIAL],
@@ -206,7 +219,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         model_error_max_micro_g=compensation.model_error_max_micro_g,
         limits=tables["limits"].record(Limits),
         stated=tables["uncertainty"].record(StatedUncertainty),
-        certificate=certificate_details(tables["certificate"]),
+        certificate=details,
         recording=recording,
         terms=fit.terms,
         loss=fit.loss,
@@ -218,7 +231,8 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         nominal_v_per_g=sensor.nominal_v_per_g,
         nominal_tolerance=sensor.nominal_tolerance,
         gravity_difference_m_per_s2=gravity_difference_m_per_s2(site),
-        measured=tables["measured"].record(Measured),
+        measured=measured,
+        equipment=equipment_of(many_of(tables, "equipment"), days_of(measured, details)),
     )
 
 

@@ -22,6 +22,8 @@ from triaxcal.report.pictures.curves import (
     uncertainty_panel,
 )
 from triaxcal.report.pictures.residual_panels import residual_panels
+from triaxcal.report.stated.statements import cautions, statements
+from triaxcal.report.stated.words import LABELS, caution_words, value_words
 from triaxcal.report.words.device import device_not_counted, device_words
 from triaxcal.report.words.firmware import (
     checked_words,
@@ -45,6 +47,7 @@ from triaxcal.report.words.numbers import (
 from triaxcal.report.words.shares import ShareRow, share_rows
 from triaxcal.uncertainty.budget import Budget, Line
 from triaxcal.unit.choices import ESTIMATOR_WORDS
+from triaxcal.unit.equipment import EQUIPMENT
 
 _NEGLIGIBLE = 1e-9
 """Of the variance: no sensitivity is shown beside it."""
@@ -54,6 +57,7 @@ def passport_html(p: Passport) -> bytes:
     """HTML of a passport: no network, no clock, no script."""
     context = {
         "identity": _identity(p),
+        "stated": _stated(p),
         "badge": _badge(p.verdict),
         "verdict": p.verdict,
         "acceptance": [_acceptance(a, p) for a in p.acceptance],
@@ -120,6 +124,24 @@ def _identity(p: Passport) -> dict[str, Any]:
             ("Made by", f"triaxcal {__version__}, gcc {d.compiler}"),
             ("Inputs", f"sha256 {d.inputs_sha256[:16]}…"),
         ],
+    }
+
+
+def _stated(p: Passport) -> dict[str, Any]:
+    """What the laboratory states, what it does not state, and the equipment, a row for each."""
+    found = statements(p.delivery.unit)
+    single = [s for s in found if not s.number]
+    return {
+        "rows": [
+            (LABELS[s.name], value_words(s.value, s.unit)) for s in single if s.value is not None
+        ],
+        "missing": [LABELS[s.name] for s in single if s.value is None],
+        "heads": [LABELS[f"{EQUIPMENT.name}.{key.name}"] for key in EQUIPMENT.keys],
+        "equipment": [
+            [value_words(s.value, s.unit) for s in found if s.number == number]
+            for number in range(1, len(p.delivery.unit.equipment) + 1)
+        ],
+        "cautions": [caution_words(c) for c in cautions(p.delivery.unit)],
     }
 
 

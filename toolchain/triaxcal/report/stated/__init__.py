@@ -1,0 +1,1 @@
+"""What the laboratory states: key by key, and in words."""
