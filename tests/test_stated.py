@@ -172,15 +172,15 @@ CAUTIONS = [
     (
         whole().replace("due = 2026-11-05", "due = 2026-04-06", 1),
         (
-            "equipment, name <&> 1: its calibration was due on 2026-04-06, before the last day of the "
-            "measurements, 2026-04-07"
+            "equipment, name <&> 1: its calibration was due on 2026-04-06, before the last day of "
+            "the measurements, 2026-04-07"
         ),
     ),
     (
         whole().replace('certificate = "equipment, certificate <&> 1"\n', ""),
         (
-            "equipment, name <&> 1: number or day of its calibration certificate is not stated, so its "
-            "traceability is not shown"
+            "equipment, name <&> 1: number or day of its calibration certificate is not stated, so "
+            "its traceability is not shown"
         ),
     ),
     (
