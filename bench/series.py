@@ -123,7 +123,7 @@ def run(units: Path, build: Path, jobs: int, label: str, log: Path | None = None
             make_unit,
             lambda m, o: run_local(m, o, jobs),
             sometimes=SOMETIMES,
-            tell=tell,
+            report=tell,
         )
     series_files(series)
     row()

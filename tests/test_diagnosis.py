@@ -99,7 +99,9 @@ def test_the_quick_evidence_of_test_positions_is_the_careful_one() -> None:
     for some in (None, unused):
         careful = System(readings, None, some).fit(scales).log_evidence
         # Both lose 16 digits on the squares of rows that are 2 g off in 20 micro-g: 1e10.
-        assert log_evidence_of_tests(readings, scales, some) == pytest.approx(careful, abs=1e-3)
+        usual, found = log_evidence_of_tests(readings, [Scales(), scales], some)
+        assert found == pytest.approx(careful, abs=1e-3)
+        assert log_evidence_of_tests(readings, [Scales()], some) == pytest.approx([usual])
 
 
 def test_a_cause_of_ones_own_competes() -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -81,17 +82,25 @@ class CrossCheck:
 
 def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[VectorSet]:
     """Every temperature code x lattice, a boundary grid, ties, random in range, random int32."""
-    rng = np.random.Generator(np.random.PCG64(SEED))
     shape = plan.shape
-    low, high = plan.temp_min_code, plan.temp_max_code
+    limits = plan.temp_min_code, plan.temp_max_code, shape.raw_min, shape.raw_max
+    lattice, in_range, anything = _of_limits(*limits, random_vectors)
+    ties_of_plan = VectorSet("borders of rounding", *ties(plan))
+    return [lattice, _boundary(plan), ties_of_plan, in_range, anything]
+
+
+@lru_cache(maxsize=1)
+def _of_limits(
+    low: int, high: int, raw_min: int, raw_max: int, random_vectors: int
+) -> tuple[VectorSet, VectorSet, VectorSet]:
+    """The sets that depend on limits only: the units of a series share them."""
+    rng = np.random.Generator(np.random.PCG64(SEED))
     # Sorted temperatures: set_temperature runs once for equal codes, as on the device.
     codes = np.arange(low, high + 1, dtype=np.int32)
     each = rng.multinomial(random_vectors, np.full(len(codes), 1.0 / len(codes)))
     in_range = (
         np.repeat(codes, each),
-        rng.integers(
-            shape.raw_min, shape.raw_max, (random_vectors, 3), dtype=np.int32, endpoint=True
-        ),
+        rng.integers(raw_min, raw_max, (random_vectors, 3), dtype=np.int32, endpoint=True),
     )
     temps = -(-random_vectors // _SHARED_TEMP)
     temps_of_any = rng.integers(INT32_MIN, INT32_MAX, temps, dtype=np.int32, endpoint=True)
@@ -99,27 +108,28 @@ def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[Vector
         np.repeat(np.sort(temps_of_any), _SHARED_TEMP)[:random_vectors],
         rng.integers(INT32_MIN, INT32_MAX, (random_vectors, 3), dtype=np.int32, endpoint=True),
     )
-    return [
-        _lattice(plan),
-        _boundary(plan),
-        VectorSet("borders of rounding", *ties(plan)),
+    for array in (*in_range, *anything):
+        array.flags.writeable = False
+    return (
+        _lattice(low, high, raw_min, raw_max),
         VectorSet("random in range", *in_range),
         VectorSet("random int32", *anything),
-    ]
+    )
 
 
 def _product(name: str, temp: list[int], raw_axis: list[int]) -> VectorSet:
-    raw = np.array(list(itertools.product(raw_axis, repeat=3)), dtype=np.int32)
-    temps = np.repeat(np.array(temp, dtype=np.int32), len(raw))
-    return VectorSet(name, temps, np.tile(raw, (len(temp), 1)), exhaustive=True)
+    one = np.array(list(itertools.product(raw_axis, repeat=3)), dtype=np.int32)
+    temps = np.repeat(np.array(temp, dtype=np.int32), len(one))
+    raw = np.tile(one, (len(temp), 1))
+    temps.flags.writeable = raw.flags.writeable = False
+    return VectorSet(name, temps, raw, exhaustive=True)
 
 
-def _lattice(plan: Plan) -> VectorSet:
+def _lattice(low: int, high: int, raw_min: int, raw_max: int) -> VectorSet:
     """Every code of the range and two beyond each end x corners, faces, edges and centre."""
-    temps = list(range(plan.temp_min_code - 2, plan.temp_max_code + 3))
-    middle = (plan.shape.raw_min + plan.shape.raw_max) // 2
-    raw = [plan.shape.raw_min, middle + 1, plan.shape.raw_max]
-    return _product("every temperature code", temps, raw)
+    middle = (raw_min + raw_max) // 2
+    temps = list(range(low - 2, high + 3))
+    return _product("every temperature code", temps, [raw_min, middle + 1, raw_max])
 
 
 def _boundary(plan: Plan) -> VectorSet:
@@ -149,13 +159,17 @@ def python_routine(plan: Plan, rates: Int32Array | None = None) -> Routine:
         status = np.empty(len(temp), np.uint32)
         for start in range(0, len(temp), _BLOCK):
             block = slice(start, start + _BLOCK)
-            codes = temp[block].astype(np.int64)
-            index = np.clip(codes, plan.temp_min_code, plan.temp_max_code) - plan.temp_min_code
+            codes = temp[block]
+            clipped = np.clip(codes, plan.temp_min_code, plan.temp_max_code)
+            index = clipped.astype(np.int64) - plan.temp_min_code
             # One row for a whole block, as beyond the ends of the range, is broadcast.
             rows = _gather(table, index[:1] if (index == index[0]).all() else index)
-            offset, flags = rows[:, :, 3], np.zeros(len(codes), np.int64)
+            offset, flags = rows[:, :, 3], np.int64(STATUS_OK)
             if plan.rate is not None:
-                own = rates_of(plan.rate, codes) if rates is None else rates[block].astype(np.int64)
+                codes64 = codes.astype(np.int64)
+                own = (
+                    rates_of(plan.rate, codes64) if rates is None else rates[block].astype(np.int64)
+                )
                 offset, flags = add_rate(plan.rate, offset, own)
             state = State(rows[:, :, :3], offset)
             # Axis by axis in memory, as the integer model works.
@@ -163,8 +177,13 @@ def python_routine(plan: Plan, rates: Int32Array | None = None) -> Routine:
             force = forces_of(temp[block], raw[block]) if plan.shape.gyro else None
             result, sample = apply(plan, state, axes, force)
             accel[block] = result
-            low, high = codes < plan.temp_min_code, codes > plan.temp_max_code
-            status[block] = flags | sample | low * STATUS_TEMP_LOW | high * STATUS_TEMP_HIGH
+            status[block] = flags | sample
+            outside = np.flatnonzero(codes != clipped)
+            if len(outside):
+                low = codes[outside] < plan.temp_min_code
+                status[block][outside] |= np.where(low, STATUS_TEMP_LOW, STATUS_TEMP_HIGH).astype(
+                    np.uint32
+                )
         return accel, status
 
     return run

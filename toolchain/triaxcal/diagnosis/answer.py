@@ -16,7 +16,7 @@ from triaxcal.diagnosis.core.evidence import Judged
 from triaxcal.diagnosis.core.readings import Readings, readings_of
 from triaxcal.diagnosis.nextdwell import Request, next_dwell
 from triaxcal.diagnosis.ranking import TOGETHER, Ranked, rank
-from triaxcal.diagnosis.remaining import remaining
+from triaxcal.diagnosis.remaining import Remaining
 from triaxcal.fitting.recorded.wrong import MARGIN
 from triaxcal.model.positions import TEST_POSITIONS
 from triaxcal.readings.measurements import MeasurementSet
@@ -253,7 +253,7 @@ def diagnose(unit: UnitDescription, measurements: MeasurementSet) -> Diagnosis:
     readings = sound.readings
     base = sound.fit.log_evidence
     judged = {_suspect(r, j, readings, base): j for r in ranked for j in r.places}
-    found = answered(judged, remaining(readings), checks=not readings.test.all())
+    found = answered(judged, Remaining(readings), checks=not readings.test.all())
     shown = found.suspects
     near = len(shown) > 1 and shown[1].log_evidence > shown[0].log_evidence - _FAR_BEHIND
     if not (found.answer and near):
@@ -321,7 +321,7 @@ def _suspect(ranked: Ranked, judged: Judged, readings: Readings, base: float) ->
         judged.log_evidence - base,
         hypothesis.change,
         amplitudes,
-        remaining(mended),
+        Remaining(mended),
         ranked.cause.apart,
         name_of(ranked.cause, hypothesis),
         ranked.cause.spoils or hypothesis.spoils,

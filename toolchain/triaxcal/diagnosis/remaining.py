@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -18,21 +19,31 @@ _CURVES = {1: "a straight line", 2: "a quadratic", 3: "a cubic"}
 
 @dataclass(frozen=True)
 class Remaining:
-    """Errors in positions of temperatures that a polynomial has not seen.
+    """Errors in positions of temperatures that a polynomial has not seen, of some readings.
 
-    Attributes
-    ----------
-    curve : str
-        "a quadratic".
-    held_out_g : float
-        Rms over the outputs at each inner temperature held out in turn; NaN with too few.
-    checks_g : float
-        Rms of |a| - g in check positions; NaN without any.
+    They are computed when somebody asks: a series asks for the answer alone.
     """
 
-    curve: str
-    held_out_g: float
-    checks_g: float
+    readings: Readings = field(compare=False, repr=False)
+
+    @property
+    def curve(self) -> str:
+        """The polynomial that predicts best: "a quadratic"."""
+        return self._best[0]
+
+    @property
+    def held_out_g(self) -> float:
+        """Rms over the outputs at each inner temperature held out in turn; NaN with too few."""
+        return self._best[1]
+
+    @cached_property
+    def checks_g(self) -> float:
+        """Rms of |a| - g in check positions; NaN without any."""
+        return _of_checks(self.readings, self._best[2])
+
+    @cached_property
+    def _best(self) -> tuple[str, float, int]:
+        return _best_curve(self.readings)
 
     @property
     def held_out(self) -> str:
@@ -64,8 +75,8 @@ def in_words(value_g: float) -> str:
     return f"{value_g * 1e3:.3g} mg" if value_g < 0.9995 else f"{value_g:.3g} g"
 
 
-def remaining(readings: Readings) -> Remaining:
-    """Held-out errors of the polynomial that predicts best."""
+def _best_curve(readings: Readings) -> tuple[str, float, int]:
+    """The polynomial that predicts best, its held-out error in g, and its order."""
     test = readings.test
     blocks = [b for b in readings.blocks if test[readings.of_block(b)].all()]
     parts = [readings.of_block(b) for b in blocks]
@@ -80,11 +91,9 @@ def remaining(readings: Readings) -> Remaining:
         rms = float(np.sqrt(np.mean(np.concatenate(known) ** 2)))
         if not best[1] <= rms:
             best = (name, rms, order)
-    checks_g = _of_checks(readings, best[2])
     # Of three temperatures, two determine but a line: `calib` holds nothing out either.
     enough = len(np.unique(np.round(temps / 3.0))) >= LEAST_TEMPERATURES
-    held_out_g = best[1] if enough else float("nan")
-    return Remaining(best[0], held_out_g, checks_g)
+    return best if enough else (best[0], float("nan"), best[2])
 
 
 def _predicted(

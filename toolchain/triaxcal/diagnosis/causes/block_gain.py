@@ -12,7 +12,6 @@ from triaxcal.diagnosis.core.blocks import (
     at_temperatures,
     in_blocks,
     sets_of,
-    test_blocks,
     unlike,
 )
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Parameter, Undo
@@ -34,7 +33,7 @@ _SIZES = (1e-3, 10e-3, 100e-3)
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     readings = known.readings
-    count = len(test_blocks(readings))
+    count = len(readings.test_blocks)
     if count < 2:
         return
     scales = np.array([_scale(*change) for change in _CHANGES])
@@ -77,7 +76,7 @@ def _wrong_ones(
 ) -> tuple[float, tuple[int, ...]]:
     """Factor and blocks as they are named: those that the nominal sensitivity does not fit."""
     nominal = known.sensitivity_v_per_g
-    others = tuple(b for b in test_blocks(known.readings) if b not in blocks)
+    others = tuple(b for b in known.readings.test_blocks if b not in blocks)
     if nominal is None:
         return factor, blocks
     off = np.log(np.abs(known.readings.volts_per_g / nominal))[list(outputs)].mean()
@@ -101,7 +100,7 @@ def _divided(factor: float, outputs: Outputs, blocks: tuple[int, ...]) -> Undo:
 
 def _followers(readings: Readings) -> Iterator[tuple[int, ...]]:
     """One block, and two that follow each other in the order of the file; fewer than others."""
-    blocks = list(test_blocks(readings))
+    blocks = list(readings.test_blocks)
     for length in range(1, min(_LONGEST, max(len(blocks) // 2, 1)) + 1):
         for first in range(len(blocks) - length + 1):
             yield tuple(blocks[first : first + length])

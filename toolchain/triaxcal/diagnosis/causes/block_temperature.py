@@ -8,7 +8,7 @@ from math import comb
 
 import numpy as np
 
-from triaxcal.diagnosis.core.blocks import sets_of, test_blocks
+from triaxcal.diagnosis.core.blocks import sets_of
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, Undo
 from triaxcal.diagnosis.core.readings import FORCES, Readings, rows_in_words
 from triaxcal.fitting.tilter.temperatures import BELIEVED_DEGC
@@ -73,7 +73,7 @@ def _several(readings: Readings, mend: ToDegc) -> list[np.ndarray]:
     Of the constants of each block, curves over temperature leave a residual. The sets of test
     blocks with the smallest are proposed, alone and with the check blocks that agree.
     """
-    outputs = test_blocks(readings)
+    outputs = readings.test_blocks
     blocks = np.array(list(outputs))
     temps = np.array([readings.block_degc(b) for b in blocks])
     eligible = [

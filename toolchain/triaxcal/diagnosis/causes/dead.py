@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from triaxcal.diagnosis.core.blocks import at_temperatures, in_blocks, sets_of, test_blocks
+from triaxcal.diagnosis.core.blocks import at_temperatures, in_blocks, sets_of
 from triaxcal.diagnosis.core.cause import Cause, Hypothesis, Known, explained, unchanged
 from triaxcal.diagnosis.core.curves import powers
 from triaxcal.diagnosis.core.readings import Readings
@@ -20,7 +20,7 @@ _BIAS_SD = np.array([0.5, 0.03, 5e-3, 2e-3, 1e-3])
 
 def _hypotheses(known: Known) -> Iterator[Hypothesis]:
     readings = known.readings
-    blocks = list(test_blocks(readings))
+    blocks = list(readings.test_blocks)
     for i in range(3):
         silent = tuple(b for b in blocks if _is_silent(readings, in_blocks(readings, (b,)), i))
         if _is_silent(readings, readings.test, i):

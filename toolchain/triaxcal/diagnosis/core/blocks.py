@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from triaxcal.diagnosis.core.cause import Hypothesis, Undo
-from triaxcal.diagnosis.core.readings import FORCES, POSITIONS, Readings
+from triaxcal.diagnosis.core.readings import FORCES, Readings
 from triaxcal.model.types import BoolArray, FloatArray
 
 Changed = Callable[[FloatArray], FloatArray]
@@ -28,18 +28,6 @@ _APART = -3.0
 """Log probability that a mistake strikes at blocks that do not follow each other."""
 
 
-def test_blocks(readings: Readings) -> dict[int, FloatArray]:
-    """Outputs of the blocks that have all test positions, each of shape (6, 3)."""
-    names = np.array(readings.positions)
-    found = {}
-    for block in readings.blocks:
-        own = readings.of_block(block)
-        rows = [np.flatnonzero(own & (names == name)) for name in POSITIONS]
-        if all(len(r) == 1 for r in rows):
-            found[block] = readings.outputs[np.concatenate(rows)]
-    return found
-
-
 def unlike(
     readings: Readings, changes: Sequence[Key], changed: Changed
 ) -> Iterator[tuple[Key, tuple[int, ...]]]:
@@ -47,7 +35,7 @@ def unlike(
 
     `changed` gives outputs after each of the `changes`. All blocks alike are a set as well.
     """
-    outputs = test_blocks(readings)
+    outputs = readings.test_blocks
     if not outputs:
         return
     seen = set()
@@ -72,7 +60,7 @@ def struck_some(
     `described` gives for a change, its blocks and their place in words: how the change is undone,
     the text, and what it would change.
     """
-    count = len(test_blocks(readings))
+    count = len(readings.test_blocks)
     for key, blocks in unlike(readings, changes, changed):
         if len(blocks) == count:
             continue
@@ -89,7 +77,7 @@ def struck_some(
 
 def in_blocks(readings: Readings, blocks: tuple[int, ...]) -> BoolArray:
     """Mask of the dwells of some blocks."""
-    return np.asarray(np.isin(readings.block, blocks))
+    return np.asarray((readings.block[:, None] == blocks).any(axis=1))
 
 
 def sets_of(count: int) -> float:
@@ -102,7 +90,7 @@ def apart(readings: Readings, blocks: tuple[int, ...]) -> float:
 
     They may do so in the order of the file or in that of the temperatures.
     """
-    tests = list(test_blocks(readings))
+    tests = list(readings.test_blocks)
     by_temp = sorted(tests, key=readings.block_degc)
     return _APART * (min(_runs(order, blocks) for order in (tests, by_temp)) - 1)
 
@@ -114,7 +102,7 @@ def _runs(order: list[int], blocks: tuple[int, ...]) -> int:
 
 def at_temperatures(readings: Readings, blocks: tuple[int, ...]) -> str:
     """The place of a set of blocks in words: "at -40 and 20 degC", "at every temperature"."""
-    if len(blocks) > 1 and len(blocks) == len(test_blocks(readings)):
+    if len(blocks) > 1 and len(blocks) == len(readings.test_blocks):
         return "at every temperature"
     temps = [f"{t:.4g}" for t in sorted(readings.block_degc(b) for b in blocks)]
     listed = temps[0] if len(temps) == 1 else f"{', '.join(temps[:-1])} and {temps[-1]}"

@@ -82,13 +82,29 @@ class Readings:
         """Numbers of the blocks, in the order of measuring."""
         return tuple(int(b) for b in np.unique(self.block))
 
+    @cached_property
+    def test_blocks(self) -> dict[int, FloatArray]:
+        """Outputs of the blocks that have all test positions, by POSITIONS, each (6, 3)."""
+        names = np.array(self.positions)
+        found = {}
+        for block in self.blocks:
+            own = np.flatnonzero(self.block == block)
+            rows = [own[names[own] == name] for name in POSITIONS]
+            if all(len(r) == 1 for r in rows):
+                found[block] = self.outputs[np.concatenate(rows)]
+        return found
+
     def of_block(self, block: int) -> BoolArray:
         """Mask of the dwells of a block."""
         return np.asarray(self.block == block)
 
     def block_degc(self, block: int) -> float:
         """Mean temperature of a block."""
-        return float(self.temps_degc[self.block == block].mean())
+        return self._blocks_degc[block]
+
+    @cached_property
+    def _blocks_degc(self) -> dict[int, float]:
+        return {b: float(self.temps_degc[self.block == b].mean()) for b in self.blocks}
 
     @cached_property
     def rising(self) -> FloatArray:

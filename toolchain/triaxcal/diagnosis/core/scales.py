@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cache
 
 import numpy as np
 
@@ -46,6 +47,7 @@ _CHOICES: dict[str, tuple[tuple[float, ...], float, float]] = {
 """Values of each scale, and mean and standard deviation of its logarithm."""
 
 
+@cache
 def log_prior(scales: Scales) -> float:
     """Logarithm of what makes scales less probable than the usual ones; 0 for those.
 

@@ -48,9 +48,7 @@ class Screen:
         self._parts = [self._part(s, f) for s, f in zip(self.settings, fits, strict=True)]
         # The mistake has spoiled the scales that fit the readings as they are.
         self._firm = tuple(dict.fromkeys(replace(s, bend=0.0) for s in self.settings))
-        self._tests_alone = max(
-            log_evidence_of_tests(self.readings, s, system.unused) for s in self._firm
-        )
+        self._tests_alone = max(log_evidence_of_tests(self.readings, self._firm, system.unused))
         self._unchanged = [system.fit(s, added).log_evidence for s in self._firm]
         self._of_added = max(self._unchanged) - max(system.fit(s).log_evidence for s in self._firm)
 
@@ -117,19 +115,22 @@ class Screen:
         about = np.zeros(len(hypothesis.parameters))
         theta = self.system.linear_about if self.system.linear_about is not None else self.theta
         extra = hypothesis.columns(self.readings, theta, about) * self.system.used[:, None]
-        values = []
-        for base, root, projector, rest in self._parts:
+        Q, b = [], []
+        for _, root, projector, rest in self._parts:
             scaled = root[:, None] * extra
             inner = projector @ scaled
-            Q, b = scaled.T @ scaled - inner.T @ inner, scaled.T @ rest
-            each = []
-            for size in hypothesis.sizes:
-                A = size**2 * Q
-                A.flat[:: len(A) + 1] += 1.0
-                gain = 0.5 * size**2 * b @ np.linalg.solve(A, b)
-                each.append(base - 0.5 * np.linalg.slogdet(A)[1] + gain)
-            values.append(float(max(each)))
-        return values
+            Q.append(scaled.T @ scaled - inner.T @ inner)
+            b.append(scaled.T @ rest)
+        # Settings, sizes, amplitudes: all at once.
+        count = len(about)
+        variance = np.array([np.broadcast_to(size, count) for size in hypothesis.sizes]) ** 2
+        A = np.array(Q)[:, None] * variance[:, None, :] + np.eye(count)
+        right = np.array(b)[:, None, :, None]
+        found = np.linalg.solve(A, np.broadcast_to(right, (*A.shape[:3], 1)))[..., 0]
+        gain = 0.5 * (variance * right[..., 0] * found).sum(axis=2)
+        values = np.array([part[0] for part in self._parts])[:, None]
+        each = values - 0.5 * np.linalg.slogdet(A)[1] + gain
+        return [float(value) for value in each.max(axis=1)]
 
     def _discrete(self, hypothesis: Hypothesis) -> list[float]:
         """Evidence of one without amplitudes, at the settings without bends.
@@ -142,7 +143,7 @@ class Screen:
             unused = either(self.system.unused, hypothesis.unused)
             hypothesis = replace(hypothesis, unused=unused)
         mended = hypothesis.undo(self.readings, np.zeros(0))
-        alone = [log_evidence_of_tests(mended, s, hypothesis.unused) for s in self._firm]
+        alone = log_evidence_of_tests(mended, self._firm, hypothesis.unused)
         if self.readings.test.all() or hypothesis.blind:
             return [value + self._of_added for value in alone]
         gained = max(alone) + hypothesis.log_density - self._tests_alone
@@ -152,10 +153,12 @@ class Screen:
         return [system.fit(s).log_evidence + self._of_added for s in self._firm]
 
 
-def log_evidence_of_tests(readings: Readings, scales: Scales, unused: BoolArray | None) -> float:
+def log_evidence_of_tests(
+    readings: Readings, settings: Sequence[Scales], unused: BoolArray | None
+) -> list[float]:
     """Evidence of the test positions alone, as `System.fit` without bends has it, but sooner.
 
-    Without check dwells the three outputs have no parameter in common.
+    At each of the settings. Without check dwells the three outputs have no parameter in common.
     """
     test = readings.test
     force, outputs = readings.force[test], readings.outputs[test]
@@ -163,26 +166,30 @@ def log_evidence_of_tests(readings: Readings, scales: Scales, unused: BoolArray 
     basis = powers(readings.temps_degc[test], readings.t0_degc)
     one = np.concatenate([np.ones((count, 1)), force], axis=1)
     used = np.ones((count, 3), dtype=np.bool_) if unused is None else ~unused[test]
-    level = (np.abs(force) < 0.5) & used
-    variance = np.where(used, (readings.sd[test] * scales.noise) ** 2, WIDE)
-    root = (used / np.sqrt(variance + np.where(level, scales.tilt**2, 0.0))).T
+    level = ((np.abs(force) < 0.5) & used).T
+    noise, tilt, seat = (
+        np.array([[[getattr(s, name)]] for s in settings]) for name in ("noise", "tilt", "seat")
+    )
+    variance = np.where(used.T, (readings.sd[test].T * noise) ** 2, WIDE)
+    root = used.T / np.sqrt(variance + np.where(level, tilt**2, 0.0))
     names = np.array([p for p, t in zip(readings.positions, test, strict=True) if t])
-    own = np.array([names == p for p in POSITIONS]).T * scales.seat
+    own = np.array([names == p for p in POSITIONS]).T
     first = 4 * ORDERS
-    sd = prior_sd(scales).reshape(3, 1, first)
-    whole = np.empty((3, count, first + len(POSITIONS) + 2))
-    whole[:, :, :first] = (one[:, :, None] * basis[:, None, :]).reshape(count, first) * sd
-    whole[:, :, first] = SQUARE_SD * force.T**2
-    whole[:, :, first + 1 : -1] = own * level.T[:, :, None]
-    whole[:, :, -1] = (outputs - force).T
-    whole *= root[:, :, None]
-    A = np.swapaxes(whole, 1, 2) @ whole
-    diagonal = np.einsum("ijj->ij", A)
-    diagonal[:, :-1] += 1.0
-    floor = ROUNDING * (1.0 + diagonal[:, -1])
-    diagonal[:, -1] += floor
-    ends = np.einsum("ijj->ij", np.linalg.cholesky(A))
-    unexplained = float((ends[:, -1] ** 2 - floor).sum())
-    norm = np.log(np.where(used.T, root, 1.0 / np.sqrt(WIDE))).sum() - np.log(ends[:, :-1]).sum()
+    sd = np.array([prior_sd(s).reshape(3, 1, first) for s in settings])
+    whole = np.empty((len(settings), 3, count, first + len(POSITIONS) + 2))
+    whole[..., :first] = (one[:, :, None] * basis[:, None, :]).reshape(count, first) * sd
+    whole[..., first] = SQUARE_SD * force.T**2
+    whole[..., first + 1 : -1] = (own * level[:, :, None]) * seat[..., None]
+    whole[..., -1] = (outputs - force).T
+    whole *= root[..., None]
+    A = np.swapaxes(whole, 2, 3) @ whole
+    diagonal = np.einsum("...jj->...j", A)
+    diagonal[..., :-1] += 1.0
+    floor = ROUNDING * (1.0 + diagonal[..., -1])
+    diagonal[..., -1] += floor
+    ends = np.einsum("...jj->...j", np.linalg.cholesky(A))
+    unexplained = (ends[..., -1] ** 2 - floor).sum(axis=1)
+    norm = np.log(np.where(used.T, root, 1.0 / np.sqrt(WIDE))).sum(axis=(1, 2))
+    norm -= np.log(ends[..., :-1]).sum(axis=(1, 2))
     evidence = -0.5 * unexplained + norm - 1.5 * count * np.log(2.0 * np.pi)
-    return float(evidence) + log_prior_of_scales(scales)
+    return [float(e) + log_prior_of_scales(s) for e, s in zip(evidence, settings, strict=True)]

@@ -270,10 +270,13 @@ class System:
             sd = np.concatenate([sd, np.full(k, added.size)])
             y = y + extra @ added.about
         root = 1.0 / np.sqrt(self.row_variance(scales))
-        Gs, ys = (root[:, None] * G) * sd, root * y
         # The last row of the root of [[A, b], [b', y'y]] is L^-1 b, and then what is not explained.
-        p = Gs.shape[1]
-        whole = np.concatenate([Gs, ys[:, None]], axis=1)
+        p = G.shape[1]
+        whole = np.empty((len(y), p + 1))
+        Gs, ys = whole[:, :p], whole[:, p]
+        np.multiply(G, root[:, None], out=Gs)
+        Gs *= sd
+        np.multiply(root, y, out=ys)
         A = whole.T @ whole
         A.flat[: p * (p + 2) : p + 2] += 1.0
         floor = ROUNDING * (1.0 + A[p, p])
