@@ -164,7 +164,7 @@ def python_routine(plan: Plan, rates: Int32Array | None = None) -> Routine:
             index = clipped.astype(np.int64) - plan.temp_min_code
             # One row for a whole block, as beyond the ends of the range, is broadcast.
             rows = _gather(table, index[:1] if (index == index[0]).all() else index)
-            offset, flags = rows[:, :, 3], np.int64(STATUS_OK)
+            offset, flags = rows[:, :, 3], np.zeros(1, np.int64)
             if plan.rate is not None:
                 codes64 = codes.astype(np.int64)
                 own = (
