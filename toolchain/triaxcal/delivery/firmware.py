@@ -138,15 +138,18 @@ def make_firmware(fitted: Fitted) -> Firmware:
     Raises
     ------
     RefusedError
-        When no integers of the format hold the functions, or they miss the fitted model by more
-        than [compensation] model_error_max_micro_g.
+        When no integers of the format hold the functions, they miss the fitted model by more than
+        [compensation] model_error_max_micro_g, or a binary decision rule refuses the unit.
     """
     unit, calibration = fitted.unit, fitted.calibration
     compensation = compensation_of(unit, calibration, unit.method)
     plan = replace(make_plan(compensation, unit), reading=calibration.reading_unit)
     error_g = model_error_g(unit, calibration.thermal, plan)
     _refuse_model_error(unit, plan, error_g)
-    return Firmware(fitted, compensation, plan, error_g)
+    made = Firmware(fitted, compensation, plan, error_g)
+    if unit.limits.rule.binary and made.verdict.refusal is not None:
+        raise made.verdict.refusal
+    return made
 
 
 def compensation_of(unit: UnitDescription, calibration: Calibration, method: str) -> Compensation:

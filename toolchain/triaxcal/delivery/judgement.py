@@ -1,8 +1,9 @@
 """Whether a calibration keeps its unit's limits.
 
 Three things are held against each limit: the residual at the fitted dwells, the error at what was
-held out, and the largest error with the uncertainty of |a|. The first two refuse. The third decides
-whether the unit has passed: where it reaches beyond a limit, the limit is not shown to hold.
+held out, and the largest error with the guard band of the decision rule, by default the uncertainty
+of |a|. The first two refuse. The third decides whether the unit has passed: where it reaches beyond
+a limit, the limit is not shown to hold, or by a binary rule it is refused.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from triaxcal.delivery.verdict import (
     AT_DWELLS,
     AT_POSES,
     COMPONENTS,
+    DECISIVE,
+    GUARDED,
     HELD_OUT,
     NOT_CHECKED,
     NOT_SHOWN,
@@ -73,7 +76,7 @@ def verdict_on(fitted: Fitted, errors_g: FloatArray, found: Uncertainty) -> Verd
     tested = tuple(_tested(fitted, errors_g))
     if recording is not None and not recording.checked:
         return Verdict(NOT_CHECKED, None, tested, (), _held_out_g(calibration))
-    tested += tuple(_with_uncertainty(fitted, errors_g, found))
+    tested += tuple(_with_guard_band(fitted, errors_g, found))
     untested = (*not_tested(unit, calibration), *_without_dwells(unit, tested))
     unknown = [s for s in found.sources if s.unknown]
     if not untested and unknown:
@@ -83,10 +86,29 @@ def verdict_on(fitted: Fitted, errors_g: FloatArray, found: Uncertainty) -> Verd
     if untested:
         result = AT_DWELLS if recording is None else AT_POSES
     contradicts = contradictions(unit, calibration)
-    if contradicts or any(t.beyond for t in tested if t.what == UNCERTAINTY):
+    refusal = _in_guard_band(unit, tested)
+    if refusal is not None:
+        result = REFUSED
+    elif contradicts or any(t.beyond for t in tested if t.what in DECISIVE):
         result = NOT_SHOWN
-    note = _estimated(calibration)
-    return Verdict(result, None, tested, untested, _held_out_g(calibration), note, contradicts)
+    note, held_out_g = _estimated(calibration), _held_out_g(calibration)
+    rule = "" if unit.limits.rule_is_default else unit.limits.rule_words
+    return Verdict(result, refusal, tested, untested, held_out_g, note, contradicts, rule)
+
+
+def _in_guard_band(unit: UnitDescription, tested: Sequence[LimitCheck]) -> RefusedError | None:
+    """Refusal by a binary rule of an error that the guard band does not leave below its limit."""
+    beyond = [t for t in tested if t.what in DECISIVE and t.beyond]
+    if not unit.limits.rule.binary or not beyond:
+        return None
+    return RefusedError(
+        f"{unit.source}, [limits] decision_rule",
+        "; ".join(map(str, beyond)),
+        expected=f"error and {DECISIVE[beyond[0].what]} within the limit, by the "
+        f"{unit.limits.rule_words}",
+        remedy='make the uncertainty smaller, or choose "guard-band", which delivers it as not '
+        "shown to pass",
+    )
 
 
 def _held_out_g(calibration: Calibration) -> float | None:
@@ -212,15 +234,19 @@ def _components(unit: UnitDescription, calibration: Calibration) -> Iterator[Lim
             yield LimitCheck(where, limit_g, largest, count, COMPONENTS, rms=True)
 
 
-def _with_uncertainty(
+def _with_guard_band(
     fitted: Fitted, errors_g: FloatArray, found: Uncertainty
 ) -> Iterator[LimitCheck]:
-    """The largest error at any dwell or pose, and the uncertainty (95 %) of |a| beside it."""
+    """The largest error at any dwell or pose, and the guard band of the decision rule beside it."""
+    limits = fitted.unit.limits
+    if not limits.rule.guarded:
+        return
+    what = UNCERTAINTY if limits.guard_band_g is None else GUARDED
     unsure = temperatures_untested(fitted.unit, fitted.calibration)
     whole = not unsure and not any(s.unknown for s in found.sources)
     uncertain = dict(zip((AT_T0, OVER_RANGE), found.length_g, strict=True))
     by_place = _by_place(fitted, errors_g, checks=None)
     for where, limit_g in _places(fitted.unit, fitted.calibration.range_degc).items():
         own = by_place[where]
-        largest = max(own, default=0.0) + uncertain[where]
-        yield LimitCheck(where, limit_g, largest, len(own), UNCERTAINTY, whole)
+        largest = max(own, default=0.0) + limits.guard_g(uncertain[where])
+        yield LimitCheck(where, limit_g, largest, len(own), what, whole)

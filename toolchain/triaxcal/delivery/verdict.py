@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from triaxcal.base.errors import RefusedError
 
-RESIDUAL, HELD_OUT, COMPONENTS, UNCERTAINTY = (
-    "residual", "held out", "held out, a component", "with uncertainty",
+RESIDUAL, HELD_OUT, COMPONENTS, UNCERTAINTY, GUARDED = (
+    "residual", "held out", "held out, a component", "with uncertainty", "with guard band",
 )  # fmt: skip
 PASSED, AT_DWELLS, AT_POSES, NOT_SHOWN, NOT_CHECKED, REFUSED = (
     "passed", "passed at the dwells", "passed at the poses", "not shown", "not checked", "refused",
@@ -22,7 +22,10 @@ _ROWS = {
     HELD_OUT: "held out",
     COMPONENTS: "held out, of a component",
     UNCERTAINTY: "with uncertainty (95 %)",
+    GUARDED: "with guard band",
 }
+DECISIVE = {UNCERTAINTY: "uncertainty (95 %)", GUARDED: "guard band"}
+"""What decides by a decision rule with a guard band, and what is added to the error there."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,8 @@ class LimitCheck:
     what : str
         "residual" at the dwells or poses of the fit; "held out", at check dwells, and at
         temperatures or poses held out; "held out, a component" of the force, there; "with
-        uncertainty", the largest error with the uncertainty (95 %) of |a|.
+        uncertainty", the largest error with the uncertainty (95 %) of |a|; "with guard band", the
+        same with a guard band that unit.toml states.
     whole : bool
         False where a source of the uncertainty is unknown: `largest_g` is without it.
     rms : bool
@@ -70,7 +74,7 @@ class LimitCheck:
             return f"{what}: not tested"
         more = " rms" * self.rms + " and what is unknown" * (not self.whole)
         words = f"{what}: {self.largest_g * 1e3:.4g} mg{more}, limit {self.limit_g * 1e3:g} mg"
-        return words if self.what == UNCERTAINTY else f"{words}, {self.dwells} dwells"
+        return words if self.what in DECISIVE else f"{words}, {self.dwells} dwells"
 
 
 @dataclass(frozen=True, repr=False)
@@ -96,6 +100,8 @@ class Verdict:
         How a held-out error was estimated, where it is not that of the delivered curves; or "".
     contradicts : tuple of str
         What is known beforehand and contradicts the result, in words.
+    rule : str
+        The decision rule, where unit.toml states another than the default; or "".
     """
 
     result: str
@@ -105,6 +111,7 @@ class Verdict:
     held_out_g: float | None
     note: str = ""
     contradicts: tuple[str, ...] = ()
+    rule: str = ""
 
     @property
     def passed(self) -> bool:
@@ -124,17 +131,18 @@ class Verdict:
     @property
     def words(self) -> str:
         """The verdict in words."""
-        found = [t for t in self.tested if t.what == UNCERTAINTY and t.beyond]
+        found = [t for t in self.tested if t.what in DECISIVE and t.beyond]
+        rule = [f"by {self.rule}"] if self.rule else []
         if self.result != NOT_SHOWN:
-            return "; ".join([self.result, *self.not_tested])
+            return "; ".join([self.result, *rule, *self.not_tested])
         reached = ", ".join(
             f"{t.largest_g * 1e3:.3g} mg {t.where} (limit {t.limit_g * 1e3:g} mg)" for t in found
         )
         reasons = [*self.contradicts]
         if found:
-            reasons.append(f"error and uncertainty (95 %) reach {reached}")
+            reasons.append(f"error and {DECISIVE[found[0].what]} reach {reached}")
         head = f"not shown to be within the limits: {reasons[0]}"
-        return "; ".join([head, *reasons[1:], *self.not_tested])
+        return "; ".join([head, *reasons[1:], *rule, *self.not_tested])
 
     @property
     def heads(self) -> tuple[str, ...]:
@@ -145,12 +153,12 @@ class Verdict:
     def rows(self) -> tuple[tuple[str, ...], ...]:
         """What was held against the limits, in mg, and last the limits."""
         found = []
-        for what in (RESIDUAL, HELD_OUT, COMPONENTS, UNCERTAINTY):
+        for what, words in _ROWS.items():
             own = {t.where: t for t in self.tested if t.what == what}
             if own:
                 rms = ", rms" * any(t.rms for t in own.values())
                 cells = (_cell(own.get(where)) for where in self.heads[1:])
-                found.append((_ROWS[what] + rms, *cells))
+                found.append((words + rms, *cells))
         limits = {t.where: f"{t.limit_g * 1e3:g}" for t in self.tested}
         return (*found, ("limit", *limits.values()))
 

@@ -30,7 +30,7 @@ from triaxcal.unit.folder import (
     refuse_duplicate_serial,
 )
 from triaxcal.unit.gravity import gravity_difference_m_per_s2, refuse_wrong_gravity
-from triaxcal.unit.limits import LIMITS, RECORDED_LIMITS, Limits
+from triaxcal.unit.limits import LIMITS, RECORDED_LIMITS, Limits, limits_of
 from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.pair import QUADRATIC, PairSource, pair_source
 from triaxcal.unit.prefix import DEFAULT_PREFIX
@@ -217,7 +217,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         method=compensation.method,
         output_q=compensation.output_q,
         model_error_max_micro_g=compensation.model_error_max_micro_g,
-        limits=tables["limits"].record(Limits),
+        limits=limits_of(tables["limits"]),
         stated=tables["uncertainty"].record(StatedUncertainty),
         certificate=details,
         recording=recording,

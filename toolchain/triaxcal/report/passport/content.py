@@ -15,7 +15,7 @@ from triaxcal.delivery.causes import DOUBT, causes_of
 from triaxcal.delivery.judgement import limits_that_apply
 from triaxcal.delivery.posecauses import causes_of_poses, doubtful_poses
 from triaxcal.delivery.unit import Delivery
-from triaxcal.delivery.verdict import UNCERTAINTY, Verdict, worst
+from triaxcal.delivery.verdict import DECISIVE, Verdict, worst
 from triaxcal.device.record import DeviceRecord
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.evaluate import LENGTH, Uncertainty
@@ -37,6 +37,8 @@ class Acceptance:
         Expanded uncertainty of |a| in the worst orientation, and temperature.
     cause : str
         The worst source of that uncertainty.
+    guard_g : float
+        Guard band of the decision rule.
     advice : str
         What would make it smaller.
     """
@@ -47,16 +49,22 @@ class Acceptance:
     uncertainty_g: float
     cause: str
     advice: str
+    guard_g: float
+
+    @property
+    def acceptance_g(self) -> float:
+        """Acceptance limit: the limit less the guard band."""
+        return self.limit_g - self.guard_g
 
     @property
     def shown(self) -> bool:
-        """Whether the limit holds with the whole 95 % interval inside it."""
-        return self.largest_g + self.uncertainty_g <= self.limit_g
+        """Whether the limit holds by the decision rule: with the guard band inside it."""
+        return self.largest_g + self.guard_g <= self.limit_g
 
     @property
     def factor(self) -> float:
-        """Interval's end as a multiple of the limit."""
-        return (self.largest_g + self.uncertainty_g) / self.limit_g
+        """Error and guard band as a multiple of the limit."""
+        return (self.largest_g + self.guard_g) / self.limit_g
 
 
 @dataclass(frozen=True)
@@ -129,7 +137,7 @@ class Passport:
         worst = int(np.argmax(u.force_u[u.t0_index, :, LENGTH]))
         t0_budget = u.force_budget(LENGTH, u.t0_index, DIRECTIONS[worst])
         return tuple(
-            _acceptance(where, limit_g, dwells, budget)
+            _acceptance(where, limit_g, dwells, budget, limits.guard_g(budget.expanded))
             for where, limit_g, dwells, budget in (
                 ("at T0", limits.at_t0_g, at_t0, t0_budget),
                 ("over the range", limits.over_range_g, others, self.length_budget),
@@ -150,7 +158,7 @@ class Passport:
         done = self.delivery
         if done.calibration.recording is not None:
             return self._cause_of_poses
-        errors = [t for t in self.verdict.tested if t.what != UNCERTAINTY]
+        errors = [t for t in self.verdict.tested if t.what not in DECISIVE]
         if worst(errors) <= DOUBT:
             return ""
         found = causes_of(done.unit, done.measurements, done.calibration)
@@ -179,10 +187,10 @@ def passport(
 
 
 def _acceptance(
-    where: str, limit_g: float, residuals: list[Residual], budget: Budget
+    where: str, limit_g: float, residuals: list[Residual], budget: Budget, guard_g: float
 ) -> Acceptance:
     worst = next(line for line in budget.lines if line.contribution is not None)
     largest = max(abs(r.error_g) for r in residuals)
     return Acceptance(
-        where, limit_g, largest, budget.expanded, worst.source.name, worst.source.advice
+        where, limit_g, largest, budget.expanded, worst.source.name, worst.source.advice, guard_g
     )

@@ -56,6 +56,10 @@ def _judged(p: Passport) -> dict[str, Any]:
     return {
         "result": p.verdict.result,
         "verdict": p.verdict.words,
+        "decision_rule": {
+            "name": p.delivery.unit.limits.decision_rule,
+            "words": p.delivery.unit.limits.rule_words,
+        },
         "not_tested": list(p.verdict.not_tested),
         "tested": [
             {
@@ -75,6 +79,8 @@ def _judged(p: Passport) -> dict[str, Any]:
                 "limit_g": a.limit_g,
                 "largest_residual_g": a.largest_g,
                 "expanded_uncertainty_g": a.uncertainty_g,
+                "guard_band_g": a.guard_g,
+                "acceptance_limit_g": a.acceptance_g,
                 "shown_with_uncertainty": a.shown,
                 "interval_over_limit": a.factor,
                 "worst_source": a.cause,

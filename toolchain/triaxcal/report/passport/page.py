@@ -8,7 +8,7 @@ from triaxcal import __version__
 from triaxcal.codegen.templates import environment
 from triaxcal.codegen.tryout import MethodResult
 from triaxcal.delivery.firmware import fitted_to
-from triaxcal.delivery.verdict import NOT_CHECKED, NOT_SHOWN, PASSED, Verdict
+from triaxcal.delivery.verdict import NOT_CHECKED, NOT_SHOWN, PASSED
 from triaxcal.fitting.converter import input_words
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import CONSTANT_NAMES
@@ -23,7 +23,7 @@ from triaxcal.report.pictures.curves import (
 )
 from triaxcal.report.pictures.residual_panels import residual_panels
 from triaxcal.report.stated.statements import cautions, statements
-from triaxcal.report.stated.words import LABELS, caution_words, value_words
+from triaxcal.report.stated.words import LABELS, added_words, caution_words, value_words
 from triaxcal.report.words.device import device_not_counted, device_words
 from triaxcal.report.words.firmware import (
     checked_words,
@@ -58,7 +58,8 @@ def passport_html(p: Passport) -> bytes:
     context = {
         "identity": _identity(p),
         "stated": _stated(p),
-        "badge": _badge(p.verdict),
+        "badge": _badge(p),
+        "rule": p.delivery.unit.limits.rule_words,
         "verdict": p.verdict,
         "acceptance": [_acceptance(a, p) for a in p.acceptance],
         "unchecked": p.unchecked,
@@ -88,15 +89,16 @@ def passport_html(p: Passport) -> bytes:
     return environment().get_template("pages/passport.html.j2").render(context).encode()
 
 
-_NOT_SHOWN = ("the uncertainty reaches beyond a limit", "the scale contradicts the readings' unit")
-
-
-def _badge(verdict: Verdict) -> dict[str, Any]:
+def _badge(p: Passport) -> dict[str, Any]:
     """The verdict in large letters, and what it leaves open."""
+    verdict, added = p.verdict, added_words(p.delivery.unit.limits)
     why = "; ".join(verdict.not_tested) or "see below"
+    counted = f"{added} included" if added else "uncertainty not counted"
+    beyond = f"the {added} reaches beyond a limit"
+    unfit = "the scale contradicts the readings' unit"
     result, small = {
-        PASSED: (PASSED, "within the limits, uncertainty included"),
-        NOT_SHOWN: ("not shown to pass", _NOT_SHOWN[bool(verdict.contradicts)]),
+        PASSED: (PASSED, f"within the limits, {counted}"),
+        NOT_SHOWN: ("not shown to pass", unfit if verdict.contradicts else beyond),
         NOT_CHECKED: (NOT_CHECKED, "as many constants as poses"),
     }.get(verdict.result, (verdict.result, why))
     return {"good": verdict.shown, "result": result.upper(), "small": small}
@@ -162,17 +164,20 @@ def _findings(p: Passport) -> tuple[str, ...]:
 
 def _acceptance(a: Acceptance, p: Passport) -> dict[str, Any]:
     checked = p.verdict.checked
-    unknown = [line.source.name for line in p.length_budget.unknown]
+    added = added_words(p.delivery.unit.limits)
+    unknown = [line.source.name for line in p.length_budget.unknown if added]
     factor = significant(a.factor, 2)
     if not checked:
         text = "not checked: there are as many constants as poses, so the residuals are 0"
     elif a.shown and unknown:
         text = f"within the limit, with what is known; not in it: {', '.join(unknown)}"
+    elif a.shown and not added:
+        text = "the limit holds; the uncertainty is not counted"
     elif a.shown:
-        text = "the limit holds, the whole uncertainty included"
+        text = f"the limit holds, the whole {added} included"
     else:
         text = (
-            f"the residuals are within the limit, but residual and uncertainty together reach "
+            f"the residuals are within the limit, but residual and {added} together reach "
             f"{factor} times the limit; the main cause is {a.cause}; {a.advice}"
         )
     scale = max(a.limit_g, a.largest_g + a.uncertainty_g)
@@ -181,6 +186,7 @@ def _acceptance(a: Acceptance, p: Passport) -> dict[str, Any]:
         "limit": g_in_words(a.limit_g),
         "largest": g_in_words(a.largest_g),
         "uncertainty": g_in_words(a.uncertainty_g) if checked else "unknown",
+        "acceptance": g_in_words(a.acceptance_g) if a.acceptance_g > 0.0 else "none",
         "shown": a.shown and checked and not unknown,
         "text": text,
         "largest_width": round(100 * a.largest_g / scale, 2),

@@ -14,6 +14,7 @@ from triaxcal.report.stated.statements import (
     Caution,
     Value,
 )
+from triaxcal.unit.limits import Limits
 
 LABELS: Mapping[str, str] = MappingProxyType(
     {
@@ -66,6 +67,13 @@ def value_words(value: Value | None, unit: str) -> str:
     else:
         words = f"{value:g}" if isinstance(value, float) else str(value)
     return f"{words} {unit}".strip()
+
+
+def added_words(limits: Limits) -> str:
+    """What the decision rule adds to an error; "" for nothing."""
+    if not limits.rule.guarded:
+        return ""
+    return "uncertainty" if limits.guard_band_g is None else "guard band"
 
 
 _CAUTIONS = {
