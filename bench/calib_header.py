@@ -20,7 +20,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from triaxcal.codegen.compiler import FLAGS, find_compiler
+from triaxcal.codegen.compiler import FLAGS
+from triaxcal.codegen.compilers import find_compiler
 
 ROOT = Path(__file__).resolve().parents[1]
 ROUNDS = 9
@@ -46,7 +47,7 @@ def measure(unit: str) -> None:
         generated = Path(folder) / "build" / unit
         floor = [
             [sys.executable, "-c", "import numpy, scipy, jinja2"],
-            [find_compiler(), *FLAGS, "-shared", "-fPIC", "-o", "floor.so",
+            [*find_compiler().command, *FLAGS, "-shared", "-fPIC", "-o", "floor.so",
              f"-I{generated}", str(generated / "triax_comp.c"), str(generated / "triax_calib.c"),
              str(ROOT / "firmware_ref" / "triax_batch.c")],
         ]  # fmt: skip

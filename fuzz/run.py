@@ -20,15 +20,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.base.shipped import shipped
+from triaxcal.base.tools import TOOLS, MissingToolError
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 from triaxcal.verify.shapes import SHAPES, subject
 from triaxcal.verify.table import table
-from triaxcal.verify.tools import Answer, MissingToolError, Tool, run
+from triaxcal.verify.tools import Answer, run
 from triaxcal.verify.workspace import IMAGE, ROUTINE, Workspace
 
 HERE = Path(__file__).parent
 CORPUS = HERE / "corpus"
-CLANG = Tool("clang", "clang libclang-rt-dev")
+CLANG = TOOLS["clang"]
 FLAGS = (
     "-std=c99", "-g", "-O1", "-fsanitize=fuzzer,address,undefined",
     "-fno-sanitize-recover=undefined",
@@ -162,7 +163,7 @@ def _compile(program: Path, sources: list[Path], include: list[Path], more: list
     ]  # fmt: skip
     answer = run(command, HERE)
     if answer.code and "cannot find" in answer.text and "libclang_rt" in answer.text:
-        raise MissingToolError(f"clang has no libFuzzer; sudo apt-get install {CLANG.package}")
+        raise MissingToolError(f"clang has no libFuzzer; {CLANG.install_command()}")
     if answer.code:
         raise SystemExit(f"fuzz: {program.name} does not compile:\n{answer.text}")
 

@@ -25,6 +25,7 @@ from plans import (
 )
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.shipped import shipped
+from triaxcal.base.tools import TOOLS, install_advice, missing_tools
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import render_routine
@@ -68,9 +69,9 @@ def case_named(name: str) -> Case:
 
 
 def need(*tools: str) -> None:
-    missing = cores.missing_tools(tools)
+    missing = missing_tools(tools)
     if missing:
-        pytest.skip(f"{', '.join(missing)} not found: {cores.install_advice(missing)}")
+        pytest.skip(f"{', '.join(missing)} not found: {install_advice(missing)}")
 
 
 def run_on_host(case: Case, folder: Path, arithmetic: int = 0) -> str:
@@ -168,7 +169,7 @@ def test_missing_tool_is_named_and_not_done(monkeypatch: pytest.MonkeyPatch) -> 
     assert outcomes[0].status == NOT_DONE
     assert outcomes[0].detail == (
         "clang, arm-none-eabi-gcc, qemu-system-arm not found: "
-        "sudo apt-get install clang gcc-arm-none-eabi qemu-system-arm"
+        "sudo apt-get install clang libclang-rt-dev gcc-arm-none-eabi qemu-system-arm"
     )
     assert counts(outcomes) == {PASSED: 0, FAILED: 0, NOT_DONE: 1}
     table = matrix_table(outcomes)
@@ -179,7 +180,7 @@ def test_missing_tool_is_named_and_not_done(monkeypatch: pytest.MonkeyPatch) -> 
 def test_every_tool_has_a_package() -> None:
     for core in cores.CORES:
         for compiler in COMPILERS:
-            assert set(core.tools(compiler)) <= set(cores.PACKAGES)
+            assert set(core.tools(compiler)) <= set(TOOLS)
 
 
 def test_matrix_is_as_large_as_promised() -> None:

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from triaxcal.base.shipped import shipped
+from triaxcal.base.tools import install_advice, missing_tools
 from triaxcal.codegen.shim import write_shim
 from triaxcal.model.terms import NO_TERMS
 from triaxcal.targets.build import Toolset, _support, compiled, emulate, link_command, run
-from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
+from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.matrix import PORTABLE, THUMB2, compare
 from triaxcal.targets.shapes import Case, made_case
 from triaxcal.targets.vectors import case_header, expected_lines

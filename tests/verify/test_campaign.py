@@ -9,13 +9,14 @@ import pytest
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes
+from triaxcal.base.tools import MissingToolError, Tool
 from triaxcal.verify import campaign
 from triaxcal.verify.campaign import CHECKS, exit_code, verify_files
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 from triaxcal.verify.record import FILE, entries, is_delivered, record
 from triaxcal.verify.shapes import Subject
 from triaxcal.verify.table import table
-from triaxcal.verify.tools import BrokenToolError, MissingToolError, Tool, run
+from triaxcal.verify.tools import BrokenToolError, run
 
 PASS = Outcome("a", "check a", PASSED, "0 alarms", {"alarms": 0})
 FAIL = Outcome("b", "check b", FAILED, "12 alarms", {"alarms": 12}, tuple(map(str, range(12))))
@@ -70,7 +71,7 @@ def test_no_result_but_three() -> None:
 
 def test_missing_tool_is_named_with_its_package() -> None:
     with pytest.raises(MissingToolError, match="no-such-tool not found; sudo apt-get install pkg"):
-        Tool("no-such-tool", "pkg").find()
+        Tool("no-such-tool", "pkg", "nothing").find()
 
 
 def test_a_killed_tool_is_broken(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -144,8 +143,9 @@ class Firmware:
         RefusedError
             When there is no C compiler, or it refuses.
         """
-        with tempfile.TemporaryDirectory(prefix="triaxcal-") as name:
-            folder = Path(name)
+        from triaxcal.codegen.compiler import library_folder  # noqa: PLC0415
+
+        with library_folder() as folder:
             for file, content in self.files.items():
                 (folder / file).write_bytes(content)
             yield CompiledFirmware(self, start_generated(folder, folder, self.plan.prefix).load())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import subprocess
 import sys
 from functools import cache
 from importlib import metadata
@@ -11,7 +10,7 @@ from pathlib import Path
 
 from triaxcal import __version__
 from triaxcal.base.shipped import shipped
-from triaxcal.codegen.compiler import find_compiler
+from triaxcal.codegen.compilers import find_compiler
 from triaxcal.codegen.outputs.registry import OUTPUTS
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
@@ -57,8 +56,8 @@ def _toolchain(entries: tuple[tuple[str, ...], ...]) -> str:
             digest.update(hashlib.sha256(Path(file).read_bytes()).digest())
     packages = sorted({"numpy", "scipy", *(f.package for f in FORMATS if f.package)})
     digest.update(f"{[_version(p) for p in packages]} {sys.version_info[:2]}".encode())
-    version = subprocess.run([find_compiler(), "--version"], capture_output=True, check=False)
-    digest.update(version.stdout)
+    compiler = find_compiler()
+    digest.update(f"{compiler.name} {compiler.version()}".encode())
     return f"{__version__} {digest.hexdigest()[:16]}"
 
 

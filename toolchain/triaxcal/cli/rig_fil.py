@@ -11,7 +11,8 @@ from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.shipped import shipped
-from triaxcal.codegen.compiler import FLAGS, find_compiler
+from triaxcal.codegen.compiler import FLAGS
+from triaxcal.codegen.compilers import find_compiler
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.codegen.shim import write_shim
 from triaxcal.delivery.unit import deliver
@@ -90,13 +91,14 @@ def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
         *(folder / name for name in files if name.endswith(".c")),
     ]
     include = [folder, *write_shim(folder / "names", setup.unit.prefix), ours]
-    command = [find_compiler(), *FLAGS, *(f"-I{path}" for path in include), "-o", str(program)]
+    compiler = find_compiler()
+    command = [*compiler.command, *FLAGS, *(f"-I{path}" for path in include), "-o", str(program)]
     done = subprocess.run(
         [*command, *map(str, sources)], capture_output=True, text=True, check=False
     )
     if done.returncode != 0:
         lines = [line for line in done.stderr.splitlines() if "error" in line]
-        raise RefusedError("gcc", (lines or ["failed without a message"])[0])
+        raise RefusedError(compiler.name, (lines or ["failed without a message"])[0])
     return program
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import _ctypes
 import ctypes
 import os
-import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,8 @@ from pathlib import Path
 
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.shipped import shipped
+from triaxcal.base.tools import NO_CONSOLE
+from triaxcal.codegen.compilers import Compiler, find_compiler, install_advice
 
 WARNINGS = (
     "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion",
@@ -22,22 +25,19 @@ WARNINGS = (
 )  # fmt: skip
 """All of the C is clean under these; a warning is an error."""
 FLAGS = (WARNINGS[0], "-O2", *WARNINGS[1:])
+_SUFFIXES = {"win32": ".dll", "cygwin": ".dll", "darwin": ".dylib"}
+_loaded: list[tuple[Path, ctypes.CDLL]] = []
+"""Libraries that Windows has to give back, by their file."""
 
 
-def find_compiler() -> str:
-    """Path of gcc.
+def library_suffix(platform: str = sys.platform) -> str:
+    """Ending of a shared library's name."""
+    return _SUFFIXES.get(platform, ".so")
 
-    Raises
-    ------
-    RefusedError
-        When it is not installed.
-    """
-    found = shutil.which("gcc")
-    if found is None:
-        raise RefusedError(
-            "gcc", "not found", remedy="install it: sudo apt-get install gcc libc6-dev"
-        )
-    return found
+
+def library_flags(platform: str = sys.platform) -> tuple[str, ...]:
+    """What makes a shared library; code for Windows is position independent without a flag."""
+    return ("-shared",) if library_suffix(platform) == ".dll" else ("-shared", "-fPIC")
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,7 @@ class Compilation:
 
     process: subprocess.Popen[str]
     library: Path
+    compiler: Compiler
 
     def load(self) -> ctypes.CDLL:
         """Wait for it and load the library.
@@ -58,21 +59,26 @@ class Compilation:
         complaints, _ = self.process.communicate()
         if self.process.returncode == -signal.SIGINT:
             raise KeyboardInterrupt
+        name = self.compiler.name
         if self.process.returncode != 0:
             lines = [line for line in complaints.splitlines() if "error" in line.lower()]
             raise RefusedError(
-                "gcc",
+                name,
                 (lines or complaints.splitlines() or ["failed without a message"])[0],
-                remedy="check the compiler with a small program, and the space in the temp folder",
+                remedy="check the compiler with a small program, and the space in the temp folder; "
+                "CC names another compiler",
             )
         try:
-            return ctypes.CDLL(str(self.library))
+            library = ctypes.CDLL(str(self.library))
         except OSError as error:
             raise RefusedError(
-                "gcc",
+                name,
                 f"printed nothing and made no library that loads ({error})",
-                remedy="check that the gcc on PATH is a C compiler for this machine",
+                remedy=f"check that this {name} is a C compiler for this machine; CC names another",
             ) from error
+        if hasattr(_ctypes, "FreeLibrary"):
+            _loaded.append((self.library, library))
+        return library
 
     def cancel(self) -> None:
         """Stop it, if it still runs."""
@@ -87,12 +93,13 @@ def compile_library(
     include: Sequence[Path] = (),
     flags: Sequence[str] = FLAGS,
 ) -> Compilation:
-    """Start gcc on C sources, to a shared library."""
+    """Start the compiler on C sources, to a shared library; its name gets the system's ending."""
+    compiler = find_compiler()
+    library = library.with_suffix(library_suffix())
     command = [
-        find_compiler(),
+        *compiler.command,
         *flags,
-        "-shared",
-        "-fPIC",
+        *library_flags(),
         *(f"-I{folder}" for folder in include),
         "-o",
         str(library),
@@ -101,15 +108,25 @@ def compile_library(
     try:
         process = subprocess.Popen(
             command,
+            stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            env=os.environ | {"TMPDIR": str(library.parent)},
+            errors="replace",
+            env=os.environ | _litter(library.parent),
+            creationflags=NO_CONSOLE,
         )
     except OSError as error:
-        remedy = "install gcc: sudo apt-get install gcc libc6-dev"
-        raise refused_by_system(command[0], "run", error, remedy=remedy) from error
-    return Compilation(process, library)
+        raise refused_by_system(
+            command[0], "run", error, remedy=f"install another: {install_advice()}"
+        ) from error
+    return Compilation(process, library, compiler)
+
+
+def _litter(folder: Path) -> dict[str, str]:
+    """Environment in which a compiler keeps what is temporary in a folder."""
+    names = ("TMPDIR", "TMP", "TEMP", "ZIG_LOCAL_CACHE_DIR")
+    return dict.fromkeys(names, str(folder))
 
 
 def start_reference(folder: Path) -> Compilation:
@@ -120,15 +137,31 @@ def start_reference(folder: Path) -> Compilation:
     """
     source = shipped("firmware_ref")
     sources = [source / "triax_ref.c", source / "triax_ref_image.c"]
-    return compile_library(sources, folder / "triax_ref.so", flags=(*WARNINGS, "-O1"))
+    return compile_library(sources, folder / "triax_ref", flags=(*WARNINGS, "-O1"))
 
 
 @contextmanager
 def reference_under_way() -> Iterator[Compilation]:
     """Compile the reference in the background; it is stopped when the caller fails."""
-    with tempfile.TemporaryDirectory(prefix="triaxcal-") as folder:
-        compilation = start_reference(Path(folder))
+    with library_folder() as folder:
+        compilation = start_reference(folder)
         try:
             yield compilation
         finally:
             compilation.cancel()
+
+
+@contextmanager
+def library_folder() -> Iterator[Path]:
+    """A temporary folder whose libraries are not used after it.
+
+    Windows removes no file of a library that is loaded: they are given back first.
+    """
+    with tempfile.TemporaryDirectory(prefix="triaxcal-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        try:
+            yield folder
+        finally:
+            for entry in [e for e in _loaded if e[0].is_relative_to(folder)]:
+                _loaded.remove(entry)
+                _ctypes.FreeLibrary(entry[1]._handle)  # type: ignore[attr-defined,unused-ignore]

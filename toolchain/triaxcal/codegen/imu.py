@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.codegen.compiler import start_reference
+from triaxcal.codegen.compiler import library_folder, start_reference
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.crosscheck import RANDOM_VECTORS, CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.identity import IDENTITY_SIZE, with_identity
@@ -60,6 +58,8 @@ class ImuBuild:
         Vectors on which both together agreed with Python, compiled in and from the image.
     files : dict
         Name and content.
+    compiler : str
+        The compiler of the check, and its version.
     """
 
     accel: Plan
@@ -71,6 +71,7 @@ class ImuBuild:
     gyro_check: CrossCheck
     vectors: int
     files: dict[str, bytes]
+    compiler: str
 
 
 def build_imu(
@@ -90,12 +91,13 @@ def build_imu(
     gyro = replace(make_gyro_plan(imu, triads[1], accel.shape.output_q), reading="rad/s")
     files = render_imu(accel, gyro, triads, provenances)
     bounds = prove(accel), prove(gyro)
-    with tempfile.TemporaryDirectory(prefix="triaxcal-imu-") as name:
-        folder = Path(name)
+    with library_folder() as folder:
         for file, content in files.items():
             (folder / file).write_bytes(content)
         reference = start_reference(folder).load()
-        library = start_generated_imu(folder, folder, accel.prefix).load()
+        compilation = start_generated_imu(folder, folder, accel.prefix)
+        library = compilation.load()
+        compiler = compilation.compiler.called(Generated(library).compiler)
         checks = (
             _check(accel, routines_of(accel.rate, library, reference), random_vectors),
             _check(gyro, (GyroGenerated(library), GyroReference(reference)), random_vectors),
@@ -114,7 +116,7 @@ def build_imu(
                 remedy="the proof is wrong: this is a fault in triaxcal, report it",
             )
     carried = rate_bound(gyro, bounds[1], bounds[0])
-    return ImuBuild(accel, gyro, *bounds, carried, *checks, vectors, files)
+    return ImuBuild(accel, gyro, *bounds, carried, *checks, vectors, files, compiler)
 
 
 def render_imu(

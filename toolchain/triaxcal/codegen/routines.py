@@ -69,7 +69,7 @@ def _start(
     tests = (folder / f"{prefix}_{name}.c" for name in ("selftest", "gyro_selftest"))
     sources += [test for test in tests if test.exists()]
     sources += [source / f"{DEFAULT_PREFIX}_{name}.c" for name in batches]
-    library = target / f"{prefix}_{names[-1]}.so"
+    library = target / f"{prefix}_{names[-1]}"
     return compile_library(sources, library, include=[folder, *shim, source])
 
 
@@ -105,10 +105,10 @@ class Generated:
 
     @property
     def compiler(self) -> str:
-        """Version of the compiler that built it."""
+        """Version of the compiler that built it, by what it defines as __VERSION__."""
         function = self.library.triax_batch_compiler
         function.restype = ctypes.c_char_p
-        return bytes(function()).decode()
+        return bytes(function()).decode(errors="replace").partition(" (")[0].strip()
 
     def run(self, temp: Int32Array, raw: Int32Array) -> Answers:
         """Answers with the compiled-in constants."""

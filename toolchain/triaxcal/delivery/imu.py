@@ -13,7 +13,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
-from triaxcal.codegen.compiler import find_compiler
+from triaxcal.codegen.compilers import find_compiler
 from triaxcal.codegen.imu import ImuBuild, build_imu
 from triaxcal.delivery.fittedimu import FittedImu, fitted_imu
 from triaxcal.delivery.inputs import files_sha256

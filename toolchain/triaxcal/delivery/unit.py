@@ -5,14 +5,13 @@ Nothing is written here but in a temporary folder; `triaxcal.base.publish` puts 
 
 from __future__ import annotations
 
-import tempfile
 from contextlib import ExitStack
 from ctypes import CDLL
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.codegen.compiler import Compilation, reference_under_way
+from triaxcal.codegen.compiler import Compilation, library_folder, reference_under_way
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images, image_cases
@@ -49,7 +48,7 @@ class Delivery(Fitted):
     methods : tuple of MethodResult
         Residuals at the unit's own dwells: before, the unit's method, then the others.
     compiler : str
-        Version of the compiler.
+        The compiler and its version.
     """
 
     firmware: Firmware
@@ -109,7 +108,7 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
 def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delivery:
     """As `deliver`, for a calibration that was made."""
     with ExitStack() as stack:
-        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="triaxcal-")))
+        work = stack.enter_context(library_folder())
         refuse_beyond_limits(fitted)
         unit = fitted.unit
         firmware = make_firmware(fitted)
@@ -131,7 +130,7 @@ def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delive
         check_selftest(plan, firmware.provenance, ours)
         _refuse_wrong_bound(unit, bound, check)
         methods = _on_dwells(fitted, plan, ours, Reference(theirs))
-        compiler = Generated(ours).compiler
+        compiler = compilation.compiler.called(Generated(ours).compiler)
     parts = unit, fitted.measurements, fitted.inputs_sha256, fitted.calibration
     delivery = Delivery(*parts, firmware, check, methods, compiler)
     _refuse_beyond_limits(delivery)

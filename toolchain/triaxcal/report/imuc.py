@@ -72,6 +72,7 @@ def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:
         "unit": unit.name,
         "serial": unit.serial,
         "inputs_sha256": made.inputs_sha256,
+        "compiler": build.compiler,
         "compiler_flags": list(FLAGS),
         "method": METHOD,
         "range_degc": list(c.device.range_degc),

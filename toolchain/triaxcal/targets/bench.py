@@ -9,13 +9,14 @@ from functools import partial
 from pathlib import Path
 
 from triaxcal.base.shipped import shipped
+from triaxcal.base.tools import install_advice, missing_tools
 from triaxcal.codegen.forms import assembly
 from triaxcal.codegen.names import Names
 from triaxcal.codegen.shim import write_shim
 from triaxcal.targets.bench_case import case_header, floating_macros, floating_tables
 from triaxcal.targets.build import TargetError, Toolset, build, in_parallel, run
 from triaxcal.targets.cores.core import Core
-from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
+from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import Counts, build_plugin, measure
 from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB1, THUMB2
 from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, GYRO, QUADRATIC, RATE_ALONE, Case

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from triaxcal.base.shipped import shipped
-from triaxcal.codegen.compiler import find_compiler
+from triaxcal.codegen.compilers import find_compiler
 from triaxcal.targets.build import TargetError, emulate, run
 from triaxcal.targets.cores.core import Core
 
@@ -47,8 +47,8 @@ def build_plugin(folder: Path) -> Path:
     """Compile count_plugin.c for the host."""
     plugin = folder / "count_plugin.so"
     source = shipped("firmware_ref") / "target" / "count_plugin.c"
-    run([find_compiler(), "-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC",
-         str(source), "-o", str(plugin)])  # fmt: skip
+    run([*find_compiler().command, "-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-shared",
+         "-fPIC", str(source), "-o", str(plugin)])  # fmt: skip
     return plugin
 
 

@@ -10,10 +10,11 @@ from functools import partial
 from pathlib import Path
 
 from triaxcal.base.shipped import shipped
+from triaxcal.base.tools import install_advice, missing_tools
 from triaxcal.codegen.shim import write_shim
 from triaxcal.targets.build import TargetError, Toolset, build, emulate, in_parallel
 from triaxcal.targets.cores.core import COMPILERS
-from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
+from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.shapes import CUBIC, Case
 from triaxcal.targets.vectors import case_header, expected_lines
 

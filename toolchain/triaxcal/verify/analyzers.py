@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.base.shipped import shipped
+from triaxcal.base.tools import TOOLS, MissingToolError, Tool
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
 from triaxcal.codegen.names import names_of
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.rows import rows_of
-from triaxcal.verify.tools import Answer, MissingToolError, Tool, run
+from triaxcal.verify.tools import Answer, run
 from triaxcal.verify.workspace import CONSTANTS, FORMS, IMAGE, ROUTINE, SHIM, Workspace
 
-GCC = Tool("gcc", "gcc libc6-dev")
-CLANG = Tool("clang", "clang libclang-rt-dev")
+GCC, CLANG = TOOLS["gcc"], TOOLS["clang"]
 MEANT_WRAPS = Path(__file__).with_name("meant_unsigned_wraps.txt")
 RANDOM_VECTORS = 20_000
 """Of each random set; the exhaustive sets are run whole."""
@@ -179,7 +179,7 @@ def _probe(folder: Path, sanitizer: Sanitizer) -> None:
     if run([compiler, *sanitizer.flags, "-o", program, probe.name], folder).code:
         raise MissingToolError(
             f"{sanitizer.tool.program} has no {sanitizer.flags[0]}; "
-            f"sudo apt-get install {sanitizer.tool.package}"
+            f"{sanitizer.tool.install_command()}"
         )
 
 

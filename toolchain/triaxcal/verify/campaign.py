@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from triaxcal.base.tools import MissingToolError
 from triaxcal.codegen.crosscheck import CrossCheck
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
 from triaxcal.verify import analyzers, cost, cppcheck, eva, gappa
 from triaxcal.verify.outcome import FAILED, NOT_DONE, Outcome, judged
-from triaxcal.verify.tools import BrokenToolError, MissingToolError
+from triaxcal.verify.tools import BrokenToolError
 from triaxcal.verify.workspace import Workspace
 
 Check = Callable[[Workspace], Outcome]

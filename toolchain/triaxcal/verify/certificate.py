@@ -17,14 +17,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from triaxcal.base.progress import Progress
+from triaxcal.base.tools import TOOLS
 from triaxcal.verify import gappa
 from triaxcal.verify.campaign import guarded
 from triaxcal.verify.image_reader import Image, read_image
 from triaxcal.verify.outcome import NOT_DONE, PASSED, Outcome, judged
-from triaxcal.verify.tools import BrokenToolError, Tool, run
+from triaxcal.verify.tools import BrokenToolError, run
 from triaxcal.verify.workspace import Workspace
 
-COQ = Tool("coqc", "coq libcoq-gappa libcoq-flocq")
+COQ = TOOLS["coqc"]
 KEY, TITLE = "coq", "Coq: error bound"
 
 _HINT = re.compile(r"Hypothesis (a\d+) : ([^\n]*)\.\nLemma (b\d+) : \2\.\n apply \1\.\nQed\.\n")

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import asdict
 from functools import partial
 
+from triaxcal.base.tools import install_advice, missing_tools
 from triaxcal.codegen.forms import assembly
 from triaxcal.targets.bench import Cost, Subject, best_form, compiler_versions, cost_of
 from triaxcal.targets.build import TargetError, in_parallel
-from triaxcal.targets.cores.registry import CORES, install_advice, missing_tools
+from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import build_plugin
 from triaxcal.targets.matrix import ARITHMETIC_NAMES
 from triaxcal.targets.shapes import Case

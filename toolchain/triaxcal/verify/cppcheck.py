@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from triaxcal.base.tools import TOOLS
 from triaxcal.codegen.names import names_of
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.verify.outcome import Outcome, judged
-from triaxcal.verify.tools import BrokenToolError, Tool, run
+from triaxcal.verify.tools import BrokenToolError, run
 from triaxcal.verify.workspace import CONSTANTS, ROUTINE, SELFTEST, Workspace
 
-CPPCHECK = Tool("cppcheck", "cppcheck")
+CPPCHECK = TOOLS["cppcheck"]
 DEVIATIONS = Path(__file__).with_name("misra_deviations.toml")
 OPTIONS = (
     "--std=c99", "--addon=misra", "--enable=warning,style,performance,portability", "--quiet",

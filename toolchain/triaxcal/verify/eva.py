@@ -16,14 +16,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+from triaxcal.base.tools import TOOLS
 from triaxcal.codegen.templates import int32_literal
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.verify.outcome import Outcome, judged
-from triaxcal.verify.tools import BrokenToolError, Tool, run
+from triaxcal.verify.tools import BrokenToolError, run
 from triaxcal.verify.workspace import CONSTANTS, LIMBS, PORTABLE, ROUTINE, Workspace
 
-FRAMA_C = Tool("frama-c", "frama-c-base", "-version")
+FRAMA_C = TOOLS["frama-c"]
 DRIVER = "verify_eva.c"
 OPTIONS = (
     "-machdep", "x86_32", "-eva", "-eva-precision", "3",

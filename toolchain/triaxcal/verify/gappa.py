@@ -15,12 +15,13 @@ from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 
+from triaxcal.base.tools import TOOLS
 from triaxcal.verify.image_reader import Image, read_image
 from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
-from triaxcal.verify.tools import BrokenToolError, Tool, run
+from triaxcal.verify.tools import BrokenToolError, run
 from triaxcal.verify.workspace import Workspace
 
-GAPPA = Tool("gappa", "gappa")
+GAPPA = TOOLS["gappa"]
 SLICES = 16
 """Temperature intervals of a segment; more do not tighten the bound."""
 TIGHT = 1.2

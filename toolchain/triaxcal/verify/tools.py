@@ -1,9 +1,8 @@
-"""External tools: found on the PATH, started with a time limit, named with their package."""
+"""External tools, started with a time limit."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,39 +12,8 @@ TIME_LIMIT_S = 900
 """Beyond this a tool is hanging: the slowest takes seconds."""
 
 
-class MissingToolError(Exception):
-    """A tool is not installed; the text names it and its Debian package."""
-
-
 class BrokenToolError(Exception):
     """A tool did not finish its work; the text says how."""
-
-
-@dataclass(frozen=True)
-class Tool:
-    """A program, the Debian package that brings it, and how it prints its version."""
-
-    program: str
-    package: str
-    version_flag: str = "--version"
-
-    def find(self) -> str:
-        """Path of the program.
-
-        Raises
-        ------
-        MissingToolError
-            When it is not installed.
-        """
-        found = shutil.which(self.program)
-        if found is None:
-            raise MissingToolError(f"{self.program} not found; sudo apt-get install {self.package}")
-        return found
-
-    def version(self) -> str:
-        """First line of what it says about its version."""
-        answer = run([self.find(), self.version_flag], Path.cwd())
-        return answer.text.strip().split("\n")[0]
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,7 @@ def _identity(p: Passport) -> dict[str, Any]:
                 "Compensation",
                 f"{d.chosen.method.label}, LSB 2{superscript(-d.plan.shape.output_q)} g",
             ),
-            ("Made by", f"triaxcal {__version__}, gcc {d.compiler}"),
+            ("Made by", f"triaxcal {__version__}, {d.compiler}"),
             ("Inputs", f"sha256 {d.inputs_sha256[:16]}…"),
         ],
     }

@@ -69,7 +69,8 @@ def _device(order: Order) -> DeviceRecord | None:
 @cache
 def _reference() -> Reference:
     """The handwritten C, compiled once a worker: it is the same for every unit."""
-    with tempfile.TemporaryDirectory(prefix="triaxcal-") as folder:
+    # Windows removes no file of a loaded library: the series' own folder takes it along.
+    with tempfile.TemporaryDirectory(prefix="triaxcal-", ignore_cleanup_errors=True) as folder:
         return Reference(start_reference(Path(folder)).load())
 
 
