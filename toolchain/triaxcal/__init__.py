@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from triaxcal.api.delivery import Delivered, deliver, update
     from triaxcal.api.diagnosis import diagnose
     from triaxcal.api.export import ExportedFiles, export
-    from triaxcal.api.files import key_schema, write_first_file
+    from triaxcal.api.files import copy_example, examples, key_schema, write_first_file
     from triaxcal.api.firmware import CompiledFirmware, Firmware, firmware
     from triaxcal.api.image import CalibrationImage, read_image
     from triaxcal.api.imu import (
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     )
     from triaxcal.api.imufile import load_imu
     from triaxcal.api.imufirmware import ImuFirmware, firmware_imu
+    from triaxcal.api.installation import installation
     from triaxcal.api.pair import LivePair, cross_coupling
     from triaxcal.api.series import SeriesResult, calibrate_series, learn_priors
     from triaxcal.api.studies import (
@@ -54,23 +55,26 @@ if TYPE_CHECKING:
     from triaxcal.api.verification import Verification, certify, verify_unit
     from triaxcal.base.errors import RefusedError, UsageError
     from triaxcal.delivery.verdict import LimitCheck, Verdict
+    from triaxcal.report.installation import Installation, InstalledPart
     from triaxcal.uncertainty.budget import Budget
     from triaxcal.uncertainty.check import FieldCheck
     from triaxcal.uncertainty.updated import FieldUpdate
+    from triaxcal.unit.examples import ExampleUnit
 
 __version__ = "0.2.0.dev0"
 
 __all__ = [
     "Budget", "Calibration", "CalibrationImage", "CompiledFirmware", "Delivered", "Diagnosis",
-    "ExportedFiles", "FieldCheck", "FieldUpdate", "Firmware", "Imu", "ImuCalibration",
-    "ImuConstants", "ImuFirmware", "ImuState", "LimitCheck", "LivePair", "MeasurementPlan",
-    "RefusedError", "SeriesResult", "Study", "TableGrid", "Unit", "UsageError", "Verdict",
-    "Verification", "__version__", "calibrate_series", "certify", "compare_history",
-    "cross_coupling", "deliver", "delivered_firmware", "diagnose", "export", "find_poses",
-    "firmware", "firmware_imu", "fit", "fit_imu", "key_schema", "learn_priors", "load", "load_imu",
-    "plan_measurements", "plan_motion", "read_image", "read_imu", "read_unit", "simulate",
-    "simulate_series", "study_angle_errors", "study_drift", "update", "verify_unit",
-    "write_first_file",
+    "ExampleUnit", "ExportedFiles", "FieldCheck", "FieldUpdate", "Firmware", "Imu",
+    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "Installation",
+    "InstalledPart", "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError",
+    "SeriesResult", "Study", "TableGrid", "Unit", "UsageError", "Verdict", "Verification",
+    "__version__", "calibrate_series", "certify", "compare_history", "copy_example",
+    "cross_coupling", "deliver", "delivered_firmware", "diagnose", "examples", "export",
+    "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "installation", "key_schema",
+    "learn_priors", "load", "load_imu", "plan_measurements", "plan_motion", "read_image",
+    "read_imu", "read_unit", "simulate", "simulate_series", "study_angle_errors", "study_drift",
+    "update", "verify_unit", "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
@@ -79,7 +83,7 @@ _MODULES = {
     "triaxcal.api.delivery": ("Delivered", "deliver", "update"),
     "triaxcal.api.diagnosis": ("diagnose",),
     "triaxcal.api.export": ("ExportedFiles", "export"),
-    "triaxcal.api.files": ("key_schema", "write_first_file"),
+    "triaxcal.api.files": ("copy_example", "examples", "key_schema", "write_first_file"),
     "triaxcal.api.firmware": ("CompiledFirmware", "Firmware", "firmware"),
     "triaxcal.api.image": ("CalibrationImage", "read_image"),
     "triaxcal.api.imu": (
@@ -87,6 +91,9 @@ _MODULES = {
     ),
     "triaxcal.api.imufile": ("load_imu",),
     "triaxcal.api.imufirmware": ("ImuFirmware", "firmware_imu"),
+    "triaxcal.api.installation": ("installation",),
+    "triaxcal.report.installation": ("Installation", "InstalledPart"),
+    "triaxcal.unit.examples": ("ExampleUnit",),
     "triaxcal.api.pair": ("LivePair", "cross_coupling"),
     "triaxcal.api.series": ("SeriesResult", "calibrate_series", "learn_priors"),
     "triaxcal.api.studies": (

@@ -1,4 +1,4 @@
-"""`write_first_file`, `key_schema`: TOML files to edit, and their schemas."""
+"""`write_first_file`, `key_schema`, `copy_example`: files to begin with, and their schemas."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from triaxcal.base.tomltable import did_you_mean
 from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.schema import json_schema
 from triaxcal.keytable.starter import write_starter
+from triaxcal.unit.examples import ExampleUnit, example_units, write_example
 
 
 def write_first_file(folder: str | Path, kind: str = "tilter") -> tuple[Path, Path]:
@@ -35,6 +36,34 @@ def write_first_file(folder: str | Path, kind: str = "tilter") -> tuple[Path, Pa
     """
     _keys(kind)
     return write_starter(Path(folder), kind)
+
+
+def examples() -> tuple[ExampleUnit, ...]:
+    """The example units that came with this triaxcal: name, description, the commands to try."""
+    return tuple(example_units())
+
+
+def copy_example(name: str, into: str | Path = ".") -> Path:
+    """Copy an example unit into a folder; nothing is replaced.
+
+    Parameters
+    ----------
+    name : str
+        As `examples` gives it: "AT-SIM".
+    into : path
+        Receives a folder of that name.
+
+    Returns
+    -------
+    path
+        The unit's folder.
+
+    Raises
+    ------
+    RefusedError
+        When there is no such example, or something of its name is there already.
+    """
+    return write_example(name, Path(into))
 
 
 def key_schema(kind: str) -> dict[str, Any]:

@@ -12,6 +12,25 @@ from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 
+EXTRAS = {
+    "cc": "a C compiler, where the system has none",
+    "rig": "rig: the bench over CAN",
+    "instruments": "rig: chambers, positioners, voltmeters, serial boards",
+    "device": "device: a unit over XCP on CAN",
+    "export": "rig export: MF4 and Parquet",
+    "parquet": "recordings in Parquet",
+    "hdf5": "recordings in HDF5, MAT-files of version 7.3",
+    "excel": "recordings in Excel files",
+    "ulog": "recordings of PX4",
+    "ros": "recordings of ROS, MCAP",
+    "ardupilot": "recordings of ArduPilot",
+    "mf4": "recordings in MF4",
+    "series": "batch: many units on a Dask cluster",
+    "production": "image: Intel HEX and SREC; a2l: addresses of a program",
+    "plot": "Calibration.plot in Python",
+}
+"""What each extra of pyproject.toml is for, less those for developers."""
+
 
 def install_command(extra: str) -> str:
     """Command that a shell in the current folder runs to install an extra of triaxcal."""

@@ -8,12 +8,14 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 NO_CONSOLE = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """For Windows: a notebook has no console, and gets none for each program that is started."""
 _ANSWER_S = 20
 """Within this a program says its version."""
 _APT = "sudo apt-get install"
+_DEBIAN = Path("/usr/bin/apt-get")
 _BY_SYSTEM = {"darwin": "brew install", "win32": "choco install"}
 
 
@@ -34,7 +36,7 @@ class Tool:
     purpose : str
         What triaxcal does with it.
     version_flag : str
-        With it the program prints its version.
+        With it the program prints its version; "" where it prints none.
     elsewhere : dict
         The packages of Homebrew ("darwin") and Chocolatey ("win32"), where they are known.
     """
@@ -59,20 +61,23 @@ class Tool:
         return found
 
     def version(self) -> str:
-        """First line of what it says about its version.
+        """First line of what it says about its version; "" where it says none.
 
         Raises
         ------
         MissingToolError
             When it is not installed.
         """
-        return version_of((self.find(), self.version_flag))
+        found = self.find()
+        return version_of((found, self.version_flag)) if self.version_flag else ""
 
     def install_command(self, platform: str = sys.platform) -> str:
         """Command that installs it on a system; only what to look for where none is known."""
         if platform in _BY_SYSTEM:
             known = self.elsewhere.get(platform)
             return f"{_BY_SYSTEM[platform]} {known}" if known else f"look for {self.program}"
+        if not _DEBIAN.exists():
+            return f"look for {self.program}; Debian's packages are {self.package}"
         return f"{_APT} {self.package}"
 
 
@@ -102,7 +107,7 @@ _TOOLS = (
     Tool("qemu-system-riscv32", "qemu-system-misc", _QEMU, elsewhere=_QEMU_ELSEWHERE),
     Tool("qemu-ppc", "qemu-user", _QEMU),
     Tool("qemu-s390x", "qemu-user", _QEMU),
-    Tool("simavr", "simavr", "target: runs the C of an AVR", "--help"),
+    Tool("simavr", "simavr", "target: runs the C of an AVR", ""),
 )  # fmt: skip
 TOOLS = {tool.program: tool for tool in _TOOLS}
 """Every program, by its name."""

@@ -15,12 +15,13 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.cli.options import HELP, UnitFolder, WithKinds, example, unit_and_build
 
 SECTIONS = {
+    "Begin": ("example", "init", "doctor"),
     "Calibrate": ("calib", "dynamic", "batch"),
     "In the field": ("check", "update", "device"),
     "Look at readings and results": ("diagnose", "poses", "drift", "crosscoupling", "history"),
     "Into production": ("firmware", "image", "a2l", "export"),
     "Check the generated C": ("verify", "certify", "target"),
-    "Plan, measure, simulate": ("init", "design", "rig", "simulate", "schema"),
+    "Plan, measure, simulate": ("design", "rig", "simulate", "schema"),
 }
 """Every command, in the order of the help. Most are imported from files of their own."""
 

@@ -12,7 +12,6 @@ import socket
 import struct
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from triaxcal.rig.bus.burst import (
     struct_marks,
 )
 from triaxcal.rig.bus.frames import BRS, DLC_SHIFT, ESI, Frames, empty
+from triaxcal.rig.sources.candevices import can_devices
 from triaxcal.rig.sources.source import PACE_S, WAIT_S, Watched
 
 QUEUE_BYTES = 4 << 20
@@ -36,8 +36,6 @@ _FRAME_QUEUE_BYTES = 384
 _ENOUGH_S = 0.5
 _FULL_RATE = 9000
 _REOPEN_S = 0.2
-_CAN_DEVICE = "280"  # ARPHRD_CAN
-_NETWORK = Path("/sys/class/net")
 _HEAD = struct.Struct("@IBBBB")
 _GONE = {errno.ENODEV, errno.ENXIO, errno.EBADF, errno.ENETUNREACH}
 
@@ -181,16 +179,6 @@ def can_socket(device: str, fd: bool) -> socket.socket:
         opened.close()
         raise
     return opened
-
-
-def can_devices() -> list[str]:
-    """Names of the CAN network devices of this machine."""
-    if not _NETWORK.is_dir():
-        return []
-    types = ((d.name, d / "type") for d in sorted(_NETWORK.iterdir()))
-    return [
-        name for name, kind in types if kind.is_file() and kind.read_text().strip() == _CAN_DEVICE
-    ]
 
 
 def packed(frames: Frames) -> list[bytes]:
