@@ -81,9 +81,8 @@ def _compilers() -> list[InstalledPart]:
         compiler = find_compiler()
         with library_folder() as folder:
             start_reference(folder).load()
-        chosen = InstalledPart(
-            COMPILER, compiler.name, compiler.version(), "is used, and makes a library"
-        )
+        found = compiler.version() or INSTALLED
+        chosen = InstalledPart(COMPILER, compiler.name, found, "is used, and makes a library")
     except RefusedError as refusal:
         chosen = InstalledPart(COMPILER, "C compiler", "", str(refusal), compiler_advice())
     parts = [replace(chosen, needed=True)]
@@ -95,17 +94,13 @@ def _compilers() -> list[InstalledPart]:
 def _optional() -> list[InstalledPart]:
     requirements = _requirements()
     parts = []
-    for extra, purpose in EXTRAS.items():
-        packages = requirements.get(extra, [])
-        versions = {name: _version(name) for name in packages}
+    for extra, what_for in EXTRAS.items():
+        versions = {name: _version(name) for name in requirements.get(extra, [])}
         missing = [name for name, version in versions.items() if not version]
         found = ", ".join(f"{name} {version}" for name, version in versions.items())
-        purpose_too = f"{purpose}; missing: {', '.join(missing)}" if missing else purpose
-        parts.append(
-            InstalledPart(
-                OPTIONAL, extra, "" if missing else found, purpose_too, install_command(extra)
-            )
-        )
+        purpose = f"{what_for}; missing: {', '.join(missing)}" if missing else what_for
+        part = InstalledPart(OPTIONAL, extra, found, purpose, install_command(extra))
+        parts.append(replace(part, found="") if missing else part)
     return parts
 
 
