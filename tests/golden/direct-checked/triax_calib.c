@@ -29,75 +29,75 @@ TRIAX_CALIB_SECTION const triax_calib_t triax_calib_constants = {
             {
                 /* Nxx = -1.81492586 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1217976128, /* x^0: -1.81492586 g/V, rounding +3.7e-10 */
-                    2692664, /* x^1: 0.00200619046 g/V, rounding +1.9e-10 */
-                    -5015, /* x^2: -1.86832622e-06 g/V, rounding +9.3e-11 */
+                    -1217976128, /* x^0: -1.81492586 g/V, rounding +4e-10 */
+                    2692664, /* x^1: 0.0020061905 g/V, rounding +2e-10 */
+                    -5015, /* x^2: -1.86833e-06 g/V, rounding +9e-11 */
                 },
                 /* Nxy = 0.00175174363 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    1175576, /* x^0: 0.00175174363 g/V, rounding +3.7e-10 */
-                    -84560, /* x^1: -6.30026683e-05 g/V, rounding +1.9e-10 */
-                    425, /* x^2: 1.58231705e-07 g/V, rounding +9.3e-11 */
+                    1175576, /* x^0: 0.0017517436 g/V, rounding +4e-10 */
+                    -84560, /* x^1: -6.30027e-05 g/V, rounding +2e-10 */
+                    425, /* x^2: 1.5823e-07 g/V, rounding +9e-11 */
                 },
                 /* Nxz = -0.0541870888 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -36364339, /* x^0: -0.0541870888 g/V, rounding +3.7e-10 */
-                    -769639, /* x^1: -0.000573426299 g/V, rounding +1.9e-10 */
-                    5229, /* x^2: 1.94786116e-06 g/V, rounding +9.3e-11 */
+                    -36364339, /* x^0: -0.0541870888 g/V, rounding +4e-10 */
+                    -769639, /* x^1: -0.0005734263 g/V, rounding +2e-10 */
+                    5229, /* x^2: 1.94786e-06 g/V, rounding +9e-11 */
                 },
                 /* bx = 0.00842545368 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    1130850, /* x^0: 0.00842545368 g, rounding +1.9e-09 */
-                    -1567374, /* x^1: -0.00583892595 g, rounding +9.3e-10 */
-                    3148, /* x^2: 5.86314127e-06 g, rounding +4.7e-10 */
+                    1130850, /* x^0: 0.008425454 g, rounding +2e-9 */
+                    -1567374, /* x^1: -0.005838926 g, rounding +9e-10 */
+                    3148, /* x^2: 5.8631e-06 g, rounding +5e-10 */
                 },
                 /* Nyx = 0.0435988326 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    29258682, /* x^0: 0.0435988326 g/V, rounding +3.7e-10 */
-                    1839679, /* x^1: 0.00137066711 g/V, rounding +1.9e-10 */
-                    -10597, /* x^2: -3.94778326e-06 g/V, rounding +9.3e-11 */
+                    29258682, /* x^0: 0.0435988326 g/V, rounding +4e-10 */
+                    1839679, /* x^1: 0.0013706671 g/V, rounding +2e-10 */
+                    -10597, /* x^2: -3.94778e-06 g/V, rounding +9e-11 */
                 },
                 /* Nyy = -1.82328434 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1223585409, /* x^0: -1.82328434 g/V, rounding +3.7e-10 */
-                    4283604, /* x^1: 0.00319153313 g/V, rounding +1.9e-10 */
-                    -14876, /* x^2: -5.54183498e-06 g/V, rounding +9.3e-11 */
+                    -1223585409, /* x^0: -1.82328434 g/V, rounding +4e-10 */
+                    4283604, /* x^1: 0.0031915331 g/V, rounding +2e-10 */
+                    -14876, /* x^2: -5.54183e-06 g/V, rounding +9e-11 */
                 },
                 /* Nyz = 0.00353288986 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    2370883, /* x^0: 0.00353288986 g/V, rounding +3.7e-10 */
-                    -97123, /* x^1: -7.23628327e-05 g/V, rounding +1.9e-10 */
-                    2178, /* x^2: 8.11275095e-07 g/V, rounding +9.3e-11 */
+                    2370883, /* x^0: 0.0035328899 g/V, rounding +4e-10 */
+                    -97123, /* x^1: -7.23628e-05 g/V, rounding +2e-10 */
+                    2178, /* x^2: 8.1128e-07 g/V, rounding +9e-11 */
                 },
                 /* by = -0.00761896931 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    -1022596, /* x^0: -0.00761896931 g, rounding +1.9e-09 */
-                    -2159328, /* x^1: -0.00804412644 g, rounding +9.3e-10 */
-                    10033, /* x^2: 1.86874531e-05 g, rounding +4.7e-10 */
+                    -1022596, /* x^0: -0.007618969 g, rounding +2e-9 */
+                    -2159328, /* x^1: -0.0080441264 g, rounding +9e-10 */
+                    10033, /* x^2: 1.86875e-05 g, rounding +5e-10 */
                 },
                 /* Nzx = 0.0484357852 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    32504706, /* x^0: 0.0484357852 g/V, rounding +3.7e-10 */
-                    1093135, /* x^1: 0.000814448483 g/V, rounding +1.9e-10 */
-                    -7148, /* x^2: -2.66293064e-06 g/V, rounding +9.3e-11 */
+                    32504706, /* x^0: 0.0484357852 g/V, rounding +4e-10 */
+                    1093135, /* x^1: 0.0008144485 g/V, rounding +2e-10 */
+                    -7148, /* x^2: -2.66293e-06 g/V, rounding +9e-11 */
                 },
                 /* Nzy = 0.00113510825 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    761759, /* x^0: 0.00113510825 g/V, rounding +3.7e-10 */
-                    -70022, /* x^1: -5.21710142e-05 g/V, rounding +1.9e-10 */
-                    606, /* x^2: 2.2565946e-07 g/V, rounding +9.3e-11 */
+                    761759, /* x^0: 0.0011351082 g/V, rounding +4e-10 */
+                    -70022, /* x^1: -5.2171e-05 g/V, rounding +2e-10 */
+                    606, /* x^2: 2.2566e-07 g/V, rounding +9e-11 */
                 },
                 /* Nzz = -1.82169696 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1222520132, /* x^0: -1.82169696 g/V, rounding +3.7e-10 */
-                    5109165, /* x^1: 0.003806624 g/V, rounding +1.9e-10 */
-                    -20429, /* x^2: -7.61048868e-06 g/V, rounding +9.3e-11 */
+                    -1222520132, /* x^0: -1.82169696 g/V, rounding +4e-10 */
+                    5109165, /* x^1: 0.003806624 g/V, rounding +2e-10 */
+                    -20429, /* x^2: -7.61049e-06 g/V, rounding +9e-11 */
                 },
                 /* bz = -0.00647641532 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    -869245, /* x^0: -0.00647641532 g, rounding +1.9e-09 */
-                    -200917, /* x^1: -0.000748476945 g, rounding +9.3e-10 */
-                    2296, /* x^2: 4.2761676e-06 g, rounding +4.7e-10 */
+                    -869245, /* x^0: -0.006476415 g, rounding +2e-9 */
+                    -200917, /* x^1: -0.0007484769 g, rounding +9e-10 */
+                    2296, /* x^2: 4.2762e-06 g, rounding +5e-10 */
                 },
             },
         },

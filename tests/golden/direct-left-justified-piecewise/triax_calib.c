@@ -29,63 +29,63 @@ TRIAX_CALIB_SECTION const triax_calib_t triax_calib_constants = {
             {
                 /* Nxx = -1.81599618 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1218694403, /* x^0: -1.81599618 g/V, rounding +3.7e-10 */
-                    1317519, /* x^1: 0.000981627963 g/V, rounding +1.9e-10 */
+                    -1218694403, /* x^0: -1.81599618 g/V, rounding +4e-10 */
+                    1317519, /* x^1: 0.000981628 g/V, rounding +2e-10 */
                 },
                 /* Nxy = 0.00178244747 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    1196181, /* x^0: 0.00178244747 g/V, rounding +3.7e-10 */
-                    -38252, /* x^1: -2.85001472e-05 g/V, rounding +1.9e-10 */
+                    1196181, /* x^0: 0.0017824475 g/V, rounding +4e-10 */
+                    -38252, /* x^1: -2.85001e-05 g/V, rounding +2e-10 */
                 },
                 /* Nxz = -0.0537657436 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -36081579, /* x^0: -0.0537657436 g/V, rounding +3.7e-10 */
-                    -500507, /* x^1: -0.000372906961 g/V, rounding +1.9e-10 */
+                    -36081579, /* x^0: -0.0537657436 g/V, rounding +4e-10 */
+                    -500507, /* x^1: -0.000372907 g/V, rounding +2e-10 */
                 },
                 /* bx = 0.0116212312 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    1559780, /* x^0: 0.0116212312 g, rounding +1.9e-09 */
-                    -784240, /* x^1: -0.00292152259 g, rounding +9.3e-10 */
+                    1559780, /* x^0: 0.011621231 g, rounding +2e-9 */
+                    -784240, /* x^1: -0.0029215226 g, rounding +9e-10 */
                 },
                 /* Nyx = 0.0427722264 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    28703956, /* x^0: 0.0427722264 g/V, rounding +3.7e-10 */
-                    1002514, /* x^1: 0.000746930949 g/V, rounding +1.9e-10 */
+                    28703956, /* x^0: 0.0427722264 g/V, rounding +4e-10 */
+                    1002514, /* x^1: 0.0007469309 g/V, rounding +2e-10 */
                 },
                 /* Nyy = -1.82502902 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1224756240, /* x^0: -1.82502902 g/V, rounding +3.7e-10 */
-                    2141019, /* x^1: 0.00159518328 g/V, rounding +1.9e-10 */
+                    -1224756240, /* x^0: -1.82502902 g/V, rounding +4e-10 */
+                    2141019, /* x^1: 0.0015951833 g/V, rounding +2e-10 */
                 },
                 /* Nyz = 0.00360221006 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    2417403, /* x^0: 0.00360221006 g/V, rounding +3.7e-10 */
-                    -80496, /* x^1: -5.99743798e-05 g/V, rounding +1.9e-10 */
+                    2417403, /* x^0: 0.0036022101 g/V, rounding +4e-10 */
+                    -80496, /* x^1: -5.99744e-05 g/V, rounding +2e-10 */
                 },
                 /* by = -0.00322100334 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    -432311, /* x^0: -0.00322100334 g, rounding +1.9e-09 */
-                    -1079389, /* x^1: -0.0040210383 g, rounding +9.3e-10 */
+                    -432311, /* x^0: -0.003221003 g, rounding +2e-9 */
+                    -1079389, /* x^1: -0.0040210383 g, rounding +9e-10 */
                 },
                 /* Nzx = 0.0478942189 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    32141267, /* x^0: 0.0478942189 g/V, rounding +3.7e-10 */
-                    649806, /* x^1: 0.000484143011 g/V, rounding +1.9e-10 */
+                    32141267, /* x^0: 0.0478942189 g/V, rounding +4e-10 */
+                    649806, /* x^1: 0.000484143 g/V, rounding +2e-10 */
                 },
                 /* Nzy = 0.00116134025 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    779363, /* x^0: 0.00116134025 g/V, rounding +3.7e-10 */
-                    -32541, /* x^1: -2.42451206e-05 g/V, rounding +1.9e-10 */
+                    779363, /* x^0: 0.0011613403 g/V, rounding +4e-10 */
+                    -32541, /* x^1: -2.42451e-05 g/V, rounding +2e-10 */
                 },
                 /* Nzz = -1.82375213 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1223899338, /* x^0: -1.82375213 g/V, rounding +3.7e-10 */
-                    2526003, /* x^1: 0.00188201871 g/V, rounding +1.9e-10 */
+                    -1223899338, /* x^0: -1.82375213 g/V, rounding +4e-10 */
+                    2526003, /* x^1: 0.0018820187 g/V, rounding +2e-10 */
                 },
                 /* bz = -0.0060667824 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    -814265, /* x^0: -0.0060667824 g, rounding +1.9e-09 */
-                    -100520, /* x^1: -0.000374467112 g, rounding +9.3e-10 */
+                    -814265, /* x^0: -0.006066782 g, rounding +2e-9 */
+                    -100520, /* x^1: -0.0003744671 g, rounding +9e-10 */
                 },
             },
         },
@@ -96,63 +96,63 @@ TRIAX_CALIB_SECTION const triax_calib_t triax_calib_constants = {
             {
                 /* Nxx = -1.81522928 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1218179747, /* x^0: -1.81522928 g/V, rounding +3.7e-10 */
-                    988139, /* x^1: 0.00073622074 g/V, rounding +1.9e-10 */
+                    -1218179747, /* x^0: -1.81522928 g/V, rounding +4e-10 */
+                    988139, /* x^1: 0.0007362207 g/V, rounding +2e-10 */
                 },
                 /* Nxy = 0.00176018216 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    1181239, /* x^0: 0.00176018216 g/V, rounding +3.7e-10 */
-                    -28689, /* x^1: -2.13751569e-05 g/V, rounding +1.9e-10 */
+                    1181239, /* x^0: 0.0017601822 g/V, rounding +4e-10 */
+                    -28689, /* x^1: -2.13752e-05 g/V, rounding +2e-10 */
                 },
                 /* Nxz = -0.0540570762 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -36277089, /* x^0: -0.0540570762 g/V, rounding +3.7e-10 */
-                    -375380, /* x^1: -0.000279680081 g/V, rounding +1.9e-10 */
+                    -36277089, /* x^0: -0.0540570762 g/V, rounding +4e-10 */
+                    -375380, /* x^1: -0.0002796801 g/V, rounding +2e-10 */
                 },
                 /* bx = 0.00933879055 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    1253436, /* x^0: 0.00933879055 g, rounding +1.9e-09 */
-                    -588180, /* x^1: -0.00219114218 g, rounding +9.3e-10 */
+                    1253436, /* x^0: 0.009338791 g, rounding +2e-9 */
+                    -588180, /* x^1: -0.0021911422 g, rounding +9e-10 */
                 },
                 /* Nyx = 0.0433557663 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    29095563, /* x^0: 0.0433557663 g/V, rounding +3.7e-10 */
-                    751886, /* x^1: 0.000560198538 g/V, rounding +1.9e-10 */
+                    29095563, /* x^0: 0.0433557663 g/V, rounding +4e-10 */
+                    751886, /* x^1: 0.0005601985 g/V, rounding +2e-10 */
                 },
                 /* Nyy = -1.82378278 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1223919905, /* x^0: -1.82378278 g/V, rounding +3.7e-10 */
-                    1605764, /* x^1: 0.00119638722 g/V, rounding +1.9e-10 */
+                    -1223919905, /* x^0: -1.82378278 g/V, rounding +4e-10 */
+                    1605764, /* x^1: 0.0011963872 g/V, rounding +2e-10 */
                 },
                 /* Nyz = 0.00355535485 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    2385959, /* x^0: 0.00355535485 g/V, rounding +3.7e-10 */
-                    -60372, /* x^1: -4.49808314e-05 g/V, rounding +1.9e-10 */
+                    2385959, /* x^0: 0.0035553548 g/V, rounding +4e-10 */
+                    -60372, /* x^1: -4.49808e-05 g/V, rounding +2e-10 */
                 },
                 /* by = -0.00636243634 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    -853947, /* x^0: -0.00636243634 g, rounding +1.9e-09 */
-                    -809542, /* x^1: -0.00301577989 g, rounding +9.3e-10 */
+                    -853947, /* x^0: -0.006362436 g, rounding +2e-9 */
+                    -809542, /* x^1: -0.0030157799 g, rounding +9e-10 */
                 },
                 /* Nzx = 0.0482724551 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    32395097, /* x^0: 0.0482724551 g/V, rounding +3.7e-10 */
-                    487354, /* x^1: 0.000363106839 g/V, rounding +1.9e-10 */
+                    32395097, /* x^0: 0.0482724551 g/V, rounding +4e-10 */
+                    487354, /* x^1: 0.0003631068 g/V, rounding +2e-10 */
                 },
                 /* Nzy = 0.00114239939 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    766652, /* x^0: 0.00114239939 g/V, rounding +3.7e-10 */
-                    -24406, /* x^1: -1.81840733e-05 g/V, rounding +1.9e-10 */
+                    766652, /* x^0: 0.0011423994 g/V, rounding +4e-10 */
+                    -24406, /* x^1: -1.81841e-05 g/V, rounding +2e-10 */
                 },
                 /* Nzz = -1.82228181 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1222912618, /* x^0: -1.82228181 g/V, rounding +3.7e-10 */
-                    1894502, /* x^1: 0.0014115138 g/V, rounding +1.9e-10 */
+                    -1222912618, /* x^0: -1.82228181 g/V, rounding +4e-10 */
+                    1894502, /* x^1: 0.0014115138 g/V, rounding +2e-10 */
                 },
                 /* bz = -0.00635932945 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    -853530, /* x^0: -0.00635932945 g, rounding +1.9e-09 */
-                    -75390, /* x^1: -0.000280850567 g, rounding +9.3e-10 */
+                    -853530, /* x^0: -0.006359329 g, rounding +2e-9 */
+                    -75390, /* x^1: -0.0002808506 g, rounding +9e-10 */
                 },
             },
         },
@@ -163,63 +163,63 @@ TRIAX_CALIB_SECTION const triax_calib_t triax_calib_constants = {
             {
                 /* Nxx = -1.81423231 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1217510695, /* x^0: -1.81423231 g/V, rounding +3.7e-10 */
-                    922263, /* x^1: 0.000687139295 g/V, rounding +1.9e-10 */
+                    -1217510695, /* x^0: -1.81423231 g/V, rounding +4e-10 */
+                    922263, /* x^1: 0.0006871393 g/V, rounding +2e-10 */
                 },
                 /* Nxy = 0.00173123665 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    1161814, /* x^0: 0.00173123665 g/V, rounding +3.7e-10 */
-                    -26776, /* x^1: -1.99498609e-05 g/V, rounding +1.9e-10 */
+                    1161814, /* x^0: 0.0017312367 g/V, rounding +4e-10 */
+                    -26776, /* x^1: -1.99499e-05 g/V, rounding +2e-10 */
                 },
                 /* Nxz = -0.0544358101 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -36531253, /* x^0: -0.0544358101 g/V, rounding +3.7e-10 */
-                    -350355, /* x^1: -0.000261035003 g/V, rounding +1.9e-10 */
+                    -36531253, /* x^0: -0.0544358101 g/V, rounding +4e-10 */
+                    -350355, /* x^1: -0.000261035 g/V, rounding +2e-10 */
                 },
                 /* bx = 0.00637161918 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    855189, /* x^0: 0.00637161918 g, rounding +1.9e-09 */
-                    -548968, /* x^1: -0.0020450661 g, rounding +9.3e-10 */
+                    855189, /* x^0: 0.006371619 g, rounding +2e-9 */
+                    -548968, /* x^1: -0.0020450661 g, rounding +9e-10 */
                 },
                 /* Nyx = 0.0441143695 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    29604653, /* x^0: 0.0441143695 g/V, rounding +3.7e-10 */
-                    701760, /* x^1: 0.000522851758 g/V, rounding +1.9e-10 */
+                    29604653, /* x^0: 0.0441143695 g/V, rounding +4e-10 */
+                    701760, /* x^1: 0.0005228518 g/V, rounding +2e-10 */
                 },
                 /* Nyy = -1.82216267 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1222832669, /* x^0: -1.82216267 g/V, rounding +3.7e-10 */
-                    1498713, /* x^1: 0.00111662801 g/V, rounding +1.9e-10 */
+                    -1222832669, /* x^0: -1.82216267 g/V, rounding +4e-10 */
+                    1498713, /* x^1: 0.001116628 g/V, rounding +2e-10 */
                 },
                 /* Nyz = 0.00349444337 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    2345082, /* x^0: 0.00349444337 g/V, rounding +3.7e-10 */
-                    -56347, /* x^1: -4.19819728e-05 g/V, rounding +1.9e-10 */
+                    2345082, /* x^0: 0.0034944434 g/V, rounding +4e-10 */
+                    -56347, /* x^1: -4.1982e-05 g/V, rounding +2e-10 */
                 },
                 /* by = -0.0104463082 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    -1402075, /* x^0: -0.0104463082 g, rounding +1.9e-09 */
-                    -755572, /* x^1: -0.00281472597 g, rounding +9.3e-10 */
+                    -1402075, /* x^0: -0.010446308 g, rounding +2e-9 */
+                    -755572, /* x^1: -0.002814726 g, rounding +9e-10 */
                 },
                 /* Nzx = 0.0487641621 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    32725076, /* x^0: 0.0487641621 g/V, rounding +3.7e-10 */
-                    454864, /* x^1: 0.000338899903 g/V, rounding +1.9e-10 */
+                    32725076, /* x^0: 0.0487641621 g/V, rounding +4e-10 */
+                    454864, /* x^1: 0.0003388999 g/V, rounding +2e-10 */
                 },
                 /* Nzy = 0.00111777522 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    750127, /* x^0: 0.00111777522 g/V, rounding +3.7e-10 */
-                    -22779, /* x^1: -1.69718638e-05 g/V, rounding +1.9e-10 */
+                    750127, /* x^0: 0.0011177752 g/V, rounding +4e-10 */
+                    -22779, /* x^1: -1.69719e-05 g/V, rounding +2e-10 */
                 },
                 /* Nzz = -1.82037038 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1221629883, /* x^0: -1.82037038 g/V, rounding +3.7e-10 */
-                    1768202, /* x^1: 0.00131741296 g/V, rounding +1.9e-10 */
+                    -1221629883, /* x^0: -1.82037038 g/V, rounding +4e-10 */
+                    1768202, /* x^1: 0.001317413 g/V, rounding +2e-10 */
                 },
                 /* bz = -0.00673964433 g at the origin; integer_k in 2^-(27 + k) g, 4 of integer_0 is rounding */
                 {
-                    -904575, /* x^0: -0.00673964433 g, rounding +1.9e-09 */
-                    -70364, /* x^1: -0.000262127258 g, rounding +9.3e-10 */
+                    -904575, /* x^0: -0.006739644 g, rounding +2e-9 */
+                    -70364, /* x^1: -0.0002621273 g, rounding +9e-10 */
                 },
             },
         },

@@ -29,75 +29,75 @@ TRIAX_CALIB_SECTION const triax_calib_t triax_calib_constants = {
             {
                 /* Nxx = -1.81492586 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1217976128, /* x^0: -1.81492586 g/V, rounding +3.7e-10 */
-                    2692664, /* x^1: 0.00200619046 g/V, rounding +1.9e-10 */
-                    -5015, /* x^2: -1.86832622e-06 g/V, rounding +9.3e-11 */
+                    -1217976128, /* x^0: -1.81492586 g/V, rounding +4e-10 */
+                    2692664, /* x^1: 0.0020061905 g/V, rounding +2e-10 */
+                    -5015, /* x^2: -1.86833e-06 g/V, rounding +9e-11 */
                 },
                 /* Nxy = 0.00175174363 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    1175576, /* x^0: 0.00175174363 g/V, rounding +3.7e-10 */
-                    -84560, /* x^1: -6.30026683e-05 g/V, rounding +1.9e-10 */
-                    425, /* x^2: 1.58231705e-07 g/V, rounding +9.3e-11 */
+                    1175576, /* x^0: 0.0017517436 g/V, rounding +4e-10 */
+                    -84560, /* x^1: -6.30027e-05 g/V, rounding +2e-10 */
+                    425, /* x^2: 1.5823e-07 g/V, rounding +9e-11 */
                 },
                 /* Nxz = -0.0541870888 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -36364339, /* x^0: -0.0541870888 g/V, rounding +3.7e-10 */
-                    -769639, /* x^1: -0.000573426299 g/V, rounding +1.9e-10 */
-                    5229, /* x^2: 1.94786116e-06 g/V, rounding +9.3e-11 */
+                    -36364339, /* x^0: -0.0541870888 g/V, rounding +4e-10 */
+                    -769639, /* x^1: -0.0005734263 g/V, rounding +2e-10 */
+                    5229, /* x^2: 1.94786e-06 g/V, rounding +9e-11 */
                 },
                 /* bx = 0.00842548348 g at the origin; integer_k in 2^-(27 + k) g */
                 {
-                    1130850, /* x^0: 0.00842548348 g, rounding +1.9e-09 */
-                    -1567374, /* x^1: -0.00583892595 g, rounding +9.3e-10 */
-                    3148, /* x^2: 5.86314127e-06 g, rounding +4.7e-10 */
+                    1130850, /* x^0: 0.008425483 g, rounding +2e-9 */
+                    -1567374, /* x^1: -0.005838926 g, rounding +9e-10 */
+                    3148, /* x^2: 5.8631e-06 g, rounding +5e-10 */
                 },
                 /* Nyx = 0.0435988326 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    29258682, /* x^0: 0.0435988326 g/V, rounding +3.7e-10 */
-                    1839679, /* x^1: 0.00137066711 g/V, rounding +1.9e-10 */
-                    -10597, /* x^2: -3.94778326e-06 g/V, rounding +9.3e-11 */
+                    29258682, /* x^0: 0.0435988326 g/V, rounding +4e-10 */
+                    1839679, /* x^1: 0.0013706671 g/V, rounding +2e-10 */
+                    -10597, /* x^2: -3.94778e-06 g/V, rounding +9e-11 */
                 },
                 /* Nyy = -1.82328434 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1223585409, /* x^0: -1.82328434 g/V, rounding +3.7e-10 */
-                    4283604, /* x^1: 0.00319153313 g/V, rounding +1.9e-10 */
-                    -14876, /* x^2: -5.54183498e-06 g/V, rounding +9.3e-11 */
+                    -1223585409, /* x^0: -1.82328434 g/V, rounding +4e-10 */
+                    4283604, /* x^1: 0.0031915331 g/V, rounding +2e-10 */
+                    -14876, /* x^2: -5.54183e-06 g/V, rounding +9e-11 */
                 },
                 /* Nyz = 0.00353288986 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    2370883, /* x^0: 0.00353288986 g/V, rounding +3.7e-10 */
-                    -97123, /* x^1: -7.23628327e-05 g/V, rounding +1.9e-10 */
-                    2178, /* x^2: 8.11275095e-07 g/V, rounding +9.3e-11 */
+                    2370883, /* x^0: 0.0035328899 g/V, rounding +4e-10 */
+                    -97123, /* x^1: -7.23628e-05 g/V, rounding +2e-10 */
+                    2178, /* x^2: 8.1128e-07 g/V, rounding +9e-11 */
                 },
                 /* by = -0.0076189395 g at the origin; integer_k in 2^-(27 + k) g */
                 {
-                    -1022596, /* x^0: -0.0076189395 g, rounding +1.9e-09 */
-                    -2159328, /* x^1: -0.00804412644 g, rounding +9.3e-10 */
-                    10033, /* x^2: 1.86874531e-05 g, rounding +4.7e-10 */
+                    -1022596, /* x^0: -0.00761894 g, rounding +2e-9 */
+                    -2159328, /* x^1: -0.0080441264 g, rounding +9e-10 */
+                    10033, /* x^2: 1.86875e-05 g, rounding +5e-10 */
                 },
                 /* Nzx = 0.0484357852 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    32504706, /* x^0: 0.0484357852 g/V, rounding +3.7e-10 */
-                    1093135, /* x^1: 0.000814448483 g/V, rounding +1.9e-10 */
-                    -7148, /* x^2: -2.66293064e-06 g/V, rounding +9.3e-11 */
+                    32504706, /* x^0: 0.0484357852 g/V, rounding +4e-10 */
+                    1093135, /* x^1: 0.0008144485 g/V, rounding +2e-10 */
+                    -7148, /* x^2: -2.66293e-06 g/V, rounding +9e-11 */
                 },
                 /* Nzy = 0.00113510825 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    761759, /* x^0: 0.00113510825 g/V, rounding +3.7e-10 */
-                    -70022, /* x^1: -5.21710142e-05 g/V, rounding +1.9e-10 */
-                    606, /* x^2: 2.2565946e-07 g/V, rounding +9.3e-11 */
+                    761759, /* x^0: 0.0011351082 g/V, rounding +4e-10 */
+                    -70022, /* x^1: -5.2171e-05 g/V, rounding +2e-10 */
+                    606, /* x^2: 2.2566e-07 g/V, rounding +9e-11 */
                 },
                 /* Nzz = -1.82169696 g/V at the origin; integer_k in 2^-(59 + k) g/code32 */
                 {
-                    -1222520132, /* x^0: -1.82169696 g/V, rounding +3.7e-10 */
-                    5109165, /* x^1: 0.003806624 g/V, rounding +1.9e-10 */
-                    -20429, /* x^2: -7.61048868e-06 g/V, rounding +9.3e-11 */
+                    -1222520132, /* x^0: -1.82169696 g/V, rounding +4e-10 */
+                    5109165, /* x^1: 0.003806624 g/V, rounding +2e-10 */
+                    -20429, /* x^2: -7.61049e-06 g/V, rounding +9e-11 */
                 },
                 /* bz = -0.00647638552 g at the origin; integer_k in 2^-(27 + k) g */
                 {
-                    -869245, /* x^0: -0.00647638552 g, rounding +1.9e-09 */
-                    -200917, /* x^1: -0.000748476945 g, rounding +9.3e-10 */
-                    2296, /* x^2: 4.2761676e-06 g, rounding +4.7e-10 */
+                    -869245, /* x^0: -0.006476386 g, rounding +2e-9 */
+                    -200917, /* x^1: -0.0007484769 g, rounding +9e-10 */
+                    2296, /* x^2: 4.2762e-06 g, rounding +5e-10 */
                 },
             },
         },
@@ -105,28 +105,28 @@ TRIAX_CALIB_SECTION const triax_calib_t triax_calib_constants = {
     {
         /* Q, an integer in 2^-37 g/g^2 */
         {
-            31415926, /* Qxxx: 0.000228580944 g/g^2, rounding +1.8e-12 */
-            -5358979, /* Qxyy: -3.89917059e-05 g/g^2, rounding +1.8e-12 */
-            3238462, /* Qxzz: 2.35629104e-05 g/g^2, rounding +1.8e-12 */
-            -643383, /* Qxxy: -4.68122926e-06 g/g^2, rounding +1.8e-12 */
-            2795028, /* Qxxz: 2.03365034e-05 g/g^2, rounding +1.8e-12 */
-            -841971, /* Qxyz: -6.12614713e-06 g/g^2, rounding +1.8e-12 */
+            31415926, /* Qxxx: 0.000228580944 g/g^2, rounding +2e-12 */
+            -5358979, /* Qxyy: -3.8991706e-05 g/g^2, rounding +2e-12 */
+            3238462, /* Qxzz: 2.356291e-05 g/g^2, rounding +2e-12 */
+            -643383, /* Qxxy: -4.681229e-06 g/g^2, rounding +2e-12 */
+            2795028, /* Qxxz: 2.0336503e-05 g/g^2, rounding +2e-12 */
+            -841971, /* Qxyz: -6.126147e-06 g/g^2, rounding +2e-12 */
         },
         {
-            -693993, /* Qyxx: -5.04946547e-06 g/g^2, rounding +1.8e-12 */
-            7510582, /* Qyyy: 5.46466745e-05 g/g^2, rounding +1.8e-12 */
-            974944, /* Qyzz: 7.0936494e-06 g/g^2, rounding +1.8e-12 */
-            5923078, /* Qyxy: 4.30960627e-05 g/g^2, rounding +1.8e-12 */
-            -1640628, /* Qyxz: -1.19371416e-05 g/g^2, rounding +1.8e-12 */
-            6208998, /* Qyyz: 4.51764045e-05 g/g^2, rounding +1.8e-12 */
+            -693993, /* Qyxx: -5.049465e-06 g/g^2, rounding +2e-12 */
+            7510582, /* Qyyy: 5.4646674e-05 g/g^2, rounding +2e-12 */
+            974944, /* Qyzz: 7.093649e-06 g/g^2, rounding +2e-12 */
+            5923078, /* Qyxy: 4.3096063e-05 g/g^2, rounding +2e-12 */
+            -1640628, /* Qyxz: -1.1937142e-05 g/g^2, rounding +2e-12 */
+            6208998, /* Qyyz: 4.5176404e-05 g/g^2, rounding +2e-12 */
         },
         {
-            6280348, /* Qzxx: 4.5695544e-05 g/g^2, rounding +1.8e-12 */
-            -253421, /* Qzyy: -1.84388227e-06 g/g^2, rounding +1.8e-12 */
-            -17067982, /* Qzzz: -0.000124185915 g/g^2, rounding +1.8e-12 */
-            148086, /* Qzxy: 1.07746564e-06 g/g^2, rounding +1.8e-12 */
-            5132823, /* Qzxz: 3.73462008e-05 g/g^2, rounding +1.8e-12 */
-            664709, /* Qzyz: 4.83639269e-06 g/g^2, rounding +1.8e-12 */
+            6280348, /* Qzxx: 4.5695544e-05 g/g^2, rounding +2e-12 */
+            -253421, /* Qzyy: -1.843882e-06 g/g^2, rounding +2e-12 */
+            -17067982, /* Qzzz: -0.000124185915 g/g^2, rounding +2e-12 */
+            148086, /* Qzxy: 1.077466e-06 g/g^2, rounding +2e-12 */
+            5132823, /* Qzxz: 3.7346201e-05 g/g^2, rounding +2e-12 */
+            664709, /* Qzyz: 4.836393e-06 g/g^2, rounding +2e-12 */
         },
     },
 };

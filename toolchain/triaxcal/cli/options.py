@@ -18,12 +18,17 @@ from triaxcal.base.screentext import wrapped
 if TYPE_CHECKING:
     from triaxcal import Study
 
+    _PathType = click.ParamType[Path]
+    _WholeType = click.ParamType[int]
+else:  # click before 8.4 has no such types
+    _PathType = _WholeType = click.ParamType
+
 UNITS = Path("units")
 _WIDTHS = 60, 120
 """Columns of text: a narrower terminal breaks the lines itself, a longer line is hard to read."""
 
 
-class UnitFolder(click.ParamType[Path]):
+class UnitFolder(_PathType):
     """The folder of a unit, by its path or by its name in units/."""
 
     name = "unit"
@@ -54,7 +59,7 @@ class UnitFolder(click.ParamType[Path]):
         return names or [CompletionItem(incomplete, type="dir")]
 
 
-class HexNumber(click.ParamType[int]):
+class HexNumber(_WholeType):
     """A whole number, decimal or hexadecimal with 0x."""
 
     name = "number"

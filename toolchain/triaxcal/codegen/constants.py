@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ from triaxcal.model.metrological import per
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unit.thermometer import TemperatureSensor
 
+_DIGITS = 9
 CONSTANTS_FILES = ("triax_calib.h", "triax_calib.c")
 
 
@@ -129,8 +131,23 @@ def _word(name: str, integer: int, exact: float, lsb: float) -> dict[str, str]:
     return {
         "name": name,
         "integer": int32_literal(integer),
-        "value": f"{exact * lsb:.9g}",
-        "rounding": f"{(integer - exact) * lsb:+.1e}",
+        **_physical(exact * lsb, (integer - exact) * lsb, lsb),
+    }
+
+
+def _physical(value: float, rounding: float, lsb: float) -> dict[str, str]:
+    """Value and rounding of an integer, to a quarter of its last place or less.
+
+    The digits behind it differ between versions of the libraries that fitted the value, and the
+    text of the C shall not.
+    """
+    place = math.floor(math.log10(lsb / 4))
+    size = math.floor(math.log10(abs(value))) if value else place
+    digits = min(_DIGITS, max(1, size - place + 1))
+    steps = round(rounding * 10.0**-place)
+    return {
+        "value": f"{value:.{digits}g}",
+        "rounding": f"{steps:+d}e{place}" if steps else "0",
     }
 
 
@@ -169,8 +186,7 @@ def _function_context(plan: Plan, s: int, f: int) -> dict[str, Any]:
         rows.append(
             {
                 "integer": int32_literal(integer),
-                "value": f"{exact * lsb:.9g}",
-                "rounding": f"{rounding:+.1e}",
+                **_physical(exact * lsb, rounding, lsb / 2.0**k),
             }
         )
     notes = f"integer_k in 2^-({bits} + k) {_raw_unit(plan, f)}"
