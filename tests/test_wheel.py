@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import sysconfig
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+ENVIRONMENT = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
 
 
 @pytest.fixture(scope="session")
@@ -42,6 +44,7 @@ def test_it_works_outside_the_checkout(wheel: Path, tmp_path: Path) -> None:
     run = subprocess.run(
         [str(venv / "bin" / "python"), "-c", code, "calib", str(ROOT / "units" / "AT-CHERNIAK")],
         cwd=tmp_path,
+        env=ENVIRONMENT,
         capture_output=True,
         text=True,
         check=False,
@@ -50,6 +53,7 @@ def test_it_works_outside_the_checkout(wheel: Path, tmp_path: Path) -> None:
     where = subprocess.run(
         [str(venv / "bin" / "python"), "-c", "import triaxcal; print(triaxcal.__file__)"],
         cwd=tmp_path,
+        env=ENVIRONMENT,
         capture_output=True,
         text=True,
         check=True,
