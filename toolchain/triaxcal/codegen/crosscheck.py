@@ -82,54 +82,53 @@ class CrossCheck:
 
 def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[VectorSet]:
     """Every temperature code x lattice, a boundary grid, ties, random in range, random int32."""
-    shape = plan.shape
-    limits = plan.temp_min_code, plan.temp_max_code, shape.raw_min, shape.raw_max
-    lattice, in_range, anything = _of_limits(*limits, random_vectors)
-    ties_of_plan = VectorSet("borders of rounding", *ties(plan))
-    return [lattice, _boundary(plan), ties_of_plan, in_range, anything]
+    low, high = plan.temp_min_code, plan.temp_max_code
+    # Sorted temperatures: set_temperature runs once for equal codes, as on the device.
+    codes = np.arange(low, high + 1, dtype=np.int32)
+    rng = np.random.Generator(np.random.PCG64(SEED))
+    each = rng.multinomial(random_vectors, np.full(len(codes), 1.0 / len(codes)))
+    in_range = _random_raw(random_vectors, plan.shape.raw_min, plan.shape.raw_max)
+    return [
+        _lattice(plan),
+        _boundary(plan),
+        VectorSet("borders of rounding", *ties(plan)),
+        VectorSet("random in range", np.repeat(codes, each), in_range),
+        _anything(random_vectors),
+    ]
+
+
+@lru_cache(maxsize=2)
+def _random_raw(count: int, low: int, high: int) -> Int32Array:
+    """Raw codes (n, 3); the units of a series share them."""
+    rng = np.random.Generator(np.random.PCG64([SEED, 1]))
+    raw = rng.integers(low, high, (count, 3), dtype=np.int32, endpoint=True)
+    raw.flags.writeable = False
+    return raw
 
 
 @lru_cache(maxsize=1)
-def _of_limits(
-    low: int, high: int, raw_min: int, raw_max: int, random_vectors: int
-) -> tuple[VectorSet, VectorSet, VectorSet]:
-    """The sets that depend on limits only: the units of a series share them."""
-    rng = np.random.Generator(np.random.PCG64(SEED))
-    # Sorted temperatures: set_temperature runs once for equal codes, as on the device.
-    codes = np.arange(low, high + 1, dtype=np.int32)
-    each = rng.multinomial(random_vectors, np.full(len(codes), 1.0 / len(codes)))
-    in_range = (
-        np.repeat(codes, each),
-        rng.integers(raw_min, raw_max, (random_vectors, 3), dtype=np.int32, endpoint=True),
-    )
-    temps = -(-random_vectors // _SHARED_TEMP)
-    temps_of_any = rng.integers(INT32_MIN, INT32_MAX, temps, dtype=np.int32, endpoint=True)
-    anything = (
-        np.repeat(np.sort(temps_of_any), _SHARED_TEMP)[:random_vectors],
-        rng.integers(INT32_MIN, INT32_MAX, (random_vectors, 3), dtype=np.int32, endpoint=True),
-    )
-    for array in (*in_range, *anything):
-        array.flags.writeable = False
-    return (
-        _lattice(low, high, raw_min, raw_max),
-        VectorSet("random in range", *in_range),
-        VectorSet("random int32", *anything),
-    )
+def _anything(count: int) -> VectorSet:
+    """Any int32; the units of a series share them."""
+    rng = np.random.Generator(np.random.PCG64([SEED, 2]))
+    temps = -(-count // _SHARED_TEMP)
+    few = rng.integers(INT32_MIN, INT32_MAX, temps, dtype=np.int32, endpoint=True)
+    temp = np.repeat(np.sort(few), _SHARED_TEMP)[:count]
+    temp.flags.writeable = False
+    return VectorSet("random int32", temp, _random_raw(count, INT32_MIN, INT32_MAX))
 
 
 def _product(name: str, temp: list[int], raw_axis: list[int]) -> VectorSet:
-    one = np.array(list(itertools.product(raw_axis, repeat=3)), dtype=np.int32)
-    temps = np.repeat(np.array(temp, dtype=np.int32), len(one))
-    raw = np.tile(one, (len(temp), 1))
-    temps.flags.writeable = raw.flags.writeable = False
-    return VectorSet(name, temps, raw, exhaustive=True)
+    raw = np.array(list(itertools.product(raw_axis, repeat=3)), dtype=np.int32)
+    temps = np.repeat(np.array(temp, dtype=np.int32), len(raw))
+    return VectorSet(name, temps, np.tile(raw, (len(temp), 1)), exhaustive=True)
 
 
-def _lattice(low: int, high: int, raw_min: int, raw_max: int) -> VectorSet:
+def _lattice(plan: Plan) -> VectorSet:
     """Every code of the range and two beyond each end x corners, faces, edges and centre."""
-    middle = (raw_min + raw_max) // 2
-    temps = list(range(low - 2, high + 3))
-    return _product("every temperature code", temps, [raw_min, middle + 1, raw_max])
+    temps = list(range(plan.temp_min_code - 2, plan.temp_max_code + 3))
+    middle = (plan.shape.raw_min + plan.shape.raw_max) // 2
+    raw = [plan.shape.raw_min, middle + 1, plan.shape.raw_max]
+    return _product("every temperature code", temps, raw)
 
 
 def _boundary(plan: Plan) -> VectorSet:

@@ -15,6 +15,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import Compilation, compile_library
 from triaxcal.codegen.forces import forces_of, rates_of
+from triaxcal.codegen.objects import SharedObjects
 from triaxcal.codegen.shim import write_shim
 from triaxcal.fixedpoint.rate import RatePlan
 from triaxcal.unit.prefix import DEFAULT_PREFIX
@@ -48,9 +49,17 @@ def difference(found: Answers, expected: Answers) -> Difference | None:
     return Difference(i, int(differs.sum()), *words)
 
 
-def start_generated(folder: Path, target: Path, prefix: str = DEFAULT_PREFIX) -> Compilation:
-    """Start compiling the generated files in `folder` with the batch entry, into `target`."""
-    return _start(folder, target, prefix, ("comp", "calib"), ("batch",))
+def start_generated(
+    folder: Path,
+    target: Path,
+    prefix: str = DEFAULT_PREFIX,
+    objects: SharedObjects | None = None,
+) -> Compilation:
+    """Start compiling the generated files in `folder` with the batch entry, into `target`.
+
+    The routine, which has no constants of the unit, may come from `objects`.
+    """
+    return _start(folder, target, prefix, ("comp", "calib"), ("batch",), objects=objects)
 
 
 def start_generated_imu(folder: Path, target: Path, prefix: str = DEFAULT_PREFIX) -> Compilation:
@@ -60,12 +69,20 @@ def start_generated_imu(folder: Path, target: Path, prefix: str = DEFAULT_PREFIX
 
 
 def _start(
-    folder: Path, target: Path, prefix: str, names: Sequence[str], batches: Sequence[str]
+    folder: Path,
+    target: Path,
+    prefix: str,
+    names: Sequence[str],
+    batches: Sequence[str],
+    *,
+    objects: SharedObjects | None = None,
 ) -> Compilation:
     """Compile the files of `names`, and the self-tests where there are any."""
     source = shipped("firmware_ref")
     shim = write_shim(target / "names", prefix)
     sources = [folder / f"{prefix}_{name}.c" for name in names]
+    if objects is not None:
+        sources[0] = objects.instead_of(sources[0])
     tests = (folder / f"{prefix}_{name}.c" for name in ("selftest", "gyro_selftest"))
     sources += [test for test in tests if test.exists()]
     sources += [source / f"{DEFAULT_PREFIX}_{name}.c" for name in batches]

@@ -15,6 +15,7 @@ from triaxcal.codegen.compiler import Compilation, library_folder, reference_und
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.image_cases import check_images, image_cases
+from triaxcal.codegen.objects import SharedObjects
 from triaxcal.codegen.routines import (
     Generated,
     Int32Array,
@@ -87,11 +88,15 @@ class Delivery(Fitted):
         return self.firmware.files
 
 
-def deliver(folder: Path, reference: Reference | Compilation | None = None) -> Delivery:
+def deliver(
+    folder: Path,
+    reference: Reference | Compilation | None = None,
+    objects: SharedObjects | None = None,
+) -> Delivery:
     """Calibrate the unit in `folder`, generate its C and check it.
 
     `reference` is the handwritten C, which does not depend on the unit, where its compilation has
-    been started already.
+    been started already. `objects` are what units of a series have in common.
 
     Raises
     ------
@@ -102,10 +107,12 @@ def deliver(folder: Path, reference: Reference | Compilation | None = None) -> D
         unit = read_unit(folder)
         if reference is None:
             reference = stack.enter_context(reference_under_way())
-        return deliver_fitted(fit_folder(unit, folder), reference)
+        return deliver_fitted(fit_folder(unit, folder), reference, objects)
 
 
-def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delivery:
+def deliver_fitted(
+    fitted: Fitted, reference: Reference | Compilation, objects: SharedObjects | None = None
+) -> Delivery:
     """As `deliver`, for a calibration that was made."""
     with ExitStack() as stack:
         work = stack.enter_context(library_folder())
@@ -115,7 +122,7 @@ def deliver_fitted(fitted: Fitted, reference: Reference | Compilation) -> Delive
         plan = firmware.plan
         for file, content in firmware.files.items():
             (work / file).write_bytes(content)
-        compilation = start_generated(work, work, plan.prefix)
+        compilation = start_generated(work, work, plan.prefix, objects)
         stack.callback(compilation.cancel)
         bound = firmware.bound
         sets = vector_sets(plan)

@@ -9,7 +9,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from triaxcal.diagnosis.core.curves import BendFeatures, residuals
+from triaxcal.diagnosis.core.curves import BendFeatures, constants, residuals
 from triaxcal.diagnosis.core.readings import Readings
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
@@ -100,12 +100,17 @@ class Hypothesis:
 
     def columns(self, readings: Readings, theta: FloatArray, about: FloatArray) -> FloatArray:
         """Effect of each amplitude on the rows, about some amplitudes, shape (n, k)."""
-        base = residuals(self.undo(readings, about), theta)
+        undone = self.undo(readings, about)
+        temps = undone.temps_degc
+        at = constants(theta, temps, undone.t0_degc)
+        base = residuals(undone, theta, at)
         effects = []
         for k in range(len(self.parameters)):
             step = np.zeros(len(self.parameters))
             step[k] = _SMALL
-            effects.append((base - residuals(self.undo(readings, about + step), theta)) / _SMALL)
+            moved = self.undo(readings, about + step)
+            same = moved.temps_degc is temps  # most causes leave the temperatures alone
+            effects.append((base - residuals(moved, theta, at if same else None)) / _SMALL)
         return np.stack(effects, axis=1)
 
 

@@ -74,10 +74,14 @@ def _force(at: FloatArray, outputs: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(at[:, :, 1:], free)[:, :, 0])
 
 
-def residuals(readings: Readings, theta: FloatArray) -> FloatArray:
-    """Of every row: output less model in test positions, |a| - g in check positions, g."""
+def residuals(readings: Readings, theta: FloatArray, at: FloatArray | None = None) -> FloatArray:
+    """Of every row: output less model in test positions, |a| - g in check positions, g.
+
+    `at` are the `constants` at the temperatures of the readings, where they are known.
+    """
     test = readings.test
-    at = constants(theta, readings.temps_degc, readings.t0_degc)
+    if at is None:
+        at = constants(theta, readings.temps_degc, readings.t0_degc)
     model = at[:, :, 0] + np.einsum("nij,nj->ni", at[:, :, 1:], readings.force)
     own = (readings.outputs - model)[test].ravel()
     if test.all():

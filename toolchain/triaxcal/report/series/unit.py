@@ -15,6 +15,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Order, Outcome, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.codegen.compiler import start_reference
+from triaxcal.codegen.objects import SharedObjects
 from triaxcal.codegen.routines import Reference
 from triaxcal.delivery.unit import Delivery, deliver
 from triaxcal.device.record import DeviceRecord, parsed_record
@@ -44,7 +45,7 @@ def make_unit(order: Order) -> Outcome:
                     raise RefusedError(str(folder / name), "lies outside of the unit's folder")
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 (folder / name).write_bytes(content)
-            delivery = deliver(folder, _reference())
+            delivery = deliver(folder, _reference(), _objects())
             order.refuse_change(delivery.inputs_sha256)
             made = passport(delivery, {}, _device(order))
             return Outcome(order.name, order.key, "", all_files(delivery, made), unit_record(made))
@@ -72,6 +73,12 @@ def _reference() -> Reference:
     # Windows removes no file of a loaded library: the series' own folder takes it along.
     with tempfile.TemporaryDirectory(prefix="triaxcal-", ignore_cleanup_errors=True) as folder:
         return Reference(start_reference(Path(folder)).load())
+
+
+@cache
+def _objects() -> SharedObjects:
+    """What the C of units of one shape has in common, compiled once a worker."""
+    return SharedObjects()
 
 
 def unit_record(made: Passport) -> dict[str, Any]:
