@@ -91,7 +91,7 @@ def calibrate_series(
     target.mkdir(parents=True, exist_ok=True)
     if series.made:
         journal.rewrite(target, ({**journal.read_journal(target), **series.entries}).values())
-    renew(series_files(series), target)
+    renew(series_files(series, target), target)
     page = target / PAGE_FILE
     text = series_summary(series, len(work.done), seconds, width, str(page))
     return SeriesResult(page, dict(series.refused), work.total, text)

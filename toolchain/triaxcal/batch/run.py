@@ -26,11 +26,14 @@ class Series:
         Why each of the others was refused, by name.
     made : int
         Units made in this run, refused ones included.
+    skipped : dict
+        Why units that were named are no units of a series, by name.
     """
 
     entries: dict[str, dict[str, Any]] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
     made: int = 0
+    skipped: dict[str, str] = field(default_factory=dict)
 
     @property
     def records(self) -> list[dict[str, Any]]:
@@ -54,7 +57,9 @@ def run_series(
     RefusedError
         When the journal cannot be written or the cluster is lost; what was made is kept.
     """
-    series = Series(dict(work.done), {o.name: o.refusal for o in work.refused})
+    skipped = {path.absolute().name: why for path, why in work.skipped if path.is_dir()}
+    refusals = {o.name: o.refusal for o in work.refused}
+    series = Series(dict(work.done), refusals, skipped=skipped)
     for outcome in work.refused:
         report(outcome)
     for outcome in runner(make, work.orders) if work.orders else ():

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,18 +27,34 @@ from triaxcal.batch.statistics import (
 )
 from triaxcal.codegen.templates import environment
 from triaxcal.delivery.verdict import PASSED
-from triaxcal.report.pictures.series import BASE, HEIGHT, WIDTH, drift, histogram
+from triaxcal.report.pictures.series import (
+    BASE,
+    HEIGHT,
+    LEFT,
+    RIGHT,
+    WIDTH,
+    drift,
+    error_histogram,
+    histogram,
+)
 from triaxcal.report.series.results import results
+from triaxcal.report.series.units import rows_of, units_csv
+from triaxcal.report.words.numbers import scaled, significant
 
 PAGE_FILE, JSON_FILE = "series.html", "series.json"
 FORMAT = 1
 MOST_ROWS = 30
 """Of a table on the page; series.json has all."""
+_WHERES = ("at T0", "over the range")
 
 
-def series_files(series: Series) -> dict[str, bytes]:
-    """The page, and the same as JSON; no clock in them."""
+def series_files(series: Series, build: Path | None = None) -> dict[str, bytes]:
+    """The page, and the same as JSON; no clock in them.
+
+    `build` is the folder that receives them, where it has pages of units that the series skips.
+    """
     records = series.records
+    rows = rows_of(series, build)
     groups = [(group, quantities(group)) for group in alike(records)]
     far = [o for group, found in groups for o in outliers(group, found)]
     by_run = [r for group, _ in groups for r in runs(group)]
@@ -58,8 +75,8 @@ def series_files(series: Series) -> dict[str, bytes]:
         "more_refusals": max(0, len(series.refused) - MOST_ROWS),
         "yield": _percent(dict(verdicts)[PASSED], len(records) + len(series.refused)),
         "models": Counter(r["thermal_model"] for r in records).most_common(),
-        "sources": Counter(r["worst_source"] for r in records).most_common(),
-        "acceptance": [_acceptance(records, w) for w in ("at T0", "over the range") if records],
+        "sources": Counter(r["worst_source"] for r in records if r["worst_source"]).most_common(),
+        "acceptance": [_acceptance(records, w) for w in _WHERES if records],
         "t0": ", ".join(sorted({f"{r['t0_degc']:g}" for r in records})),
         "width": WIDTH,
         "height": HEIGHT,
@@ -68,24 +85,33 @@ def series_files(series: Series) -> dict[str, bytes]:
             {
                 "unit": group[0]["reading_unit"],
                 "units": len(group),
-                "histograms": [histogram(q, group, far) for q in found],
+                "histograms": [histogram(q, group, far, _factor(group)) for q in found],
             }
             for group, found in groups
         ],
         "outliers": [
-            {**asdict(o), "value": f"{o.value:.6g}", "spreads": _spreads(o)}
+            {**asdict(o), "value": scaled(o.value, abs(o.value), 6), "spreads": _spreads(o)}
             for o in far[:MOST_ROWS]
         ],
         "more_outliers": max(0, len(far) - MOST_ROWS),
-        "factor": f"{outlier_factor(len(groups[0][0]), 36):.2f}" if records else "",
+        "factor": f"{_factor(groups[0][0]):.2f}" if groups and _factor(groups[0][0]) else "",
         "enough": bool(groups) and len(groups[0][0]) >= FEWEST_UNITS,
         "fewest": FEWEST_UNITS,
         "runs": [_run(r) for r in by_run[:60]],
         "more_runs": max(0, len(by_run) - 60),
         "drift": drift(by_run),
+        "left": LEFT,
+        "right": WIDTH - RIGHT,
+        "errors": _error_histograms(records),
+        "rows": rows,
+        "skipped": len(series.skipped),
+        "csv": units_csv(rows),
     }
     page = environment().get_template("pages/series.html.j2").render(context)
-    return {PAGE_FILE: page.encode(), JSON_FILE: _json(series, groups, far, by_run)}
+    return {
+        PAGE_FILE: page.encode("utf-8", "backslashreplace"),
+        JSON_FILE: _json(series, groups, far, by_run),
+    }
 
 
 def _json(
@@ -102,6 +128,7 @@ def _json(
         "passed": dict(results(series))[PASSED],
         "verdicts": dict(results(series)),
         "refused": dict(sorted(series.refused.items())),
+        "skipped": dict(sorted(series.skipped.items())),
         "distributions": [
             {
                 "quantity": q.name,
@@ -131,7 +158,34 @@ def _percent(part: int, whole: int) -> str:
 
 
 def _spreads(outlier: Outlier) -> str:
-    return f"{outlier.spreads:.1f}" if math.isfinite(outlier.spreads) else "all others agree"
+    if not math.isfinite(outlier.spreads):
+        return "all others agree"
+    return scaled(outlier.spreads, max(outlier.spreads, 10.0), 3)
+
+
+def _factor(group: Sequence[dict[str, Any]]) -> float | None:
+    """Spreads beyond which a unit is far from the others; None of too few units."""
+    return outlier_factor(len(group), 36) if len(group) >= FEWEST_UNITS else None
+
+
+def _error_histograms(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Largest errors at T0 and over the range, of units with one limit: of the most of them."""
+    found = []
+    for where in _WHERES:
+        by_limit: dict[float, list[float]] = defaultdict(list)
+        for record in records:
+            for a in record["acceptance"]:
+                if a["where"] == where:
+                    by_limit[a["limit_g"]].append(1e3 * a["largest_residual_g"])
+        for limit_g, errors in sorted(by_limit.items(), key=lambda item: -len(item[1]))[:2]:
+            name = f"{where}, {len(errors)} unit{'s' * (len(errors) > 1)}"
+            found.append(error_histogram(np.array(errors), 1e3 * limit_g, name))
+    return found
+
+
+def _share(share: float) -> str:
+    """Share of a limit in percent, three digits."""
+    return f"{scaled(100.0 * share, max(abs(100.0 * share), 1.0), 3)} %"
 
 
 def _acceptance(records: Sequence[dict[str, Any]], where: str) -> dict[str, str]:
@@ -153,9 +207,9 @@ def _acceptance(records: Sequence[dict[str, Any]], where: str) -> dict[str, str]
     return {
         "where": where,
         "units": str(len(shares)),
-        "median": f"{100 * float(np.median(shares)):.2g} %",
-        "most": f"{100 * max(shares):.2g} %",
-        "end": f"{100 * max(ends):.2g} %",
+        "median": _share(float(np.median(shares))),
+        "most": _share(max(shares)),
+        "end": _share(max(ends)),
     }
 
 
@@ -164,9 +218,9 @@ def _run(r: Run) -> dict[str, Any]:
         "rig": r.rig,
         "date": r.date,
         "units": r.units,
-        "pattern": f"{r.pattern_arcsec:.2g}",
+        "pattern": significant(r.pattern_arcsec),
         "worst": r.worst or "nothing to compare with",
-        "shift": f"{r.shift:+.3g} {r.of_unit}" if r.worst else "",
-        "z": f"{r.z:.1f}" if r.worst else "",
+        "shift": f"{scaled(r.shift, abs(r.shift), 3)} {r.of_unit}" if r.worst else "",
+        "z": scaled(r.z, max(r.z, 10.0), 3) if r.worst else "",
         "far": r.told,
     }

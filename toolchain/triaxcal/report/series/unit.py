@@ -88,6 +88,7 @@ def unit_record(made: Passport) -> dict[str, Any]:
     return {
         "unit": d.unit.name,
         "serial": d.unit.serial,
+        "kind": _kind(d),
         "rig": measured.rig,
         "date": measured.date.isoformat() if measured.date else None,
         "result": made.verdict.result,
@@ -115,6 +116,13 @@ def unit_record(made: Passport) -> dict[str, Any]:
         "vectors": d.check.total,
         "shape": _shape(d),
     }
+
+
+def _kind(delivery: Delivery) -> str:
+    """What the constants were fitted to."""
+    if delivery.unit.recording is None:
+        return "tilter"
+    return "faces" if delivery.calibration.recording is None else "poses"
 
 
 def coefficients(thermal: ThermalModel, range_degc: tuple[float, float]) -> FloatArray:

@@ -46,6 +46,22 @@ def significant(value: float, digits: int = 2) -> str:
     return signed(f"{round(value, places):.{max(places, 0)}f}")
 
 
+def scaled(value: float, scale: float, digits: int = 3) -> str:
+    """Number of either sign to `digits` digits of a `scale`: no exponent where it is short."""
+    if not scale > 0.0:
+        scale = abs(value)
+    if not scale > 0.0:
+        return "0"
+    power = math.floor(math.log10(scale))
+    places = digits - 1 - power
+    if not -9 <= power <= 9:
+        exponent = math.floor(math.log10(abs(value))) if value else 0
+        mantissa = f"{value / 10.0**exponent:.{digits - 1}f}"
+        return signed(f"{mantissa}·10{superscript(exponent)}")
+    # The sign of a negative value that is rounded to 0 goes.
+    return signed(f"{round(value, places) + 0.0:.{max(places, 0)}f}")
+
+
 def g_in_words(value_g: float) -> str:
     """Acceleration in mg, µg or ng, whichever gives a short number."""
     for scale, unit in ((1e3, "mg"), (1e6, "µg"), (1e9, "ng")):
