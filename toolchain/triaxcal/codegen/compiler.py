@@ -94,17 +94,22 @@ def compile_library(
     flags: Sequence[str] = FLAGS,
 ) -> Compilation:
     """Start the compiler on C sources, to a shared library; its name gets the system's ending."""
-    compiler = find_compiler()
     library = library.with_suffix(library_suffix())
-    command = [
-        *compiler.command,
-        *flags,
-        *library_flags(),
-        *(f"-I{folder}" for folder in include),
-        "-o",
-        str(library),
-        *map(str, sources),
-    ]
+    return _start([*flags, *library_flags()], sources, library, include)
+
+
+def compile_object(source: Path, target: Path, include: Sequence[Path] = ()) -> Compilation:
+    """Start the compiler on one source, to an object that can be linked to such a library."""
+    flags = [flag for flag in library_flags() if flag != "-shared"]
+    return _start([*FLAGS, *flags, "-c"], [source], target, include)
+
+
+def _start(
+    flags: Sequence[str], sources: Sequence[Path], target: Path, include: Sequence[Path]
+) -> Compilation:
+    compiler = find_compiler()
+    folders = [f"-I{folder}" for folder in include]
+    command = [*compiler.command, *flags, *folders, "-o", str(target), *map(str, sources)]
     try:
         process = subprocess.Popen(
             command,
@@ -113,14 +118,14 @@ def compile_library(
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
-            env=os.environ | _litter(library.parent),
+            env=os.environ | _litter(target.parent),
             creationflags=NO_CONSOLE,
         )
     except OSError as error:
         raise refused_by_system(
             command[0], "run", error, remedy=f"install another: {install_advice()}"
         ) from error
-    return Compilation(process, library, compiler)
+    return Compilation(process, target, compiler)
 
 
 def _litter(folder: Path) -> dict[str, str]:

@@ -10,7 +10,7 @@ import hashlib
 import re
 from pathlib import Path
 
-from triaxcal.codegen.compiler import FLAGS, compile_library
+from triaxcal.codegen.compiler import compile_object
 
 _INCLUDED = re.compile(rb'^[ \t]*#[ \t]*include[ \t]+"([^"\n]+)"', re.MULTILINE)
 _OTHER_INCLUDE = re.compile(rb"^[ \t]*#[ \t]*include[ \t]+[^\"<\s]", re.MULTILINE)
@@ -59,7 +59,6 @@ def _text_sha256(source: Path) -> str | None:
 
 def _compiled(source: Path) -> bytes | None:
     target = source.with_name(f"{source.stem}_shared.o")
-    compilation = compile_library([source], target, [source.parent], (*FLAGS, "-c"))
-    compilation.process.communicate()
-    made = compilation.library
-    return made.read_bytes() if not compilation.process.returncode and made.is_file() else None
+    process = compile_object(source, target, [source.parent]).process
+    process.communicate()
+    return target.read_bytes() if not process.returncode and target.is_file() else None
