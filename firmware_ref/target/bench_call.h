@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "bench_stack.h"
 #include "bench_subject.h"
 
 typedef uint32_t (*bench_set_t)(subject_state_t *state, const subject_calib_t *calib,
@@ -16,10 +17,6 @@ uint32_t bench_call_set(bench_set_t routine, subject_state_t *state, const subje
                         int32_t temp RATE_PARAMETER);
 uint32_t bench_call_apply(bench_apply_t routine, const subject_state_t *state,
                           const int32_t raw[3], FORCE_PARAMETER int32_t accel[3]);
-
-/* Paints the free stack, and tells how many bytes of it have been overwritten since. */
-void bench_stack_paint(void);
-uint32_t bench_stack_used(void);
 
 /* Of bench_known.S. */
 uint32_t bench_empty_set(subject_state_t *state, const subject_calib_t *calib,
