@@ -1,4 +1,4 @@
-"""Generated C of three fixed plans, byte for byte."""
+"""Generated C of fixed plans and of both pairs of angles, byte for byte."""
 
 from __future__ import annotations
 
@@ -9,14 +9,24 @@ import pytest
 
 from builds import PROVENANCE
 from plans import GOLDEN, SENSOR
+from triaxcal.codegen.angles import ANGLES_FILES, render_angles
 from triaxcal.codegen.constants import CONSTANTS_FILES, render_constants
+from triaxcal.codegen.names import names_of
 from triaxcal.codegen.render import ROUTINE_FILES, render_routine
+from triaxcal.fixedpoint.angles import AnglesPlan
+from triaxcal.unit.angles import PITCH_ROLL, ZENITH_TOOL_FACE, AnglesChoice
 
 FOLDER = Path(__file__).parent / "golden"
+ANGLES_GOLDEN = {
+    f"angles-{pair}": AnglesPlan(AnglesChoice(pair), 24) for pair in (ZENITH_TOOL_FACE, PITCH_ROLL)
+}
+ALL = (*GOLDEN, *ANGLES_GOLDEN)
 REMEDY = "if the change is meant: make golden (pytest --update-golden), read git diff, commit"
 
 
 def rendered(name: str) -> dict[str, str]:
+    if name in ANGLES_GOLDEN:
+        return render_angles(ANGLES_GOLDEN[name], names_of(GOLDEN["direct-checked"]))
     plan = GOLDEN[name]
     return {
         **render_routine(plan),
@@ -44,8 +54,13 @@ def compare_or_update(found: str, golden: Path, *, update: bool) -> None:
     pytest.fail("\n".join([*list(difference)[:60], REMEDY]), pytrace=False)
 
 
-@pytest.mark.parametrize("file", [*ROUTINE_FILES, *CONSTANTS_FILES])
-@pytest.mark.parametrize("name", GOLDEN)
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        *((name, file) for name in GOLDEN for file in (*ROUTINE_FILES, *CONSTANTS_FILES)),
+        *((name, file) for name in ANGLES_GOLDEN for file in ANGLES_FILES),
+    ],
+)
 def test_generated_c_is_as_it_was(name: str, file: str, request: pytest.FixtureRequest) -> None:
     update = bool(request.config.getoption("--update-golden"))
     compare_or_update(rendered(name)[file], FOLDER / name / file, update=update)
@@ -53,10 +68,10 @@ def test_generated_c_is_as_it_was(name: str, file: str, request: pytest.FixtureR
 
 def test_every_golden_file_belongs_to_a_plan() -> None:
     kept = {str(p.relative_to(FOLDER)) for p in FOLDER.rglob("*") if p.is_file()}
-    assert kept == {f"{name}/{file}" for name in GOLDEN for file in rendered(name)}
+    assert kept == {f"{name}/{file}" for name in ALL for file in rendered(name)}
 
 
-@pytest.mark.parametrize("name", GOLDEN)
+@pytest.mark.parametrize("name", ALL)
 def test_rendering_twice_gives_the_same_bytes(name: str) -> None:
     assert rendered(name) == rendered(name)
 
@@ -73,7 +88,7 @@ def test_a_difference_is_shown_with_its_remedy(tmp_path: Path) -> None:
         compare_or_update("new\n", tmp_path / "missing.c", update=False)
 
 
-@pytest.mark.parametrize("name", GOLDEN)
+@pytest.mark.parametrize("name", ALL)
 def test_golden_files_name_no_clock_host_or_path(name: str) -> None:
     for text in rendered(name).values():
         assert str(Path.cwd()) not in text
@@ -81,7 +96,7 @@ def test_golden_files_name_no_clock_host_or_path(name: str) -> None:
         assert not any(word in text for word in ("20:", ":20", "Jan ", "UTC", "localhost"))
 
 
-@pytest.mark.parametrize("name", GOLDEN)
+@pytest.mark.parametrize("name", ALL)
 def test_templates_leave_no_trace(name: str) -> None:
     for file, text in rendered(name).items():
         assert "{{" not in text

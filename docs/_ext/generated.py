@@ -7,9 +7,11 @@ it is kept in the page, so that it can be read without building the site. `make 
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from fractions import Fraction
 from pathlib import Path
 
 import click
@@ -19,6 +21,8 @@ from triaxcal.diagnosis.causes.registry import CAUSES
 from triaxcal.diagnosis.core.cause import Cause
 from triaxcal.diagnosis.poses.causes.registry import POSE_CAUSES
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
+from triaxcal.fixedpoint.angles import ARCSEC_PER_UNIT
+from triaxcal.fixedpoint.angles_proof import prove_angles
 from triaxcal.keytable.catalogue import FILES
 from triaxcal.keytable.reference import reference_markdown
 from triaxcal.model.methods.registry import METHODS
@@ -111,6 +115,21 @@ def _causes(registry: Iterable[Cause]) -> str:
     return _table(("cause", "what it is", "what would tell it from what looks the same"), rows)
 
 
+def _angles_bound() -> str:
+    """Terms of the proven error of triax_angles, in units, and their sums in arcsec."""
+    bound = prove_angles()
+    names = dict.fromkeys(t.name for t in (*bound.first, *bound.second))
+    columns = [{t.name: t.units for t in terms} for terms in (bound.first, bound.second)]
+    rows = [[n, *(f"{_up(c[n], 3):.3f}" if n in c else "" for c in columns)] for n in names]
+    rows.append(["sum", *(f"{_up(u, 2):.2f}" for u in bound.units)])
+    rows.append(["in arcsec", *(f"{_up(u * ARCSEC_PER_UNIT, 4):.4f}" for u in bound.units)])
+    return _table(("term", "zenith, pitch", "tool face, roll"), rows)
+
+
+def _up(value: Fraction | float, decimals: int) -> float:
+    return math.ceil(value * 10**decimals) / 10**decimals
+
+
 TABLES: dict[str, Callable[..., str]] = {
     "keys": _keys,
     "formats": _formats,
@@ -124,6 +143,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "commands": _commands,
     "causes": lambda: _causes(CAUSES),
     "pose-causes": lambda: _causes(POSE_CAUSES),
+    "angles-bound": _angles_bound,
 }
 
 

@@ -11,14 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from triaxcal.api.calibration import Calibration
 from triaxcal.base.arrays import int32
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import publish, renew
+from triaxcal.codegen.angles import GeneratedAngles
 from triaxcal.codegen.routines import Int32Array, UInt32Array, routines_of, start_generated
 from triaxcal.delivery.firmware import make_firmware
 from triaxcal.delivery.fitted import refuse_beyond_limits
+from triaxcal.fixedpoint.angles import AnglesPlan, angles
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound, prove
@@ -27,6 +30,7 @@ from triaxcal.model.types import FloatArray
 from triaxcal.unit.prefix import checked_prefix
 
 Answers = tuple[Int32Array, UInt32Array]
+Angles = tuple[npt.NDArray[np.integer[Any]], UInt32Array]
 _BLOCK = 1 << 16
 """Rows that are computed at a time: the working arrays stay small."""
 
@@ -119,6 +123,49 @@ class Firmware:
             accel[block], more = apply(self.plan, state, wide[2])
             status[block] = flags | more
         return accel, status
+
+    def angles(self, accel: Any) -> Angles:
+        """Answers of `triax_angles`: the two angles of [firmware] angles.
+
+        Parameters
+        ----------
+        accel : array_like of whole numbers, shape (n, 3)
+            What `apply` gives, any int32.
+
+        Returns
+        -------
+        angle : array of uint32 or int32, shape (n, 2)
+            Binary angles, 2^32 a turn: zenith and tool face (uint32), or pitch and roll (int32).
+        status : array of uint32, shape (n,)
+            Bits of docs/reference/c-api.md; 0 is good.
+
+        Raises
+        ------
+        RefusedError
+            For another shape, a number beyond int32, or a unit without [firmware] angles.
+        """
+        plan = self.angles_plan
+        angle, status = angles(plan, int32("accel", accel, 3).astype(np.int64))
+        return angle.astype(np.uint32 if plan.zenith else np.int32), status.astype(np.uint32)
+
+    @property
+    def angles_plan(self) -> AnglesPlan:
+        """What `angles` needs to know.
+
+        Raises
+        ------
+        RefusedError
+            For a unit without [firmware] angles.
+        """
+        plan = self._made.angles
+        if plan is None:
+            raise RefusedError(
+                "angles",
+                f"unit {self.unit} states none",
+                expected='[firmware] angles = "zenith-tool-face" or "pitch-roll"',
+                remedy="state it in unit.toml",
+            )
+        return plan
 
     def model(self, raw_codes: Any, temp_codes: Any, rate_codes: Any = None) -> FloatArray:
         """The same functions in floats, shape (n, 3), in g: `bound` is against these.
@@ -264,6 +311,12 @@ class CompiledFirmware:
         raw, temp, rate = self._firmware.codes(raw_codes, temp_codes, rate_codes)
         plan = self._firmware.plan
         return routines_of(plan.rate, self._library, self._library, rate)[0].run(temp, raw)
+
+    def angles(self, accel: Any) -> Angles:
+        """As `Firmware.angles`, by the compiled C."""
+        plan = self._firmware.angles_plan
+        angle, status = GeneratedAngles(self._library, plan).run(int32("accel", accel, 3))
+        return angle.astype(np.uint32 if plan.zenith else np.int32), status
 
 
 def _one_or_all(name: str, value: Any, count: int) -> Int32Array:

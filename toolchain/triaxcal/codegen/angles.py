@@ -6,7 +6,6 @@ import ctypes
 import math
 import zlib
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -114,9 +113,3 @@ class GeneratedAngles:
         pointers = [ctypes.c_void_p(a.ctypes.data) for a in (given, angle, status)]
         self._function(*pointers[:1], ctypes.c_uint32(len(given)), *pointers[1:])
         return angle.astype(np.int64), status
-
-
-def angle_sources(folder: Path, prefix: str, firmware_ref: Path) -> Sequence[Path]:
-    """C files that make the batch entry, for a delivery in `folder` that has angles."""
-    own = folder / f"{prefix}_angles.c"
-    return (own, firmware_ref / "triax_angles_batch.c") if own.exists() else ()

@@ -77,7 +77,7 @@ def _start(
     *,
     objects: SharedObjects | None = None,
 ) -> Compilation:
-    """Compile the files of `names`, and the self-tests where there are any."""
+    """Compile the files of `names`, the self-tests and the angles where there are any."""
     source = shipped("firmware_ref")
     shim = write_shim(target / "names", prefix)
     sources = [folder / f"{prefix}_{name}.c" for name in names]
@@ -86,6 +86,8 @@ def _start(
     tests = (folder / f"{prefix}_{name}.c" for name in ("selftest", "gyro_selftest"))
     sources += [test for test in tests if test.exists()]
     sources += [source / f"{DEFAULT_PREFIX}_{name}.c" for name in batches]
+    if (angles := folder / f"{prefix}_angles.c").exists():
+        sources += [angles, source / f"{DEFAULT_PREFIX}_angles_batch.c"]
     library = target / f"{prefix}_{names[-1]}"
     return compile_library(sources, library, include=[folder, *shim, source])
 

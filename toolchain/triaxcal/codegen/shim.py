@@ -8,11 +8,12 @@ from triaxcal.unit.prefix import DEFAULT_PREFIX
 
 _HEADERS = (
     "comp.h", "calib.h", "selftest.h", "gyro_comp.h", "gyro_calib.h", "gyro_selftest.h", "imu.h",
+    "angles.h",
 )  # fmt: skip
 _TRIADS = ("", "gyro_", "imu_")
 _NAMES = (
     "calib_t", "state_t", "set_temperature", "set_temperature_rate", "apply", "calib_load",
-    "selftest",
+    "selftest", "angles", "angle_t",
 )  # fmt: skip
 _MACROS = ("CALIB", "IMAGE_SIZE", "RAW_MIN", "RAW_MAX", "RATE_Q", "SHAPE")
 

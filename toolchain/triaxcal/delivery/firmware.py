@@ -22,6 +22,7 @@ from triaxcal.delivery.verdict import Verdict
 from triaxcal.fitting.converter import input_words, plain_name
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.acceptance import dwells_in_range
+from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.arithmetic import INT32_MAX
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan, make_plan
@@ -78,6 +79,12 @@ class Firmware:
     def error_g(self) -> float:
         """Largest error against K(T)^-1 (U - U0(T)): that of arithmetic and method."""
         return self.bound.lsb * 2.0**-self.plan.shape.output_q + self.model_error_g
+
+    @property
+    def angles(self) -> AnglesPlan | None:
+        """The angles that the device makes; None for none."""
+        choice = self.fitted.unit.angles
+        return None if choice is None else AnglesPlan(choice, self.plan.shape.output_q)
 
     @cached_property
     def uncertainty(self) -> Uncertainty:
@@ -182,7 +189,7 @@ def _files(firmware: Firmware) -> dict[str, bytes]:
         *_tested(firmware.verdict),
     )
     provenance = replace(firmware.provenance, summary=summary)
-    return output_files(Job(plan, unit.temperature_sensor, provenance))
+    return output_files(Job(plan, unit.temperature_sensor, provenance, firmware.angles))
 
 
 def fitted_to(calibration: Calibration) -> str:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.angles_check import AnglesCheck, check_angles
 from triaxcal.codegen.compiler import Compilation, library_folder, reference_under_way
 from triaxcal.codegen.crosscheck import CrossCheck, cross_check, vector_sets
 from triaxcal.codegen.image import image_bytes
@@ -50,12 +51,15 @@ class Delivery(Fitted):
         Residuals at the unit's own dwells: before, the unit's method, then the others.
     compiler : str
         The compiler and its version.
+    angles_check : AnglesCheck or None
+        Of the angles, where the device makes them.
     """
 
     firmware: Firmware
     check: CrossCheck
     methods: tuple[MethodResult, ...]
     compiler: str
+    angles_check: AnglesCheck | None = None
 
     @property
     def chosen(self) -> MethodResult:
@@ -135,11 +139,12 @@ def deliver_fitted(
         check = cross_check(plan, sets, tried[0], tried[1].routine(image), image)
         check = replace(check, images=check_images(plan, cases, *tried))
         check_selftest(plan, firmware.provenance, ours)
+        angles_check = check_angles(firmware.angles, ours) if firmware.angles else None
         _refuse_wrong_bound(unit, bound, check)
         methods = _on_dwells(fitted, plan, ours, Reference(theirs))
         compiler = compilation.compiler.called(Generated(ours).compiler)
     parts = unit, fitted.measurements, fitted.inputs_sha256, fitted.calibration
-    delivery = Delivery(*parts, firmware, check, methods, compiler)
+    delivery = Delivery(*parts, firmware, check, methods, compiler, angles_check)
     _refuse_beyond_limits(delivery)
     return delivery
 

@@ -10,8 +10,8 @@ from triaxcal.base.shipped import shipped
 from triaxcal.codegen.templates import environment
 from triaxcal.exports.target import Exported, Source
 
-_TO_INCLUDE = ("_calib.h", "_imu.h")
-"""What a program includes: the constants, and of an IMU the call for both triads."""
+_TO_INCLUDE = ("_calib.h", "_imu.h", "_angles.h")
+"""What a program includes: the constants, of an IMU the call for both triads, and angles."""
 
 
 def layout(source: Source, name: str, sources: str = "src", headers: str = "include") -> Exported:

@@ -22,6 +22,9 @@ DIGITS = 15
 FRACTION = 12
 """Bits behind the point of `QUOTIENT_UNITS`."""
 
+_BLOCK = 4096
+"""Rows of the Python model: its working arrays stay in the cache."""
+
 TURN = 1 << 32
 QUARTER = 1 << 30
 STATUS_SECOND_ANGLE = 64
@@ -55,9 +58,7 @@ def _per_length() -> int:
 
 
 ROTATION_UNITS = _rotation_units()
-QUOTIENT_UNITS = round(
-    Fraction(TURN << FRACTION, 1 << (ROTATIONS - 3 + DIGITS)) / (2 * pi()[0])
-)
+QUOTIENT_UNITS = round(Fraction(TURN << FRACTION, 1 << (ROTATIONS - 3 + DIGITS)) / (2 * pi()[0]))
 """Units of two digits' worth, 2^-(ROTATIONS - 3 + DIGITS) rad, with `FRACTION` bits more."""
 START_UNITS = round(
     Fraction(ROTATIONS, 2)
@@ -113,16 +114,27 @@ def angles(plan: AnglesPlan, accel: IntArray) -> tuple[IntArray, IntArray]:
 
     Zenith is 0 to 2^31, tool face 0 to 2^32 - 1; pitch is -2^30 to 2^30, roll -2^31 to 2^31 - 1.
     """
+    result = np.empty((len(accel), 2), np.int64)
+    status = np.empty(len(accel), np.int64)
+    for start in range(0, len(accel), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        result[block], status[block] = _angles(plan, accel[block])
+    return result, status
+
+
+def _angles(plan: AnglesPlan, accel: IntArray) -> tuple[IntArray, IntArray]:
     x, y, z = (accel[:, i].astype(np.int64) for i in range(3))
     c, s, a = (x, y, z) if plan.zenith else (z, y, x)
     wide, high, along = np.abs(c), np.abs(s), np.abs(a)
+    across_any = np.bitwise_or(wide, high)
+    any_part = np.bitwise_or(across_any, along)
     # The vector (c, s) turned by half a turn where c is negative, its larger part 2^29 to 2^30.
-    left = normalising_shift(wide | high)
+    left = normalising_shift(across_any)
     sign = np.where((c < 0) == (s < 0), 1, -1)
     turned, length = polar((wide << left) >> 2, sign * ((high << left) >> 2))
     azimuth = turned + np.where(c < 0, TURN // 2, 0)
     # (|(c, s)|, a), normalised together.
-    common = normalising_shift(wide | high | along)
+    common = normalising_shift(any_part)
     across = ((length * PER_LENGTH) >> 32) >> (left - common)
     elevation, _ = polar(across, np.where(a < 0, -1, 1) * ((along << common) >> 2))
     elevation = np.clip(elevation, -QUARTER, QUARTER)
@@ -130,8 +142,8 @@ def angles(plan: AnglesPlan, accel: IntArray) -> tuple[IntArray, IntArray]:
         first, second = QUARTER - elevation, (azimuth + TURN // 2) % TURN
     else:
         first, second = -elevation, (azimuth + TURN // 2) % TURN - TURN // 2
-    first = np.where((wide | high | along) == 0, 0, first)
-    second = np.where((wide | high) == 0, 0, second)
+    first = np.where(any_part == 0, 0, first)
+    second = np.where(across_any == 0, 0, second)
     return np.stack([first, second], axis=1), _status(plan, wide, high, along)
 
 
@@ -171,4 +183,5 @@ def _status(plan: AnglesPlan, wide: IntArray, high: IntArray, along: IntArray) -
     total = (squares[0] + squares[1] + squares[2]) >> np.uint64(1)
     steep = across < np.uint64(plan.across_low)
     moved = (total < np.uint64(plan.rest_low)) | (total > np.uint64(plan.rest_high))
-    return np.where(steep, STATUS_SECOND_ANGLE, 0) | np.where(moved, STATUS_NOT_AT_REST, 0)
+    status: IntArray = steep * STATUS_SECOND_ANGLE + moved * STATUS_NOT_AT_REST
+    return status

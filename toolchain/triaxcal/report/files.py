@@ -15,6 +15,7 @@ from triaxcal.report.results import verification_json
 CERTIFICATE = "certificate.dcc.xml"
 SOMETIMES = (
     CERTIFICATE, "*_comp.h", "*_comp.c", "*_calib.h", "*_calib.c", "*_selftest.h", "*_selftest.c",
+    "*_angles.h", "*_angles.c",
     "*_calib.bin", "*_calib.a2l",
 )  # fmt: skip
 """Files that an earlier delivery may have had besides; the prefix may have been another."""

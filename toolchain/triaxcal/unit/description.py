@@ -12,6 +12,7 @@ from pathlib import Path
 from triaxcal.base.keys import DESCRIPTION, FileKeys, TableKeys, Values, many_of
 from triaxcal.base.tomltable import content_of, shown, text_of, toml_document
 from triaxcal.unit.adc import ADC, RECORDED_ADC, Adc, adc_of, recorded_adc
+from triaxcal.unit.angles import AnglesChoice, angles_choice
 from triaxcal.unit.certificate import CERTIFICATE, CertificateDetails, certificate_details
 from triaxcal.unit.choices import FIT, SENSOR, Compensation, Fit, Sensor, compensation_table
 from triaxcal.unit.equipment import (
@@ -109,6 +110,8 @@ class UnitDescription:
         One of `unit.priors.FIRMWARE_TERMS`.
     prefix : str
         What the names in the C begin with.
+    angles : AnglesChoice or None
+        Which angles the device makes.
     source : str
         Path of its unit.toml, for messages.
     toml : str
@@ -139,6 +142,7 @@ class UnitDescription:
     priors: Priors = field(default_factory=Priors)
     firmware_terms: str = AUTO
     prefix: str = DEFAULT_PREFIX
+    angles: AnglesChoice | None = None
 
     @property
     def reading_unit(self) -> str:
@@ -228,6 +232,9 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         priors=tables["priors"].record(Priors),
         firmware_terms=firmware.terms,
         prefix=firmware.prefix,
+        angles=angles_choice(
+            firmware.angles, firmware.rest_within_g, firmware.second_angle_from_deg
+        ),
         nominal_v_per_g=sensor.nominal_v_per_g,
         nominal_tolerance=sensor.nominal_tolerance,
         gravity_difference_m_per_s2=gravity_difference_m_per_s2(site),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from triaxcal.base.keys import TableKeys, setting
 from triaxcal.base.kinds import number, word
+from triaxcal.unit.angles import ANGLES, NONE, REST_WITHIN_G, SECOND_FROM_DEG
 from triaxcal.unit.prefix import DEFAULT_PREFIX, PREFIX
 
 AUTO, LINEAR, OWN_SQUARES, QUADRATIC_TERMS = "auto", "linear", "own-squares", "quadratic"
@@ -58,10 +59,20 @@ class FirmwareChoice:
     prefix
         What the names of functions, types, macros and files in the C begin with. Give each sensor
         of a program its own.
+    angles
+        Which two angles triax_angles makes of the compensated acceleration; none leaves it out.
+    rest_within_g
+        Of triax_angles: |a| further than this from 1 g is flagged, the unit is not at rest.
+    second_angle_from_deg
+        Of triax_angles: tool face, or roll, is flagged as poor where its axis is nearer to the
+        plumb line than this.
     """
 
     terms: str = setting(word(FIRMWARE_TERMS), AUTO)
     prefix: str = setting(PREFIX, DEFAULT_PREFIX)
+    angles: str = setting(word(ANGLES), NONE)
+    rest_within_g: float = setting(number(1e-4, 0.9), REST_WITHIN_G, "g")
+    second_angle_from_deg: float = setting(number(1e-3, 45.0), SECOND_FROM_DEG, "deg")
 
 
 PRIORS, FIRMWARE = TableKeys.of(Priors), TableKeys.of(FirmwareChoice)

@@ -6,17 +6,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from triaxcal.codegen.constants import Provenance
+from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.unit.thermometer import TemperatureSensor
 
 
 @dataclass(frozen=True)
 class Job:
-    """A plan, the thermometer of its codes, and what the files say of where they come from."""
+    """A plan, the thermometer of its codes, and what the files say of where they come from.
+
+    `angles` is None where the device makes no angles.
+    """
 
     plan: Plan
     sensor: TemperatureSensor
     provenance: Provenance
+    angles: AnglesPlan | None = None
 
 
 @dataclass(frozen=True)
