@@ -34,7 +34,7 @@ from triaxcal.device.compare import Samples
 from triaxcal.device.positions import Expected, at_positions
 from triaxcal.device.record import DeviceRecord, read_record, record_bytes, record_path
 from triaxcal.device.unit import flash, require_in_use
-from triaxcal.report.dcc import certificate_xml
+from triaxcal.report.dcc.certificate import certificate_xml
 from triaxcal.report.files import all_files
 from triaxcal.report.passport.content import passport
 from triaxcal.report.passport.document import passport_json

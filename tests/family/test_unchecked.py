@@ -15,7 +15,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
 from triaxcal.delivery.unit import deliver
 from triaxcal.model.types import FloatArray
-from triaxcal.report.dcc import certificate_xml
+from triaxcal.report.dcc.certificate import certificate_xml
 from triaxcal.report.passport.content import passport
 from triaxcal.report.passport.page import passport_html
 from triaxcal.report.summary import summary

@@ -34,7 +34,7 @@ def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, byt
     unit_passport = made or passport(delivery, {})
     certificate = {}
     if details := delivery.unit.certificate:
-        from triaxcal.report.dcc import certificate_xml  # noqa: PLC0415  XML only when needed
+        from triaxcal.report.dcc.certificate import certificate_xml  # noqa: PLC0415  XML only when needed
 
         certificate[CERTIFICATE] = certificate_xml(unit_passport, details)
     return {

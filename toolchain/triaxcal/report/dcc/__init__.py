@@ -1,0 +1,1 @@
+"""certificate.dcc.xml: the Digital Calibration Certificate, a file for each of its parts."""
