@@ -66,6 +66,9 @@ ONLY_IN = {
     "pyarrow": {"rig", "readings"},
     "bincopy": {"codegen"},
     "elftools": {"codegen"},
+    "lxml": {"report"},
+    "signxml": {"report"},
+    "cryptography": {"report"},
     "jinja2": {"codegen", "report"},
     "click": {"cli"},
     "matplotlib": {"report", "api"},  # api: the type of `plot` alone

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from triaxcal.api.calibration import Calibration, Diagnosis, fit, load
+    from triaxcal.api.certificate import check_certificate, sign_certificate, verify_certificate
     from triaxcal.api.delivered import delivered_firmware
     from triaxcal.api.delivery import Delivered, deliver, update
     from triaxcal.api.diagnosis import diagnose
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from triaxcal.api.verification import Verification, certify, verify_unit
     from triaxcal.base.errors import RefusedError, UsageError
     from triaxcal.delivery.verdict import LimitCheck, Verdict
+    from triaxcal.report.dcc.signed import Signature
     from triaxcal.report.installation import Installation, InstalledPart
     from triaxcal.uncertainty.budget import Budget
     from triaxcal.uncertainty.check import FieldCheck
@@ -66,19 +68,21 @@ __version__ = "0.2.0.dev0"
 __all__ = [
     "Budget", "Calibration", "CalibrationImage", "CompiledFirmware", "Delivered", "Diagnosis",
     "ExampleUnit", "ExportedFiles", "FieldCheck", "FieldUpdate", "Firmware", "Imu",
-    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "Installation",
-    "InstalledPart", "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError",
-    "SeriesResult", "Study", "TableGrid", "Unit", "UsageError", "Verdict", "Verification",
-    "__version__", "calibrate_series", "certify", "compare_history", "copy_example",
+    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "Installation", "InstalledPart",
+    "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "SeriesResult", "Signature",
+    "Study", "TableGrid", "Unit", "UsageError", "Verdict", "Verification", "__version__",
+    "calibrate_series", "certify", "check_certificate", "compare_history", "copy_example",
     "cross_coupling", "deliver", "delivered_firmware", "diagnose", "examples", "export",
     "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "installation", "key_schema",
     "learn_priors", "load", "load_imu", "plan_measurements", "plan_motion", "read_image",
-    "read_imu", "read_unit", "simulate", "simulate_series", "study_angle_errors", "study_drift",
-    "update", "verify_unit", "write_first_file",
+    "read_imu", "read_unit", "sign_certificate", "simulate", "simulate_series",
+    "study_angle_errors", "study_drift", "update", "verify_certificate", "verify_unit",
+    "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
     "triaxcal.api.calibration": ("Calibration", "Diagnosis", "fit", "load"),
+    "triaxcal.api.certificate": ("check_certificate", "sign_certificate", "verify_certificate"),
     "triaxcal.api.delivered": ("delivered_firmware",),
     "triaxcal.api.delivery": ("Delivered", "deliver", "update"),
     "triaxcal.api.diagnosis": ("diagnose",),
@@ -106,6 +110,7 @@ _MODULES = {
     "triaxcal.api.verification": ("Verification", "certify", "verify_unit"),
     "triaxcal.base.errors": ("RefusedError", "UsageError"),
     "triaxcal.delivery.verdict": ("LimitCheck", "Verdict"),
+    "triaxcal.report.dcc.signed": ("Signature",),
     "triaxcal.uncertainty.budget": ("Budget",),
     "triaxcal.uncertainty.check": ("FieldCheck",),
     "triaxcal.uncertainty.updated": ("FieldUpdate",),

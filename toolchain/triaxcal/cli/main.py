@@ -19,7 +19,7 @@ SECTIONS = {
     "Calibrate": ("calib", "dynamic", "batch"),
     "In the field": ("check", "update", "device"),
     "Look at readings and results": ("diagnose", "poses", "drift", "crosscoupling", "history"),
-    "Into production": ("firmware", "image", "a2l", "export"),
+    "Into production": ("firmware", "image", "a2l", "export", "certificate"),
     "Check the generated C": ("verify", "certify", "target"),
     "Plan, measure, simulate": ("design", "rig", "simulate", "schema"),
 }

@@ -33,7 +33,9 @@ def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, byt
     """
     unit_passport = made or passport(delivery, {})
     certificate = {}
-    if details := delivery.unit.certificate:
+    details = delivery.unit.certificate
+    # Number and dates of a certificate are those of the calibration before an update in the field.
+    if details is not None and delivery.calibration.update is None:
         from triaxcal.report.dcc.certificate import certificate_xml  # noqa: PLC0415  XML only when needed
 
         certificate[CERTIFICATE] = certificate_xml(unit_passport, details)

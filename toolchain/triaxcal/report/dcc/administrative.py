@@ -9,7 +9,6 @@ from triaxcal.codegen.names import names_of
 from triaxcal.device.record import sha256_of
 from triaxcal.report.dcc.elements import contact, element, identification, text
 from triaxcal.report.passport.content import Acceptance, Passport
-from triaxcal.report.stated.statements import cautions
 from triaxcal.report.stated.words import caution_words
 from triaxcal.report.words.device import device_words
 from triaxcal.uncertainty.coverage import LEVEL
@@ -107,7 +106,7 @@ def _statements(data: ET.Element, p: Passport) -> None:
     _statement(statements, "what was held against the limits", tested)
     untested = "; ".join(p.verdict.not_tested) or "everything that the limits ask for was tested"
     _statement(statements, "what was not tested", untested)
-    for caution in cautions(p.delivery.unit):
+    for caution in p.cautions:
         _statement(statements, "stated by the laboratory, with a caution", caution_words(caution))
     if p.verified_device is not None:
         name = "compensated output of the device itself at check positions"

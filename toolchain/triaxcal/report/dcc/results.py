@@ -30,6 +30,7 @@ _UNITS = {
     "mg": (1e-3 * STANDARD_GRAVITY_M_PER_S2, _ACCELERATION),
 }
 """Unit of the readings in SI units, and the units of K and U0 then."""
+_PER_RATE = r"\metre\second\tothe{-1}\kelvin\tothe{-1}"
 _PER_ACCELERATION = r"\second\tothe{2}\metre\tothe{-1}"
 
 
@@ -45,7 +46,7 @@ def measurement_results(root: ET.Element, p: Passport) -> None:
     # A unit of one temperature has its ends there.
     for temp in dict.fromkeys((p.uncertainty.t0_index, 0, len(p.uncertainty.temps_degc) - 1)):
         _constants(results, p, temp)
-    _quadratic(results, p)
+    _terms(results, p)
     _metadata(result, p)
 
 
@@ -72,7 +73,11 @@ def _beyond(p: Passport) -> str:
             "no uncertainty of Q is stated here."
         )
     if terms.rate is not None:
-        words += " Terms of the rate of temperature are in calibration.json."
+        low, high = terms.rate.range_k_per_s
+        words += (
+            " To K^-1 (U - U0) a term of the rate of temperature is added, for rates from "
+            f"{low:g} to {high:g} K/s; no uncertainty of it is stated here."
+        )
     return words
 
 
@@ -166,15 +171,21 @@ def _constants(results: ET.Element, p: Passport, temp: int) -> None:
     si(expanded, "coverageProbabilityXMLList", [f"{LEVEL:g}"])
 
 
-def _quadratic(results: ET.Element, p: Passport) -> None:
-    """Q of a = l + Q p(l), where there are quadratic terms."""
-    per_g = p.delivery.calibration.terms.quadratic_per_g
-    if per_g is None:
-        return
-    names = tuple(f"Q_{axis}_{product}" for axis in AXES for product in PRODUCT_NAMES)
-    numbers = _list(results, "quadratic terms at every temperature", names)
-    si(numbers, "valueXMLList", _decimals(per_g.reshape(-1) / STANDARD_GRAVITY_M_PER_S2))
-    si(numbers, "unitXMLList", [_PER_ACCELERATION] * len(names))
+def _terms(results: ET.Element, p: Passport) -> None:
+    """What is beyond the constants: Q of a = l + Q p(l), and the term of the rate."""
+    terms = p.delivery.calibration.terms
+    if terms.quadratic_per_g is not None:
+        names = tuple(f"Q_{axis}_{product}" for axis in AXES for product in PRODUCT_NAMES)
+        numbers = _list(results, "quadratic terms at every temperature", names)
+        values = terms.quadratic_per_g.reshape(-1) / STANDARD_GRAVITY_M_PER_S2
+        si(numbers, "valueXMLList", _decimals(values))
+        si(numbers, "unitXMLList", [_PER_ACCELERATION] * len(names))
+    if terms.rate is not None:
+        names = tuple(f"rate_{axis}" for axis in AXES)
+        numbers = _list(results, "term of the rate of temperature, for 1 K/s", names)
+        values = terms.rate.offset_g_s_per_k * STANDARD_GRAVITY_M_PER_S2
+        si(numbers, "valueXMLList", _decimals(values))
+        si(numbers, "unitXMLList", [_PER_RATE] * len(names))
 
 
 def _list(results: ET.Element, title: str, names: tuple[str, ...]) -> ET.Element:

@@ -17,6 +17,7 @@ from triaxcal.delivery.posecauses import causes_of_poses, doubtful_poses
 from triaxcal.delivery.unit import Delivery
 from triaxcal.delivery.verdict import DECISIVE, Verdict, worst
 from triaxcal.device.record import DeviceRecord
+from triaxcal.report.stated.statements import Caution, cautions
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.evaluate import LENGTH, Uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
@@ -151,6 +152,12 @@ class Passport:
         checked = {a.where for a in self.acceptance}
         needed = limits_that_apply(self.delivery.unit, self.delivery.calibration.range_degc)
         return tuple(where for where in needed if where not in checked)
+
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """What a reader should know of what the laboratory states."""
+        updated = self.delivery.calibration.update is not None
+        return cautions(self.delivery.unit, updated=updated)
 
     @cached_property
     def cause(self) -> str:

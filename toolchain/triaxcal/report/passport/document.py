@@ -12,7 +12,7 @@ from triaxcal.base.jsontext import json_bytes, sha256_of_files
 from triaxcal.base.plaindata import plain
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Passport
-from triaxcal.report.stated.statements import cautions, stated_json
+from triaxcal.report.stated.statements import stated_json
 from triaxcal.report.stated.words import caution_words
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.coverage import LEVEL
@@ -33,7 +33,7 @@ def passport_json(p: Passport) -> bytes:
         **({"inputs": list(d.calibration.inputs)} if d.calibration.inputs else {}),
         "stated": {
             **stated_json(d.unit),
-            "cautions": [caution_words(c) for c in cautions(d.unit)],
+            "cautions": [caution_words(c) for c in p.cautions],
         },
         **_judged(p),
         **_known(p),

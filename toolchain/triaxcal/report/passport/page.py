@@ -22,7 +22,7 @@ from triaxcal.report.pictures.curves import (
     uncertainty_panel,
 )
 from triaxcal.report.pictures.residual_panels import residual_panels
-from triaxcal.report.stated.statements import cautions, statements
+from triaxcal.report.stated.statements import statements
 from triaxcal.report.stated.words import LABELS, added_words, caution_words, value_words
 from triaxcal.report.words.device import device_not_counted, device_words
 from triaxcal.report.words.firmware import (
@@ -143,7 +143,7 @@ def _stated(p: Passport) -> dict[str, Any]:
             [value_words(s.value, s.unit) for s in found if s.number == number]
             for number in range(1, len(p.delivery.unit.equipment) + 1)
         ],
-        "cautions": [caution_words(c) for c in cautions(p.delivery.unit)],
+        "cautions": [caution_words(c) for c in p.cautions],
     }
 
 

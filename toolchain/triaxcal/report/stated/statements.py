@@ -19,8 +19,8 @@ from triaxcal.unit.measured import MEASURED
 
 Value = str | float | datetime.date | tuple[float, float]
 
-OVERDUE, NO_CERTIFICATE, NOT_TRACEABLE, NO_EQUIPMENT, NO_DAY = (
-    "overdue", "no certificate", "not traceable", "no equipment", "no day",
+OVERDUE, NO_CERTIFICATE, NOT_TRACEABLE, NO_EQUIPMENT, NO_DAY, UPDATED = (
+    "overdue", "no certificate", "not traceable", "no equipment", "no day", "updated",
 )  # fmt: skip
 """What is half filled, or does not fit together, and is not refused."""
 
@@ -86,9 +86,11 @@ def _of(table: TableKeys, record: object | None, number: int = 0) -> Iterator[St
         yield Statement(table.name, key.name, value, key.unit, number)
 
 
-def cautions(unit: UnitDescription) -> tuple[Caution, ...]:
-    """What a reader should know of what is stated."""
-    return tuple(_cautions(unit))
+def cautions(unit: UnitDescription, *, updated: bool = False) -> tuple[Caution, ...]:
+    """What a reader should know of what is stated; `updated` in the field after it was."""
+    stated = unit.certificate is not None or unit.measured.date is not None
+    of_update = [Caution(UPDATED)] if updated and stated else []
+    return (*of_update, *_cautions(unit))
 
 
 def _cautions(unit: UnitDescription) -> Iterator[Caution]:

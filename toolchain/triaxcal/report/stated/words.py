@@ -11,6 +11,7 @@ from triaxcal.report.stated.statements import (
     NO_EQUIPMENT,
     NOT_TRACEABLE,
     OVERDUE,
+    UPDATED,
     Caution,
     Value,
 )
@@ -83,6 +84,8 @@ _CAUTIONS = {
     "traceability is not shown",
     NOT_TRACEABLE: "{subject}: to what its calibration is traceable is not stated",
     NO_EQUIPMENT: "no equipment is stated, so traceability is not shown",
+    UPDATED: "what is stated here is of the calibration before the constants were brought up to "
+    "date in the field; there is no certificate of the update",
     NO_DAY: "no day of the measurements is stated, so the dates of the equipment were not compared "
     "with it",
 }
