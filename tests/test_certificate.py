@@ -12,13 +12,15 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
+from test_stated import of, whole
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.constants import function_format
 from triaxcal.codegen.names import names_of
 from triaxcal.delivery.unit import Delivery
 from triaxcal.report.a2l import calib_a2l
 from triaxcal.report.a2l_words import calib_words
-from triaxcal.report.dcc import DCC, SI, certificate_xml
+from triaxcal.report.dcc.certificate import certificate_xml
+from triaxcal.report.dcc.elements import DCC, SI
 from triaxcal.report.files import CERTIFICATE, all_files
 from triaxcal.report.passport.content import passport
 from triaxcal.unit.certificate import CertificateDetails
@@ -74,7 +76,12 @@ ORDER = {
     "expandedUncXMLList?",
     "expandedUncXMLList": "uncertaintyXMLList coverageFactorXMLList coverageProbabilityXMLList "
     "distributionXMLList?",
-    "location": "(city|countryCode|further)+",
+    "location": "(street|city|countryCode|further)+",
+    "measuringEquipments": "measuringEquipment+",
+    "measuringEquipment": "name equipmentClass* description? certificate? manufacturer? model? "
+    "identifications?",
+    "measurementMetaData": "metaData+",
+    "metaData": "name? description? declaration?",
     **dict.fromkeys(("name", "description", "declaration", "further"), "content+"),
 }
 """Children as in PTB's dcc.xsd 3.2.1 and SI_Format.xsd 2.1.0; unlisted elements have none.
@@ -93,6 +100,15 @@ TEXTS = {
     "usedLangCodeISO639_1": "[a-z]{2}",
     "mandatoryLangCodeISO639_1": "[a-z]{2}",
     "uniqueIdentifier": NOT_EMPTY,
+    "street": NOT_EMPTY,
+    "model": NOT_EMPTY,
+    "role": NOT_EMPTY,
+    "eMail": NOT_EMPTY,
+    "phone": NOT_EMPTY,
+    "convention": NOT_EMPTY,
+    "norm": NOT_EMPTY,
+    "calibrationLaboratoryCode": NOT_EMPTY,
+    "issueDate": DAY,
     "beginPerformanceDate": DAY,
     "endPerformanceDate": DAY,
     "performanceLocation": "laboratory|customer|laboratoryBranch|customerBranch|other",
@@ -142,6 +158,15 @@ def wrong_texts(element: ET.Element) -> list[str]:
 @pytest.fixture(scope="session")
 def certificate(delivered: dict[str, Delivery]) -> ET.Element:
     return ET.fromstring(certificate_xml(passport(delivered["AT-SIM"], {}), DETAILS))
+
+
+def test_with_every_key_it_has_the_same_order(delivered: dict[str, Delivery]) -> None:
+    made = of(delivered["AT-SIM"], whole())
+    details = made.delivery.unit.certificate
+    assert details is not None
+    root = ET.fromstring(certificate_xml(made, details))
+    assert wrong_children(root) == []
+    assert wrong_texts(root) == []
 
 
 def test_elements_stand_in_the_documented_order(certificate: ET.Element) -> None:

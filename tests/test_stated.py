@@ -9,6 +9,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -16,6 +17,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import TableKeys
 from triaxcal.base.tomltext import toml_value
 from triaxcal.delivery.unit import Delivery
+from triaxcal.report.dcc.certificate import certificate_xml
 from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.passport.document import passport_json
 from triaxcal.report.passport.page import passport_html
@@ -72,9 +74,13 @@ def shown(page: bytes) -> str:
     return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", page.decode())).split())
 
 
-def test_every_key_is_in_page_and_json(delivered: dict[str, Delivery]) -> None:
+def test_every_key_is_in_page_and_json_and_certificate(delivered: dict[str, Delivery]) -> None:
     made = of(delivered["AT-SIM"], whole())
     page, document = shown(passport_html(made)), json.loads(passport_json(made))
+    details = made.delivery.unit.certificate
+    assert details is not None
+    root = ET.fromstring(certificate_xml(made, details))
+    certificate = " ".join(" ".join(root.itertext()).split())
     for table in TABLES:
         for key in table.keys:
             for number in (1, 2) if table.many else (0,):
@@ -83,7 +89,8 @@ def test_every_key_is_in_page_and_json(delivered: dict[str, Delivery]) -> None:
                 found = rows[number - 1][key.name] if table.many else rows[key.name]
                 assert found == (value if isinstance(value, list) else str(value)), key.name
                 words = [f"{v:g}" for v in value] if isinstance(value, list) else [str(value)]
-                assert all(word in page for word in words), key.name
+                for place in (page, certificate):
+                    assert all(word in place for word in words), key.name
             assert LABELS[f"{table.name}.{key.name}"] in page
     assert document["stated"]["cautions"] == []
 

@@ -49,7 +49,8 @@ def toml_value(value: Any, place: str = "value") -> str:
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, str | bool):
-        return json.dumps(value, ensure_ascii=False)  # TOML's basic strings escape as JSON does
+        # TOML's basic strings escape as JSON does, and DEL besides.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, float) and math.isfinite(value):
         return repr(value).removesuffix(".0")
     if isinstance(value, int | Decimal | datetime.date):

@@ -182,7 +182,7 @@ def unit_of_text(name: str, text: str, source: str) -> UnitDescription:
         When the name is unfit, or the text breaks a rule of unit.toml.
     """
     check_unit_name(name, f"unit {shown(name)}")
-    return _unit_of_content(name, text.encode(), source)
+    return _unit_of_content(name, text.encode("utf-8", "surrogatepass"), source)
 
 
 def _unit_of_content(name: str, content: bytes, source: str) -> UnitDescription:

@@ -63,6 +63,7 @@ def sign(
             where, "is signed already", expected="a certificate without a signature",
             remedy="sign the file as triaxcal calib wrote it",
         )  # fmt: skip
+    _refuse_comments(root, where)
     pair = key_pair(key, cert, passphrase, datetime.now(UTC))
     signer = XAdESSigner(
         signature_algorithm=SignatureMethod[pair.method],
@@ -100,6 +101,7 @@ def verify(content: bytes, where: str, ca: tuple[str, bytes] | None = None) -> S
             where, said.get(len(found), f"has {len(found)} signatures"),
             expected="one signature, of the whole certificate",
         )  # fmt: skip
+    _refuse_comments(root, where)
     chain = _embedded(found[0], where)
     signed = _signing_time(found[0], where)
     _refuse_wrong_dates(chain[0], signed, where)
@@ -114,9 +116,21 @@ def _signatures(root: etree._Element) -> list[etree._Element]:
 
 
 def _damaged(where: str, why: object) -> RefusedError:
-    return RefusedError(
-        where, f"no valid signature: {why}", expected="the file as it was signed, unchanged"
-    )
+    found = f"no valid signature: {why}".rstrip(": ")
+    return RefusedError(where, found, expected="the file as it was signed, unchanged")
+
+
+def _refuse_comments(root: etree._Element, where: str) -> None:
+    """No signature covers an XML comment, and one within a text cuts it for careless readers."""
+    from lxml import etree  # noqa: PLC0415  optional
+
+    comment = next(root.iter(etree.Comment), None)
+    if comment is not None:
+        raise RefusedError(
+            f"{where}, line {comment.sourceline}",
+            "an XML comment, which no signature covers",
+            expected="a certificate without XML comments",
+        )
 
 
 def _embedded(signature: etree._Element, where: str) -> tuple[x509.Certificate, ...]:
