@@ -27,6 +27,7 @@ EXTRAS = {
     "mf4": "recordings in MF4",
     "series": "batch: many units on a Dask cluster",
     "production": "image: Intel HEX and SREC; a2l: addresses of a program",
+    "sign": "certificate: against the schema, signed, verified",
     "plot": "Calibration.plot in Python",
 }
 """What each extra of pyproject.toml is for, less those for developers."""
