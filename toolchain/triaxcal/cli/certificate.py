@@ -17,7 +17,7 @@ _FILE = click.argument("file", type=click.Path(path_type=Path))
 @click.group(
     context_settings=HELP,
     epilog=example(
-        "triaxcal certificate check build/AT-SIM/certificate.dcc.xml --schemas schemas",
+        "triaxcal certificate check certificate.dcc.xml --schemas schemas",
         "triaxcal certificate sign --help",
     ),
 )
@@ -56,9 +56,7 @@ def check(file: Path, schemas: Path) -> None:
 
 @certificate.command(
     context_settings=HELP,
-    epilog=example(
-        "triaxcal certificate sign build/AT-SIM/certificate.dcc.xml --key key.pem --cert cert.pem"
-    ),
+    epilog=example("triaxcal certificate sign certificate.dcc.xml --key k.pem --cert c.pem"),
 )
 @_FILE
 @click.option(
