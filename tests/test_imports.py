@@ -23,6 +23,7 @@ MAY_IMPORT = {
     "fixedpoint": {"base", "model", "unit"},
     "codegen": {"base", "model", "unit", "readings", "fixedpoint"},
     "uncertainty": {"base", "model", "unit", "readings", "poses", "fitting", "fixedpoint"},
+    "noise": {"base", "model", "unit", "readings"},
     "simulation": {"base", "model", "unit", "readings", "dynamic"},
     "design": {"base", "model", "unit", "dynamic", "simulation"},
     "rig": {"base", "model", "unit", "readings", "simulation"},
@@ -31,6 +32,9 @@ MAY_IMPORT = {
     "delivery": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
         "fixedpoint", "codegen", "uncertainty",
+    },
+    "performance": {
+        "base", "model", "unit", "readings", "fitting", "uncertainty", "noise", "delivery",
     },
     "exports": {"base", "model", "unit", "fitting", "codegen", "delivery"},
     "targets": {
@@ -46,7 +50,7 @@ MAY_IMPORT = {
     },
     "report": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
-        "fixedpoint", "codegen", "uncertainty", "delivery", "batch", "device",
+        "fixedpoint", "codegen", "uncertainty", "delivery", "batch", "device", "performance",
     },
 }  # fmt: skip
 """What each room may import: what lies below it. None but the API imports report, which reads all,
@@ -54,7 +58,8 @@ nor the API, nor cli, which calls all."""
 MAY_IMPORT["api"] = set(MAY_IMPORT)
 
 ONLY_IN = {
-    "scipy": {"fitting", "dynamic", "readings"},  # readings: MAT-files
+    "scipy": {"fitting", "dynamic", "readings", "noise", "performance"},  # readings: MAT-files
+    "allantools": {"noise"},
     "can": {"rig", "device"},
     "pyxcp": {"device"},
     "construct": {"device"},  # what pyxcp's answers are parsed with

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from triaxcal.api.imufile import load_imu
     from triaxcal.api.imufirmware import ImuFirmware, firmware_imu
     from triaxcal.api.installation import installation
+    from triaxcal.api.noise import study_noise
     from triaxcal.api.pair import LivePair, cross_coupling
     from triaxcal.api.series import SeriesResult, calibrate_series, learn_priors
     from triaxcal.api.studies import (
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     )
     from triaxcal.api.study import Study
     from triaxcal.api.table import TableGrid, study_angle_errors
+    from triaxcal.api.testreport import ReportedTests, make_test_report
     from triaxcal.api.unit import Unit, read_unit
     from triaxcal.api.verification import Verification, certify, verify_unit
     from triaxcal.base.errors import RefusedError, UsageError
@@ -69,15 +71,15 @@ __all__ = [
     "Budget", "Calibration", "CalibrationImage", "CompiledFirmware", "Delivered", "Diagnosis",
     "ExampleUnit", "ExportedFiles", "FieldCheck", "FieldUpdate", "Firmware", "Imu",
     "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "Installation", "InstalledPart",
-    "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "SeriesResult", "Signature",
-    "Study", "TableGrid", "Unit", "UsageError", "Verdict", "Verification", "__version__",
-    "calibrate_series", "certify", "check_certificate", "compare_history", "copy_example",
-    "cross_coupling", "deliver", "delivered_firmware", "diagnose", "examples", "export",
-    "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "installation", "key_schema",
-    "learn_priors", "load", "load_imu", "plan_measurements", "plan_motion", "read_image",
-    "read_imu", "read_unit", "sign_certificate", "simulate", "simulate_series",
-    "study_angle_errors", "study_drift", "update", "verify_certificate", "verify_unit",
-    "write_first_file",
+    "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "ReportedTests", "SeriesResult",
+    "Signature", "Study", "TableGrid", "Unit", "UsageError", "Verdict", "Verification",
+    "__version__", "calibrate_series", "certify", "check_certificate", "compare_history",
+    "copy_example", "cross_coupling", "deliver", "delivered_firmware", "diagnose", "examples",
+    "export", "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "installation",
+    "key_schema", "learn_priors", "load", "load_imu", "make_test_report", "plan_measurements",
+    "plan_motion", "read_image", "read_imu", "read_unit", "sign_certificate", "simulate",
+    "simulate_series", "study_angle_errors", "study_drift", "study_noise", "update",
+    "verify_certificate", "verify_unit", "write_first_file",
 ]  # fmt: skip
 
 _MODULES = {
@@ -98,6 +100,7 @@ _MODULES = {
     "triaxcal.api.installation": ("installation",),
     "triaxcal.report.installation": ("Installation", "InstalledPart"),
     "triaxcal.unit.examples": ("ExampleUnit",),
+    "triaxcal.api.noise": ("study_noise",),
     "triaxcal.api.pair": ("LivePair", "cross_coupling"),
     "triaxcal.api.series": ("SeriesResult", "calibrate_series", "learn_priors"),
     "triaxcal.api.studies": (
@@ -106,6 +109,7 @@ _MODULES = {
     ),
     "triaxcal.api.study": ("Study",),
     "triaxcal.api.table": ("TableGrid", "study_angle_errors"),
+    "triaxcal.api.testreport": ("ReportedTests", "make_test_report"),
     "triaxcal.api.unit": ("Unit", "read_unit"),
     "triaxcal.api.verification": ("Verification", "certify", "verify_unit"),
     "triaxcal.base.errors": ("RefusedError", "UsageError"),

@@ -187,7 +187,7 @@ def _stamp(path: Path, layout: FileLayout) -> list[tuple[int, int, int]]:
 
 
 def _unreadable(path: Path, layout: FileLayout, error: OSError) -> RefusedError:
-    key = "file" if layout.table == "recording" else "recording"
+    key = "recording" if layout.table == "dynamic" else "file"
     remedy = f"put the recording there, or correct [{layout.table}] {key}"
     return refused_by_system(path, "read", error, remedy=remedy)
 

@@ -126,7 +126,7 @@ class Order:
                 expected=f"rising time in all but {LEFT_OUT_MAX:.0%} of the rows",
                 remedy=f"cut the recording there, or correct the time in [{self._table}]",
             )
-        rate = "sample_rate_hz" if self._table == "recording" else "rate_hz"
+        rate = "sample_rate_hz" if self._table != "dynamic" else "rate_hz"
         return RefusedError(
             f"{self._place}{self._repeated.first}",
             f"{self._repeated.count} of {self._count} rows repeat the time of the row before",

@@ -159,7 +159,7 @@ def read_samples(
     label = None if layout.section is None else ("section", layout.section)
     clock = layout.clock
     if layout.rows == SAMPLES and not layout.faces:
-        place = f"{folder / 'unit.toml'}, [recording] time"
+        place = f"{folder / 'unit.toml'}, [{layout.table}] time"
         absent = RefusedError(place, "missing", expected="a time column, or sample_rate_hz")
         clock = replace(clock, absent=absent)
     ordered = layout.rows == SAMPLES
@@ -176,7 +176,7 @@ def read_samples(
     table = joined([read(path) for path in paths]) if len(paths) > 1 else read(paths[0])
     samples = Samples(table, table.median_step(), table.findings)
     if TEMP in samples:
-        _refuse_implausible(samples)
+        _refuse_implausible(samples, layout.table)
     if not (ordered and table.clocked):
         return samples
     return Samples(
@@ -215,7 +215,7 @@ def _gaps(samples: Samples) -> tuple[str, ...]:
     return (f"{found}; no pose extends across a gap",)
 
 
-def _refuse_implausible(samples: Samples) -> None:
+def _refuse_implausible(samples: Samples, table: str) -> None:
     low, high = PLAUSIBLE_DEGC
     coldest, warmest = samples.extremes(TEMP)[:, 0]
     if not (low <= coldest and warmest <= high):
@@ -223,5 +223,5 @@ def _refuse_implausible(samples: Samples) -> None:
             samples.source,
             f"temperatures of {coldest:.4g} to {warmest:.4g} degC",
             expected=f"{low:g} to {high:g} degC",
-            remedy="check temperature and temperature_unit in [recording]",
+            remedy=f"check temperature and temperature_unit in [{table}]",
         )

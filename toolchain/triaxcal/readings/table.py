@@ -219,7 +219,7 @@ class _Reading:
     ) -> None:
         self._file, self._quantities = file, quantities
         self._clock = Clock(clock, str(file.path), file.source.row_word)
-        key = "time" if file.layout.table == "recording" else "time_column"
+        key = "time_column" if file.layout.table == "dynamic" else "time"
         stamps = [file.index(column, key) for column in clock.columns]
         dates = [unit == ISO for unit in clock.unit_of]
         self._numbers = [k for k, date in zip(stamps, dates, strict=True) if not date]

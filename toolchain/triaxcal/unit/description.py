@@ -43,17 +43,21 @@ from triaxcal.unit.priors import (
     FirmwareChoice,
     Priors,
 )
+from triaxcal.unit.recordedtest import TEST, StatedTest, stated_tests
 from triaxcal.unit.recording import RECORDING, RecordingLayout, recording_layout
+from triaxcal.unit.reporting import NONLINEARITY, REPORT, Nonlinearity, Reporting, nonlinearity
 from triaxcal.unit.site import SITE, STANDARD_GRAVITY_M_PER_S2, PlacedSite
 from triaxcal.unit.thermal import Temperatures, ThermalChoice, thermal_choice, thermal_table
 from triaxcal.unit.thermometer import TEMPERATURE_SENSOR, TemperatureSensor
 from triaxcal.unit.uncertainty import UNCERTAINTY, StatedUncertainty
+from triaxcal.unit.vibration import VIBRATION, Vibration, stated_vibrations
 
 
 def _common() -> tuple[TableKeys, ...]:
     compensation = compensation_table()
     more = UNCERTAINTY, CERTIFICATE, MEASURED, EQUIPMENT, QUADRATIC
-    return FIT, PRIORS, SENSOR, compensation, FIRMWARE, *more
+    tests = REPORT, TEST, NONLINEARITY, VIBRATION
+    return FIT, PRIORS, SENSOR, compensation, FIRMWARE, *more, *tests
 
 
 def tilter_file() -> FileKeys:
@@ -112,6 +116,13 @@ class UnitDescription:
         What the names in the C begin with.
     angles : AnglesChoice or None
         Which angles the device makes.
+    reporting : Reporting
+    tests : tuple of StatedTest
+        Recordings beside the calibration, for the test report.
+    nonlinearity : Nonlinearity or None
+        Terms of the output that another test has shown.
+    vibrations : mapping
+        Stated vibrations by name.
     source : str
         Path of its unit.toml, for messages.
     toml : str
@@ -154,6 +165,10 @@ class UnitDescription:
     gravity_difference_m_per_s2: float | None = None
     measured: Measured = field(default_factory=Measured)
     equipment: tuple[Equipment, ...] = ()
+    reporting: Reporting = field(default_factory=Reporting)
+    tests: tuple[StatedTest, ...] = ()
+    nonlinearity: Nonlinearity | None = None
+    vibrations: Mapping[str, Vibration] = field(default_factory=dict)
     toml: str = field(default="", repr=False, compare=False)
     source: str = field(default=UNIT_FILE, compare=False)
 
@@ -240,6 +255,10 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         gravity_difference_m_per_s2=gravity_difference_m_per_s2(site),
         measured=measured,
         equipment=equipment_of(many_of(tables, "equipment"), days_of(measured, details)),
+        reporting=tables["report"].record(Reporting),
+        tests=stated_tests(tables),
+        nonlinearity=nonlinearity(tables["nonlinearity"]),
+        vibrations=stated_vibrations(tables),
     )
 
 

@@ -155,6 +155,8 @@ class RecordingLayout(WrittenFile, _RecordedFile):
         The second inclinometer angle.
     azimuth
         As `yaw`.
+    table
+        Of unit.toml, for messages.
     """
 
     acceleration: tuple[SignedColumn, ...] = setting(
@@ -191,6 +193,7 @@ class RecordingLayout(WrittenFile, _RecordedFile):
     zenith: Column | None = setting(COLUMN, None)
     tool_face: Column | None = setting(COLUMN, None)
     azimuth: Column | None = setting(COLUMN, None)
+    table: str = "recording"
 
     @property
     def reading_of_1_g(self) -> float | None:
@@ -203,7 +206,7 @@ class RecordingLayout(WrittenFile, _RecordedFile):
         columns = [c.column for c in self.acceleration]
         columns += [*self.time, *(self.gyro or ()), *(self.angles.columns if self.angles else ())]
         columns += [column for column in (self.temperature, self.section) if column is not None]
-        return self.layout("recording", columns)
+        return self.layout(self.table, columns)
 
     @property
     def clock(self) -> ClockLayout:

@@ -10,35 +10,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.fitting.core.halfcycles import (
+    TURN_DEGC,
+    HalfCycle,
+    half_cycles,
+    hysteresis,
+    smoothed,
+)
 from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.readings.samples import READING, TEMP, Samples
-from triaxcal.readings.table import TIME
 
-SMOOTH_S = 60.0
-"""Window of the temperature's slope: units warm over minutes, thermometers jitter by tenths."""
-TURN_DEGC = 5.0
-"""A half-cycle goes at least so far."""
 ORDERS = (0, 1, 2, 3, 4, 5)
 KNOTS = 10
-
-
-@dataclass(frozen=True)
-class HalfCycle:
-    """A stretch of rising or falling temperature: samples start to stop, stop excluded."""
-
-    start: int
-    stop: int
-    rising: bool
-
-    def label(self, temp_degc: FloatArray) -> str:
-        """Words for tables."""
-        first, last = temp_degc[self.start], temp_degc[self.stop - 1]
-        return f"{'heating' if self.rising else 'cooling'} {first:.0f} to {last:.0f} degC"
 
 
 @dataclass(frozen=True)
@@ -127,58 +114,6 @@ def study(samples: Samples) -> Drift:
     )
     size, where = hysteresis(reading, temp, halves)
     return Drift(temp, rate, halves, rows, chosen, size, where)
-
-
-def smoothed(samples: Samples) -> tuple[FloatArray, FloatArray]:
-    """Temperature and its slope, each (n,), by a straight line in a centred window."""
-    t, temp = samples.part(TIME), samples.part(TEMP)
-    half = max(2, round(SMOOTH_S / samples.step_s / 2.0))
-    n = len(t)
-    low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
-    sums = [np.concatenate([[0.0], np.cumsum(v)]) for v in (t, temp, t * t, t * temp)]
-    st, sy, stt, sty = (s[high] - s[low] for s in sums)
-    count = high - low
-    rate = (sty - st * sy / count) / (stt - st * st / count)
-    middle = sy / count + rate * (t - st / count)
-    return middle, rate
-
-
-def half_cycles(temp: FloatArray) -> tuple[HalfCycle, ...]:
-    """Stretches between turning points at least `TURN_DEGC` apart."""
-    turns = [0]
-    extreme, rising = 0, None
-    for k in range(1, len(temp)):
-        if rising is None:
-            if abs(temp[k] - temp[0]) >= TURN_DEGC:
-                rising, extreme = bool(temp[k] > temp[0]), k
-            continue
-        if (temp[k] > temp[extreme]) == rising:
-            extreme = k
-        elif abs(temp[k] - temp[extreme]) >= TURN_DEGC:
-            turns.append(extreme)
-            rising, extreme = not rising, k
-    if rising is None:
-        return ()
-    ends = [*turns, len(temp)]
-    return tuple(HalfCycle(a, b, bool(temp[b - 1] > temp[a])) for a, b in pairwise(ends))
-
-
-def hysteresis(
-    reading: FloatArray, temp: FloatArray, halves: tuple[HalfCycle, ...]
-) -> tuple[FloatArray, FloatArray]:
-    """Largest difference of heating and cooling in one degree, (3,), and at which, (3,)."""
-    degree = np.floor(temp).astype(np.int64)
-    rising = np.zeros(len(temp), dtype=np.bool_)
-    for half in halves:
-        rising[half.start : half.stop] = half.rising
-    size, where = np.zeros(3), np.zeros(3)
-    for d in np.unique(degree):
-        up, down = (degree == d) & rising, (degree == d) & ~rising
-        if up.any() and down.any():
-            apart = np.abs(reading[up].mean(axis=0) - reading[down].mean(axis=0))
-            where = np.where(apart > size, d + 0.5, where)
-            size = np.maximum(size, apart)
-    return size, where
 
 
 def _rows(

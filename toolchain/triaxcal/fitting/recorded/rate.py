@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.fitting.core.drift import half_cycles
+from triaxcal.fitting.core.halfcycles import half_cycles
 from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.poses.poseset import PoseSet
 from triaxcal.readings.samples import TEMP, Samples

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,13 +43,17 @@ class Band:
 
 @dataclass(frozen=True)
 class Panel:
-    """Lines and bands of one picture; `y_range` None takes in all lines."""
+    """Lines and bands of one picture; `y_range` None takes in all lines.
+
+    `powers`: both axes have scales of powers of ten; values are above 0.
+    """
 
     title: str
     x_label: str
     lines: Sequence[Line]
     bands: Sequence[Band] = ()
     y_range: tuple[float, float] | None = None
+    powers: bool = False
 
 
 def line_plot(title: str, panels: Sequence[Panel]) -> bytes:
@@ -81,6 +86,9 @@ def _legend(panels: Sequence[Panel]) -> list[dict[str, Any]]:
 
 
 def _panel(panel: Panel, top: float) -> dict[str, Any]:
+    if panel.powers:
+        lines = [replace(li, x=np.log10(li.x), y=np.log10(li.y)) for li in panel.lines]
+        panel = replace(panel, lines=lines)
     xs = np.concatenate([line.x for line in panel.lines])
     ys = np.concatenate([line.y for line in panel.lines])
     x_low, x_high = float(xs.min()), float(xs.max())
@@ -100,8 +108,8 @@ def _panel(panel: Panel, top: float) -> dict[str, Any]:
         "top": top,
         "bottom": top + HEIGHT,
         "height": HEIGHT,
-        "x_ticks": [{"at": x_at(t), "label": f"{t:g}"} for t in ticks(x_low, x_high, 8)],
-        "y_ticks": [{"at": y_at(t), "label": f"{t:g}"} for t in ticks(low, high, 5)],
+        "x_ticks": [{"at": x_at(t), "label": n} for t, n in _ticks(panel, x_low, x_high, 8)],
+        "y_ticks": [{"at": y_at(t), "label": n} for t, n in _ticks(panel, low, high, 5)],
         "bands": [
             {
                 "x": x_at(b.start),
@@ -116,6 +124,16 @@ def _panel(panel: Panel, top: float) -> dict[str, Any]:
             for line in panel.lines
         ],
     }
+
+
+def _ticks(panel: Panel, low: float, high: float, count: int) -> list[tuple[float, str]]:
+    """Where ticks are, and what stands there; of powers of ten at 1, 2, 5, or 1 where many."""
+    if not panel.powers:
+        return [(t, f"{t:g}") for t in ticks(low, high, count)]
+    decades = range(math.floor(low), math.ceil(high) + 1)
+    digits = (1, 2, 5) if high - low < 3.0 else (1,)
+    every = [d * 10.0**k for k in decades for d in digits]
+    return [(math.log10(v), f"{v:g}") for v in every if low <= math.log10(v) <= high]
 
 
 def _padded(low: float, high: float) -> tuple[float, float]:

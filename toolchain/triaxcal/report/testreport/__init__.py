@@ -1,0 +1,1 @@
+"""The test report as a page, as JSON and for the terminal."""
