@@ -28,6 +28,7 @@ EXTRAS = {
     "series": "batch: many units on a Dask cluster",
     "production": "image: Intel HEX and SREC; a2l: addresses of a program",
     "sign": "certificate: against the schema, signed, verified",
+    "noise": "noise, report: the Allan deviation",
     "plot": "Calibration.plot in Python",
 }
 """What each extra of pyproject.toml is for, less those for developers."""
