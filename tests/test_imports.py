@@ -75,6 +75,8 @@ ONLY_IN = {
     "signxml": {"report"},
     "cryptography": {"report"},
     "jinja2": {"codegen", "report"},
+    "markupsafe": {"report"},  # the type of text that jinja2 need not escape
+    "segno": {"report"},
     "click": {"cli"},
     "matplotlib": {"report", "api"},  # api: the type of `plot` alone
     "rich": {"rig", "cli"},

@@ -21,7 +21,8 @@ from triaxcal.report.dcc.certificate import certificate_xml
 from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.passport.document import passport_json
 from triaxcal.report.passport.page import passport_html
-from triaxcal.report.stated.words import LABELS
+from triaxcal.report.stated.words import label
+from triaxcal.report.texts.speaker import speaker
 from triaxcal.unit.certificate import CERTIFICATE
 from triaxcal.unit.description import UnitDescription, unit_of_text
 from triaxcal.unit.equipment import EQUIPMENT
@@ -91,7 +92,7 @@ def test_every_key_is_in_page_and_json_and_certificate(delivered: dict[str, Deli
                 words = [f"{v:g}" for v in value] if isinstance(value, list) else [str(value)]
                 for place in (page, certificate):
                     assert all(word in place for word in words), key.name
-            assert LABELS[f"{table.name}.{key.name}"] in page
+            assert label(f"{table.name}.{key.name}", speaker("en")) in page
     assert document["stated"]["cautions"] == []
 
 
@@ -99,7 +100,9 @@ def test_what_is_not_stated_is_said(delivered: dict[str, Delivery]) -> None:
     made = of(delivered["AT-SIM"], UNIT)
     page, document = shown(passport_html(made)), json.loads(passport_json(made))
     missing = page.partition("Not stated: ")[2].partition(".")[0].split("; ")
-    single = [LABELS[f"{t.name}.{k.name}"] for t in (CERTIFICATE, MEASURED) for k in t.keys]
+    single = [
+        label(f"{t.name}.{k.name}", speaker("en")) for t in (CERTIFICATE, MEASURED) for k in t.keys
+    ]
     assert missing == [*single, "Equipment"]
     assert document["stated"]["equipment"] == []
     assert set(document["stated"]["certificate"].values()) == {None}

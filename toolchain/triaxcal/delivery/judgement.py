@@ -15,7 +15,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import Fitted, refuse_beyond_limits
-from triaxcal.delivery.unshown import contradictions, temperatures_untested
+from triaxcal.delivery.unshown import contradictions
 from triaxcal.delivery.verdict import (
     AT_DWELLS,
     AT_POSES,
@@ -144,7 +144,19 @@ def not_tested(unit: UnitDescription, calibration: Calibration) -> tuple[str, ..
         return ("between the temperatures estimated, not tested",) * estimated
     if len(calibration.points) == 1:
         return ("nothing was held out",)
-    return ("between the temperatures not tested", *temperatures_untested(unit, calibration))
+    return ("between the temperatures not tested", *_exchanged(unit, calibration))
+
+
+def _exchanged(unit: UnitDescription, calibration: Calibration) -> tuple[str, ...]:
+    """That temperatures may be exchanged, in words."""
+    # Only a verdict needs it here.
+    from triaxcal.uncertainty.exchanged import exchanged_error_g  # noqa: PLC0415
+
+    largest_g = exchanged_error_g(unit, calibration)
+    if largest_g is None:
+        return ()
+    wrong = f"with two exchanged, a component is up to {largest_g * 1e3:.2g} mg wrong"
+    return (f"which temperature is which not tested: {wrong}",)
 
 
 def _clipped(calibration: Calibration) -> tuple[str, ...]:
@@ -242,8 +254,7 @@ def _with_guard_band(
     if not limits.rule.guarded:
         return
     what = UNCERTAINTY if limits.guard_band_g is None else GUARDED
-    unsure = temperatures_untested(fitted.unit, fitted.calibration)
-    whole = not unsure and not any(s.unknown for s in found.sources)
+    whole = not any(s.unknown for s in found.sources)
     uncertain = dict(zip((AT_T0, OVER_RANGE), found.length_g, strict=True))
     by_place = _by_place(fitted, errors_g, checks=None)
     for where, limit_g in _places(fitted.unit, fitted.calibration.range_degc).items():

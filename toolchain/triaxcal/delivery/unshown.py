@@ -1,14 +1,11 @@
-"""What readings cannot show by themselves: their scale, and which temperature is which."""
+"""What readings cannot show by themselves: their scale."""
 
 from __future__ import annotations
-
-from itertools import permutations
 
 import numpy as np
 
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import unpack_constants
-from triaxcal.model.types import FloatArray
 from triaxcal.unit.description import UnitDescription
 from triaxcal.unit.priors import Priors
 
@@ -40,30 +37,3 @@ def contradictions(unit: UnitDescription, calibration: Calibration) -> tuple[str
         "scale of the readings, or state mean_scale"
     )
     return (words,)
-
-
-def temperatures_untested(unit: UnitDescription, calibration: Calibration) -> tuple[str, ...]:
-    """That temperatures might be exchanged, where curves pass through all of them.
-
-    Nothing is held out then: curves through the readings of two exchanged temperatures fit as well.
-    Said where it would matter: where the constants of one temperature are wrong at another by more
-    than the limit.
-    """
-    test, points = calibration.held_out, calibration.points
-    redundant = len(points) > calibration.shape.parameters
-    if calibration.recording is not None or redundant or not (test is None or not test.between):
-        return ()
-    pairs = permutations([p.constants for p in points], 2)
-    largest_g = max((_component_error_g(a, b) for a, b in pairs), default=0.0)
-    if largest_g <= unit.limits.over_range_g:
-        return ()
-    wrong = f"with two exchanged, a component is up to {largest_g * 1e3:.2g} mg wrong"
-    return (f"which temperature is which not tested: {wrong}",)
-
-
-def _component_error_g(at: FloatArray, used: FloatArray) -> float:
-    """Largest error of a component at 1 g where the constants (12,) `used` are not those `at`."""
-    (K, U0), (L, V0) = unpack_constants(at), unpack_constants(used)
-    of_force = np.linalg.solve(L, K) - np.eye(3)
-    offset = np.linalg.solve(L, U0 - V0)
-    return float((np.linalg.norm(of_force, axis=1) + np.abs(offset)).max())

@@ -131,18 +131,23 @@ class Verdict:
     @property
     def words(self) -> str:
         """The verdict in words."""
-        found = [t for t in self.tested if t.what in DECISIVE and t.beyond]
         rule = [f"by {self.rule}"] if self.rule else []
         if self.result != NOT_SHOWN:
             return "; ".join([self.result, *rule, *self.not_tested])
+        first, *others = self.reasons
+        head = f"not shown to be within the limits: {first}"
+        return "; ".join([head, *others, *rule, *self.not_tested])
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the limits are not shown to hold, in words; nothing where they are."""
+        found = [t for t in self.tested if t.what in DECISIVE and t.beyond]
+        if not found:
+            return self.contradicts
         reached = ", ".join(
             f"{t.largest_g * 1e3:.3g} mg {t.where} (limit {t.limit_g * 1e3:g} mg)" for t in found
         )
-        reasons = [*self.contradicts]
-        if found:
-            reasons.append(f"error and {DECISIVE[found[0].what]} reach {reached}")
-        head = f"not shown to be within the limits: {reasons[0]}"
-        return "; ".join([head, *reasons[1:], *rule, *self.not_tested])
+        return (*self.contradicts, f"error and {DECISIVE[found[0].what]} reach {reached}")
 
     @property
     def heads(self) -> tuple[str, ...]:
@@ -173,10 +178,16 @@ class Verdict:
     __repr__ = __str__
 
 
+def cell(check: LimitCheck | None) -> str | None:
+    """What is known of the largest error, in mg; None where nothing was held against the limit."""
+    return None if check is None or not check.dwells else _milli_g(check.largest_g)
+
+
 def _cell(check: LimitCheck | None) -> str:
-    if check is None or not check.dwells:
+    words = cell(check)
+    if check is None or words is None:
         return "nothing"
-    return _milli_g(check.largest_g) + " + unknown" * (not check.whole)
+    return words + " + unknown" * (not check.whole)
 
 
 def _milli_g(value_g: float) -> str:

@@ -16,14 +16,17 @@ CERTIFICATE = "certificate.dcc.xml"
 SOMETIMES = (
     CERTIFICATE, "*_comp.h", "*_comp.c", "*_calib.h", "*_calib.c", "*_selftest.h", "*_selftest.c",
     "*_angles.h", "*_angles.c",
-    "*_calib.bin", "*_calib.a2l",
+    "*_calib.bin", "*_calib.a2l", "passport.*.html",
 )  # fmt: skip
 """Files that an earlier delivery may have had besides; the prefix may have been another."""
 
 
 def passport_files(made: Passport) -> dict[str, bytes]:
-    """The passport as a page and as JSON."""
-    return {"passport.html": passport_html(made), "passport.json": passport_json(made)}
+    """The passport as a page in each of the unit's languages, and as JSON."""
+    first, *others = made.languages
+    pages = {"passport.html": passport_html(made, first)}
+    pages |= {f"passport.{code}.html": passport_html(made, code) for code in others}
+    return {**pages, "passport.json": passport_json(made)}
 
 
 def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, bytes]:

@@ -16,6 +16,7 @@ from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.uncertainty.budget import Budget, budget
 from triaxcal.uncertainty.coverage import coverage_factor, with_offset
 from triaxcal.uncertainty.device_sources import Device, device_sources
+from triaxcal.uncertainty.exchanged import exchanged_source
 from triaxcal.uncertainty.model_sources import thermal_model
 from triaxcal.uncertainty.orientation import DIRECTIONS, QUANTITIES, force_variance, weights
 from triaxcal.uncertainty.propagation import ROWS, Curves, propagation
@@ -182,6 +183,7 @@ def uncertainty(
         *squares_source(p),
         *square_form_source(p),
         *pair_source(p),
+        *exchanged_source(unit, calibration),
         *device_sources(p, device),
     ]
     return Uncertainty(temps, t0_index, tuple(sources), s, tuple(_warnings(unit, s)), units)

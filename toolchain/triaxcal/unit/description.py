@@ -34,6 +34,7 @@ from triaxcal.unit.gravity import gravity_difference_m_per_s2, refuse_wrong_grav
 from triaxcal.unit.limits import LIMITS, RECORDED_LIMITS, Limits, limits_of
 from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.pair import QUADRATIC, PairSource, pair_source
+from triaxcal.unit.passport import ENGLISH, PASSPORT, PassportChoice
 from triaxcal.unit.prefix import DEFAULT_PREFIX
 from triaxcal.unit.priors import (
     AUTO,
@@ -55,7 +56,7 @@ from triaxcal.unit.vibration import VIBRATION, Vibration, stated_vibrations
 
 def _common() -> tuple[TableKeys, ...]:
     compensation = compensation_table()
-    more = UNCERTAINTY, CERTIFICATE, MEASURED, EQUIPMENT, QUADRATIC
+    more = UNCERTAINTY, CERTIFICATE, MEASURED, EQUIPMENT, PASSPORT, QUADRATIC
     tests = REPORT, TEST, NONLINEARITY, VIBRATION
     return FIT, PRIORS, SENSOR, compensation, FIRMWARE, *more, *tests
 

@@ -42,6 +42,9 @@ class Acceptance:
         Guard band of the decision rule.
     advice : str
         What would make it smaller.
+    unknown : tuple of str
+        Sources of which nothing is known, where the rule counts the uncertainty: it is without
+        them.
     """
 
     where: str
@@ -51,6 +54,7 @@ class Acceptance:
     cause: str
     advice: str
     guard_g: float
+    unknown: tuple[str, ...] = ()
 
     @property
     def acceptance_g(self) -> float:
@@ -58,9 +62,14 @@ class Acceptance:
         return self.limit_g - self.guard_g
 
     @property
-    def shown(self) -> bool:
-        """Whether the limit holds by the decision rule: with the guard band inside it."""
+    def within(self) -> bool:
+        """Whether the limit holds by the decision rule, with what is known of the uncertainty."""
         return self.largest_g + self.guard_g <= self.limit_g
+
+    @property
+    def shown(self) -> bool:
+        """Whether it does so with nothing unknown that the rule counts."""
+        return self.within and not self.unknown
 
     @property
     def factor(self) -> float:
@@ -93,6 +102,11 @@ class Passport:
     def verdict(self) -> Verdict:
         """Of the unit with its firmware."""
         return self.delivery.verdict
+
+    @property
+    def languages(self) -> tuple[str, ...]:
+        """Languages of its pages; passport.html is in the first."""
+        return self.delivery.unit.languages
 
     @property
     def verified_device(self) -> DeviceRecord | None:
@@ -196,8 +210,9 @@ def passport(
 def _acceptance(
     where: str, limit_g: float, residuals: list[Residual], budget: Budget, guard_g: float
 ) -> Acceptance:
-    worst = next(line for line in budget.lines if line.contribution is not None)
+    worst = next(line for line in budget.lines if line.contribution is not None).source
     largest = max(abs(r.error_g) for r in residuals)
+    unknown = tuple(line.source.name for line in budget.unknown if guard_g)
     return Acceptance(
-        where, limit_g, largest, budget.expanded, worst.source.name, worst.source.advice, guard_g
+        where, limit_g, largest, budget.expanded, worst.name, worst.advice, guard_g, unknown
     )

@@ -1,9 +1,11 @@
-"""What a laboratory states, in words."""
+"""What a laboratory states, in the words of a language."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
+from collections.abc import Iterable
+from typing import Any
+
+from markupsafe import Markup
 
 from triaxcal.report.stated.statements import (
     NO_CERTIFICATE,
@@ -13,84 +15,78 @@ from triaxcal.report.stated.statements import (
     OVERDUE,
     UPDATED,
     Caution,
-    Value,
+    Statement,
+    statements,
 )
+from triaxcal.report.texts.speaker import Speaker, speaker
+from triaxcal.report.words.numbers import signed
+from triaxcal.unit.description import UnitDescription
+from triaxcal.unit.equipment import EQUIPMENT
 from triaxcal.unit.limits import Limits
+from triaxcal.unit.passport import ENGLISH
 
-LABELS: Mapping[str, str] = MappingProxyType(
-    {
-        "certificate.identifier": "Certificate number",
-        "certificate.laboratory": "Laboratory",
-        "certificate.city": "City",
-        "certificate.country": "Country",
-        "certificate.customer": "Customer",
-        "certificate.signer": "Responsible",
-        "certificate.manufacturer": "Manufacturer of the unit",
-        "certificate.begin": "First day of the measurements",
-        "certificate.end": "Last day of the measurements",
-        "certificate.issued": "Issued",
-        "certificate.laboratory_address": "Address of the laboratory",
-        "certificate.laboratory_contact": "Contact of the laboratory",
-        "certificate.accreditation": "Accreditation",
-        "certificate.customer_address": "Address of the customer",
-        "certificate.signer_role": "Role of the responsible person",
-        "certificate.second_signer": "Second signer",
-        "certificate.second_signer_role": "Role of the second signer",
-        "certificate.model": "Model of the unit",
-        "certificate.performed_at": "Performed at",
-        "measured.rig": "Rig",
-        "measured.date": "Day of the measurements",
-        "measured.place": "Place",
-        "measured.operator": "Measured by",
-        "measured.ambient_degc": "Temperature of the room",
-        "measured.humidity_percent": "Relative humidity",
-        "measured.pressure_hpa": "Air pressure",
-        "equipment.name": "Equipment",
-        "equipment.manufacturer": "Manufacturer",
-        "equipment.model": "Model",
-        "equipment.serial": "Serial number",
-        "equipment.certificate": "Certificate",
-        "equipment.calibrated": "Calibrated",
-        "equipment.due": "Due",
-        "equipment.traceable_to": "Traceable to",
-    }
-)
-"""Of every key, as a form has it."""
-
-
-def value_words(value: Value | None, unit: str) -> str:
-    """A value with its unit."""
-    if value is None:
-        return "not stated"
-    if isinstance(value, tuple):
-        low, high = value
-        words = f"{low:g}" if low == high else f"{low:g} to {high:g}"
-    else:
-        words = f"{value:g}" if isinstance(value, float) else str(value)
-    return f"{words} {unit}".strip()
-
-
-def added_words(limits: Limits) -> str:
-    """What the decision rule adds to an error; "" for nothing."""
-    if not limits.rule.guarded:
-        return ""
-    return "uncertainty" if limits.guard_band_g is None else "guard band"
-
-
+_PERFORMED_AT = "certificate.performed_at"
 _CAUTIONS = {
-    OVERDUE: "{subject}: its calibration was due on {dates[0]}, before the last day of the "
-    "measurements, {dates[1]}",
-    NO_CERTIFICATE: "{subject}: number or day of its calibration certificate is not stated, so its "
-    "traceability is not shown",
-    NOT_TRACEABLE: "{subject}: to what its calibration is traceable is not stated",
-    NO_EQUIPMENT: "no equipment is stated, so traceability is not shown",
-    UPDATED: "what is stated here is of the calibration before the constants were brought up to "
-    "date in the field; there is no certificate of the update",
-    NO_DAY: "no day of the measurements is stated, so the dates of the equipment were not compared "
-    "with it",
+    OVERDUE: "caution.overdue",
+    NO_CERTIFICATE: "caution.no_certificate",
+    NOT_TRACEABLE: "caution.not_traceable",
+    NO_EQUIPMENT: "caution.no_equipment",
+    NO_DAY: "caution.no_day",
+    UPDATED: "caution.updated",
 }
 
 
-def caution_words(caution: Caution) -> str:
-    """A caution as a sentence without its full stop."""
-    return _CAUTIONS[caution.kind].format(subject=caution.subject, dates=caution.dates)
+def label(name: str, t: Speaker) -> Markup:
+    """Name of a key, as "measured.rig", as a form has it."""
+    return t(f"stated.{name}")
+
+
+def stated(unit: UnitDescription, cautions: Iterable[Caution], t: Speaker) -> dict[str, Any]:
+    """What is stated, what is not, and the equipment, a row for each."""
+    found = statements(unit)
+    single = [s for s in found if not s.number]
+    missing = [label(s.name, t) for s in single if s.value is None]
+    if not unit.equipment:
+        missing.append(label("equipment.name", t))
+    return {
+        "rows": [(label(s.name, t), value_words(s, t)) for s in single if s.value is not None],
+        "missing": missing,
+        "heads": [label(f"{EQUIPMENT.name}.{key.name}", t) for key in EQUIPMENT.keys],
+        "equipment": [
+            [value_words(s, t) for s in found if s.number == number]
+            for number in range(1, len(unit.equipment) + 1)
+        ],
+        "cautions": [
+            words[:1].upper() + words[1:] for words in (caution_words(c, t) for c in cautions)
+        ],
+    }
+
+
+def value_words(found: Statement, t: Speaker) -> str:
+    """A value with its unit."""
+    value = found.value
+    if value is None:
+        return t("stated.not_stated")
+    if found.name == _PERFORMED_AT:
+        return t(f"performed.{value}")
+    if isinstance(value, tuple):
+        low, high = (signed(f"{end:g}") for end in value)
+        words = low if low == high else t.plain("stated.between", low=low, high=high)
+    else:
+        words = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{words} {found.unit.replace('degC', '°C')}".strip()
+
+
+def by_rule(limits: Limits) -> str:
+    """End of the keys of texts that say what the decision rule adds to an error."""
+    if not limits.rule.guarded:
+        return "_simple"
+    return "" if limits.guard_band_g is None else "_guarded"
+
+
+def caution_words(caution: Caution, t: Speaker | None = None) -> str:
+    """A caution as a sentence without its full stop; None is English."""
+    first, last = (*map(str, caution.dates), "", "")[:2]
+    return (t or speaker(ENGLISH)).plain(
+        _CAUTIONS[caution.kind], subject=caution.subject, due=first, last=last
+    )

@@ -42,7 +42,7 @@ def significant(value: float, digits: int = 2) -> str:
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     places = digits - 1 - int(exponent)
     if places > 6:
-        return f"{mantissa}·10<sup>{signed(str(int(exponent)))}</sup>"
+        return f"{mantissa}·10{superscript(int(exponent))}"
     return signed(f"{round(value, places):.{max(places, 0)}f}")
 
 
