@@ -114,8 +114,9 @@ def test_the_record_and_the_passport(bench: Bench, target: Path) -> None:
     assert stated.pop("of_this_delivery") is True
     assert {"format": 1, **stated} == written
     page = (target / "passport.html").read_text(encoding="utf-8")
-    assert "verified on device AT-SIM-001, 2026−03−30" not in page
-    assert "verified on device AT-SIM-001, 2026-03-30, xcp-node 1: 192 samples, " in page
+    assert "2026−03−30" not in page
+    assert "<td>device AT-SIM-001, 2026-03-30, xcp-node 1: 192 samples, " in page
+    assert "<li>the device itself: serial number AT-SIM-001, 2026-03-30</li>" in page
     assert "largest difference 0 LSB; | |a| − g | at most" in page
     assert "at 6 check positions (limit " in page
 
@@ -139,8 +140,10 @@ def test_calibrating_again_keeps_it(bench: Bench, tmp_path: Path) -> None:
     stated = json.loads((build / "AT-SIM" / "passport.json").read_bytes())["device"]
     assert stated["of_this_delivery"] is False
     page = (build / "AT-SIM" / "passport.html").read_text(encoding="utf-8")
-    assert "not counted: the record of 2026-03-30 is of another delivery (image sha256 0000" in page
-    assert "verified on device" not in page
+    assert (
+        "not counted: the record of 2026-03-30 is of another delivery (image SHA-256 0000" in page
+    )
+    assert "<li>the C on a device of this unit: the record of 2026-03-30 is of another" in page
 
 
 def test_the_certificate(bench: Bench, target: Path) -> None:
@@ -324,7 +327,9 @@ def test_the_command(bench: Bench, target: Path, monkeypatch: pytest.MonkeyPatch
     assert len(record.positions) == 2
 
 
-def test_a_passport_without_a_device_says_nothing(bench: Bench) -> None:
+def test_a_passport_without_a_device_says_so(bench: Bench) -> None:
     made = passport(bench.delivery, {})
     assert json.loads(passport_json(made))["device"] is None
-    assert b"On the device" not in passport_html(made)
+    page = passport_html(made).decode()
+    assert "not verified on a device (triaxcal device verify)" in page
+    assert "<li>the C on a device of this unit</li>" in page

@@ -19,11 +19,3 @@ def device_words(record: DeviceRecord) -> str:
         f"{record.largest_difference_lsb} LSB; | |a| − g | at most "
         f"{g_in_words(abs(worst.error_g))} at {where}{of_limit}"
     )
-
-
-def device_not_counted(record: DeviceRecord) -> str:
-    """A device that had another delivery."""
-    return (
-        f"not counted: the record of {record.date} is of another delivery "
-        f"(image sha256 {record.image_sha256[:16]}…)"
-    )
