@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 
 from triaxcal import __version__
-from triaxcal.codegen.templates import environment
 from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.consistency import consistent, verdict
 from triaxcal.dynamic.observability import Weak
 from triaxcal.report.imuc import NO_C, imu_verification
+from triaxcal.report.texts.html import page
+from triaxcal.report.texts.speaker import speaker
 from triaxcal.report.words.firmware import file_rows, theorem_rows, tool_rows
 from triaxcal.report.words.numbers import signed, superscript, thousands
+from triaxcal.unit.passport import ENGLISH
 
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
 BAND = 10.0
@@ -92,7 +94,7 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
             *(row for entries in tools.values() for row in theorem_rows(entries)),
         ],
     }
-    return environment().get_template("pages/dynamic.html.j2").render(context).encode()
+    return page("dynamic.html.j2", t=speaker(ENGLISH), **context)
 
 
 def _badge(made: ImuDelivery) -> tuple[bool, str, str]:

@@ -124,6 +124,8 @@ class UnitDescription:
         Terms of the output that another test has shown.
     vibrations : mapping
         Stated vibrations by name.
+    languages : tuple of str
+        Codes of the languages of the passport.
     source : str
         Path of its unit.toml, for messages.
     toml : str
@@ -170,6 +172,7 @@ class UnitDescription:
     tests: tuple[StatedTest, ...] = ()
     nonlinearity: Nonlinearity | None = None
     vibrations: Mapping[str, Vibration] = field(default_factory=dict)
+    languages: tuple[str, ...] = (ENGLISH,)
     toml: str = field(default="", repr=False, compare=False)
     source: str = field(default=UNIT_FILE, compare=False)
 
@@ -256,6 +259,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         gravity_difference_m_per_s2=gravity_difference_m_per_s2(site),
         measured=measured,
         equipment=equipment_of(many_of(tables, "equipment"), days_of(measured, details)),
+        languages=tables["passport"].record(PassportChoice).languages,
         reporting=tables["report"].record(Reporting),
         tests=stated_tests(tables),
         nonlinearity=nonlinearity(tables["nonlinearity"]),
