@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import importlib.util
 import re
 from pathlib import Path
 from typing import Any
@@ -269,6 +270,44 @@ def test_a_certificate_of_the_wrong_authority_chain(desk: Desk, keys: dict[str, 
     leaf = cert_of(keys["ec"], issuer=(shop, shop_key))
     path = desk.sign(pem(keys["ec"]), cert_pem(leaf, shop))
     assert "is not vouched for" in refused(path, desk.put("root.pem", cert_pem(root)))
+
+
+def test_a_missing_package_is_named(
+    desk: Desk, keys: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = desk.sign(pem(keys["ec"]), cert_pem(cert_of(keys["ec"])))
+    found = importlib.util.find_spec
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda name: None if name == "signxml" else found(name)
+    )
+    text = refused(path)
+    assert "certificate.signed.dcc.xml: missing packages: signxml; install them: " in text
+    assert text.endswith("-m pip install 'triaxcal[sign]'")
+
+
+def test_a_certificate_that_has_expired_since_is_said() -> None:
+    day = datetime.datetime(2026, 1, 5, 12, 30, tzinfo=datetime.UTC)
+    year = datetime.timedelta(days=365)
+    found = triaxcal.Signature("CN=S", "CN=I", "ab", "rsa-sha256", day, day - year, day, "")
+    text = " ".join(str(found).split())
+    assert "on 2026-01-05 12:30 UTC, as the signer's computer said" in text
+    assert "valid 2025-01-05 12:30 to 2026-01-05 12:30 UTC (expired since)" in text
+
+
+def test_an_xml_comment_is_covered_by_no_signature(desk: Desk, keys: dict[str, Any]) -> None:
+    key, cert = pem(keys["ec"]), cert_pem(cert_of(keys["ec"]))
+    path = desk.sign(key, cert)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"<dcc:street>c", b"<dcc:street>c<!-- x -->"))
+    assert "an XML comment, which no signature covers; expected a certificate without" in refused(
+        path
+    )
+    path.unlink()
+    desk.put(
+        "certificate.dcc.xml",
+        desk.path.read_bytes().replace(b"<dcc:city>", b"<!-- x --><dcc:city>"),
+    )
+    assert "an XML comment, which no signature covers" in desk.refused(key, cert)
 
 
 def test_the_commands(desk: Desk, keys: dict[str, Any]) -> None:

@@ -7,6 +7,7 @@ import html
 import json
 import shutil
 from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +26,12 @@ from triaxcal.model.methods.imu import ImuModel, compensate_imu
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
 from triaxcal.report.dynamicpage import digits, dynamic_page
+from triaxcal.report.stated.words import label
+from triaxcal.report.texts.speaker import speaker
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
 from triaxcal.simulation.unit import write_simulated_unit
+from triaxcal.unit.measured import MEASURED, Measured
+from triaxcal.unit.passport import ENGLISH
 
 SIM = Path(__file__).parent.parent / "units" / "IMU-SIM"
 STANDARD_G = 9.80665
@@ -236,6 +241,36 @@ def test_the_page_warns_of_what_was_left_out(ran: Ran) -> None:
     page = dynamic_page(replace(made, done=replace(made.done, result=result)), {}).decode()
     assert "NOT CONSISTENT<small>innovations 2.00 times the stated noise" in page
     assert '<p class="warning">The innovations 2.00 times the stated noise' in page
+
+
+def test_page_and_json_say_when_and_where_it_was_measured(ran: Ran) -> None:
+    stated = Measured(
+        "table 2",
+        date(2026, 3, 30),
+        "room <7>",
+        "O. O.",
+        (21.5, 23.0),
+        (40.0, 45.0),
+        (1001.0, 1001.0),
+    )
+    unit = replace(ran.made.done.unit, measured=stated)
+    made = replace(ran.made, done=replace(ran.made.done, unit=unit))
+    page = html.unescape(dynamic_page(made, {}).decode())
+    words = (
+        "table 2",
+        "2026-03-30",
+        "room <7>",
+        "O. O.",
+        "21.5 to 23 °C",
+        "40 to 45 %",
+        "1001 hPa",
+    )
+    t = speaker(ENGLISH)
+    for key, text in zip(MEASURED.keys, words, strict=True):
+        assert f"<dt>{label(f'measured.{key.name}', t)}</dt><dd>{text}</dd>" in page
+    found = json.loads(dynamic_files(made)["calibration.json"])["measured"]
+    assert list(found) == [key.name for key in MEASURED.keys]
+    assert (found["date"], found["ambient_degc"]) == ("2026-03-30", [21.5, 23.0])
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,8 @@ from triaxcal.dynamic.observability import Observability
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.report.dynamicpage import digits, dynamic_page, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
+from triaxcal.report.stated.statements import statements_of
+from triaxcal.unit.measured import MEASURED
 
 FORMAT = 1
 
@@ -48,6 +50,7 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
         "range_degc": done.range_degc and list(done.range_degc),
         "local_gravity_m_per_s2": unit.gravity_m_per_s2,
         "latitude_deg": unit.latitude_deg,
+        "measured": {s.key: s.json for s in statements_of(MEASURED, unit.measured)},
         "blocks": list(unit.blocks),
         "states": _states(result),
         "covariance": result.covariance.tolist(),

@@ -14,10 +14,13 @@ from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.consistency import consistent, verdict
 from triaxcal.dynamic.observability import Weak
 from triaxcal.report.imuc import NO_C, imu_verification
+from triaxcal.report.stated.statements import statements_of
+from triaxcal.report.stated.words import label, value_words
 from triaxcal.report.texts.html import page
 from triaxcal.report.texts.speaker import speaker
 from triaxcal.report.words.firmware import file_rows, theorem_rows, tool_rows
 from triaxcal.report.words.numbers import signed, superscript, thousands
+from triaxcal.unit.measured import MEASURED
 from triaxcal.unit.passport import ENGLISH
 
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
@@ -128,8 +131,10 @@ def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
             ("Working range", signed(f"{low:g} to {high:g} °C")),
             ("Firmware", f"LSB 2{q[0]} g, 2{q[1]} °/s"),
         ]
+    stated, t = statements_of(MEASURED, unit.measured), speaker(ENGLISH)
     return [
         *facts,
+        *((label(s.name, t), value_words(s, t)) for s in stated if s.value is not None),
         ("Made by", f"triaxcal {__version__}"),
         ("Inputs", f"sha256 {made.inputs_sha256[:16]}…"),
     ]

@@ -11,6 +11,7 @@ from triaxcal.fitting.core.recorded import RecordingFit
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.report.passport.content import Passport
+from triaxcal.report.stated.words import caution_words
 from triaxcal.report.words.measured import measured_words
 from triaxcal.report.words.numbers import thousands
 from triaxcal.report.words.shares import share_rows
@@ -59,6 +60,7 @@ def _head(made: Passport) -> str:
             _entry("measured", measured),
             *_findings(calibration),
             *([_entry("found", made.cause)] if made.cause else []),
+            *(_entry("stated", caution_words(caution)) for caution in made.cautions),
             _entry("thermal model", calibration.selection_reason),
             _entry("method", method),
             _entry(

@@ -52,6 +52,13 @@ class Statement:
         """Table and key, as "measured.rig"."""
         return f"{self.table}.{self.key}"
 
+    @property
+    def json(self) -> Any:
+        """The value as JSON has it."""
+        if isinstance(self.value, datetime.date):
+            return self.value.isoformat()
+        return list(self.value) if isinstance(self.value, tuple) else self.value
+
 
 @dataclass(frozen=True)
 class Caution:
@@ -74,13 +81,15 @@ class Caution:
 
 def statements(unit: UnitDescription) -> tuple[Statement, ...]:
     """Every key of [certificate] and [measured], and those of each [[equipment]], in order."""
-    found = [*_of(CERTIFICATE, unit.certificate), *_of(MEASURED, unit.measured)]
+    found = [*statements_of(CERTIFICATE, unit.certificate)]
+    found += statements_of(MEASURED, unit.measured)
     for number, one in enumerate(unit.equipment, 1):
-        found += _of(EQUIPMENT, one, number)
+        found += statements_of(EQUIPMENT, one, number)
     return tuple(found)
 
 
-def _of(table: TableKeys, record: object | None, number: int = 0) -> Iterator[Statement]:
+def statements_of(table: TableKeys, record: object | None, number: int = 0) -> Iterator[Statement]:
+    """Every key of a table, with the values of its record; None is a table that is not there."""
     for key in table.keys:
         value = None if record is None else getattr(record, key.name)
         yield Statement(table.name, key.name, value, key.unit, number)
@@ -114,11 +123,5 @@ def stated_json(unit: UnitDescription) -> dict[str, Any]:
     tables[EQUIPMENT.name] = [{} for _ in unit.equipment]
     for s in statements(unit):
         target = tables[s.table][s.number - 1] if s.number else tables[s.table]
-        target[s.key] = _json(s.value)
+        target[s.key] = s.json
     return tables
-
-
-def _json(value: Value | None) -> Any:
-    if isinstance(value, datetime.date):
-        return value.isoformat()
-    return list(value) if isinstance(value, tuple) else value
