@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
+import json
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from triaxcal.rig.bus.frames import ERR_FLAG, Frames, alike, concatenate
 from triaxcal.rig.many.replay import replay_bus
 from triaxcal.rig.many.screen import group_line, many_screen
 from triaxcal.rig.many.setup import many_of_plan, one_of_plan
+from triaxcal.rig.records import rawlog
 from triaxcal.rig.records.journal import read_journal
 from triaxcal.rig.records.recording import JOURNAL_FILE
 from triaxcal.rig.records.replay import replay
@@ -216,7 +219,7 @@ def test_a_session_is_gone_on_with_and_made_again_from_its_logs(tmp_path):
     assert again.taken.resumed
     again.go()
     assert [len(first.accepted(n)) + len(again.accepted(n)) for n in ("AT-1", "AT-2")] == [6, 6]
-    played = replay_bus(setup, folder, "can0", ["AT-1", "AT-2"])
+    played, _ = replay_bus(setup, folder, "can0", ["AT-1", "AT-2"])
     for member in again.group.members:
         assert played[member.name].accepted == member.session.accepted
     # Samples have two frames, each tenth one a temperature besides, the first an identity: 30
@@ -225,6 +228,23 @@ def test_a_session_is_gone_on_with_and_made_again_from_its_logs(tmp_path):
     # One unit's own session out of the same log, as `rig replay --unit` does.
     alone = replay(one_of_plan(tmp_path / "many.toml", "AT-2"), folder / "frames-1.log")
     assert alone.engine.session.accepted == again.group.members[1].session.accepted
+
+
+@pytest.mark.long
+def test_a_session_killed_before_its_records_is_delivered_by_resume(tmp_path, monkeypatch):
+    """However long its log is: the hash of what came before the restart is not yet known then."""
+    setup = setup_of(tmp_path, 2)
+    Run(setup, bench_of(setup), setup.sessions / "001").go()
+    monkeypatch.setattr(rawlog, "_HASH_BYTES", 1000)
+    done = CliRunner().invoke(
+        main, ["rig", "resume", "--plan", setup.source, "--bus", "virtual", "--plain"]
+    )
+    assert done.exit_code == 0, done.output
+    log = setup.sessions / "001" / "frames-1.log"
+    for place in setup.places:
+        sidecar = json.loads((place.setup.folder / "measurements.json").read_text())
+        assert sidecar["log"]["sha256"] == hashlib.sha256(log.read_bytes()).hexdigest()
+        assert refuse_false_records(place, place.setup.folder) == 6
 
 
 @pytest.mark.long

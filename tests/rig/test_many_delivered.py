@@ -47,7 +47,7 @@ def refuse_other_dwells(run: Run, folder: Path) -> None:
     """The logs alone give the same dwells again."""
     for bus in run.taken.setup.buses:
         names = [m.name for m in run.group.members if m.place.bus == bus and not m.aside]
-        again = replay_bus(run.taken.setup, folder / "001", bus, names)
+        again, _ = replay_bus(run.taken.setup, folder / "001", bus, names)
         for member in run.group.members:
             if member.name in again:
                 assert again[member.name].accepted == member.session.accepted

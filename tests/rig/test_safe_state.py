@@ -118,3 +118,19 @@ def test_an_error_of_the_program(tmp_path):
     lines = errors.splitlines()
     assert lines[:2] == SAFE
     assert "serial number" in lines[2]
+
+
+def test_a_process_that_is_refused_gives_no_order(tmp_path):
+    """The chamber is that of the first process, which goes on."""
+    with started(tmp_path) as first:
+        try:
+            wait_for(tmp_path / "chamber", "-40", first)
+            command = [str(word).replace("run", "resume") if word == "run" else word
+                       for word in first.args]  # fmt: skip
+            second = subprocess.run(command, capture_output=True, text=True, check=False)
+            assert second.returncode == 1
+            assert f"a session is under way in process {first.pid}, " in second.stderr
+            assert "safe" not in second.stderr
+            assert (tmp_path / "chamber.all").read_text() == "-40\n"
+        finally:
+            first.kill()

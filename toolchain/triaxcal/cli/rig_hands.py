@@ -17,33 +17,39 @@ from triaxcal.rig.sources.canbus import SimulatedSource
 from triaxcal.rig.sources.source import Source
 
 
-@contextlib.contextmanager
-def hands_of(setup: Setup, source: Source, unattended: bool) -> Iterator[Hands | None]:
-    """Hands of a session; chamber and positioner are brought to safety however it ends."""
+def hands_of(setup: Setup, source: Source, unattended: bool) -> Hands | None:
+    """Hands of a session; nothing is asked or ordered yet.
+
+    Raises
+    ------
+    RefusedError
+        When the plan leaves to a person what must be done alone, or a package is missing.
+    """
     rig = source.rig if isinstance(source, SimulatedSource) else None
     equipment = setup.plan.equipment
     by_hand = equipment.chamber_by.by_hand, equipment.positioner_by.by_hand
     if not unattended and (rig is not None or all(by_hand)):
-        yield Robot(rig) if rig is not None else None
-        return
+        return Robot(rig) if rig is not None else None
     if rig is not None and all(by_hand):
-        hands = simulated_attendant(setup.plan, rig)
-    elif rig is not None:
-        hands = attendant(setup.plan, lambda: float(rig.seconds), at_once=True)
-    else:
-        hands = attendant(setup.plan, time.monotonic, alone=unattended)
-    with made_safe(hands):
-        yield hands
+        return simulated_attendant(setup.plan, rig)
+    if rig is not None:
+        return attendant(setup.plan, lambda: float(rig.seconds), at_once=True)
+    return attendant(setup.plan, time.monotonic, alone=unattended)
 
 
 @contextlib.contextmanager
-def made_safe(hands: Attendant) -> Iterator[None]:
-    """Chamber and positioner are brought to safety at the end, whatever ends it."""
+def made_safe(hands: object) -> Iterator[None]:
+    """Chamber and positioner of an attendant are brought to safety, whatever ends the session.
+
+    Enter it when the session is locked: a process that is refused must not order the chamber of
+    the first one.
+    """
     try:
         yield
     finally:
-        with _uninterrupted():
-            _end(hands)
+        if isinstance(hands, Attendant):
+            with _uninterrupted():
+                _end(hands)
 
 
 def _end(hands: Attendant) -> None:

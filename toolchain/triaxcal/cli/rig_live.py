@@ -15,7 +15,7 @@ from rich.live import Live
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.keys import Keys
-from triaxcal.cli.rig_hands import hands_of
+from triaxcal.cli.rig_hands import hands_of, made_safe
 from triaxcal.model.positions import CHECK_POSITIONS, TEST_POSITIONS
 from triaxcal.rig.bus.messages import messages_of
 from triaxcal.rig.description.description import RigDescription
@@ -89,15 +89,17 @@ def guide(
 ) -> None:
     """Guide a session to its end and write the records."""
     start = time.monotonic()
-    with contextlib.closing(source), hands_of(setup, source, unattended) as hands:
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.closing(source))
+        hands = hands_of(setup, source, unattended)
         taken = recording.Recording(setup, folder, source.name)
+        stack.enter_context(contextlib.closing(taken))
+        stack.enter_context(made_safe(hands))
         try:
             log = _guided(taken, source, hands, plain, start)
         except (Stop, KeyboardInterrupt):
             click.echo(f"stopped; go on with: triaxcal rig resume --unit {setup.folder}", err=True)
             sys.exit(1)
-        finally:
-            taken.close()
     _write(setup, taken, log)
 
 

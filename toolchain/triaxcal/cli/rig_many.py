@@ -18,7 +18,7 @@ from triaxcal.cli.keys import Keys
 from triaxcal.cli.rig_hands import made_safe
 from triaxcal.cli.rig_live import Operator, Stop, clock_of_end, show_written
 from triaxcal.cli.rig_options import BusChoice, refuse_other_kind
-from triaxcal.rig.live.attendant import attendant
+from triaxcal.rig.live.attendant import Attendant, attendant
 from triaxcal.rig.live.simhands import simulated_attendant
 from triaxcal.rig.many.group import Group
 from triaxcal.rig.many.hands import ManyAttendant
@@ -62,8 +62,12 @@ def guide_many(
 ) -> None:
     """Guide a session of many units to its end and write the records of those that are done."""
     opened = _open(setup, bus)
-    with contextlib.closing(opened.sources), _hands(setup, opened, unattended) as hands:
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.closing(opened.sources))
+        hands, own = _hands(setup, opened, unattended)
         taken = ManyRecording(setup, folder, follow=hands is None)
+        stack.enter_context(contextlib.closing(taken))
+        stack.enter_context(made_safe(own))
         try:
             _guided(taken, opened, hands, plain)
             logs = {name: here.log.state for name, here in taken.buses.items()}
@@ -71,8 +75,6 @@ def guide_many(
             plan = f"triaxcal rig resume --plan {setup.source}"
             click.echo(f"stopped; go on with: {plan}", err=True)
             sys.exit(1)
-        finally:
-            taken.close()
     _write(taken, logs)
 
 
@@ -107,20 +109,18 @@ def _no_rig() -> SimulatedRig:
     )
 
 
-@contextlib.contextmanager
-def _hands(setup: ManySetup, opened: _Opened, unattended: bool) -> Iterator[ManyHands | None]:
-    """Hands of a session; chamber and positioner are brought to safety however it ends."""
+def _hands(
+    setup: ManySetup, opened: _Opened, unattended: bool
+) -> tuple[ManyHands | None, Attendant | None]:
+    """Hands of a session, and the attendant that has the instruments."""
     bench, plan = opened.bench, setup.plan
     if not unattended:
-        yield ManyRobot(bench) if bench is not None else None
-        return
+        return (ManyRobot(bench) if bench is not None else None), None
     if bench is not None and plan.equipment.positioner_by.by_hand:
         own = simulated_attendant(plan, bench)
     else:
         own = attendant(plan, opened.clock, at_once=bench is not None)
-    hands = ManyAttendant(own, opened.clock)
-    with made_safe(own):
-        yield hands
+    return ManyAttendant(own, opened.clock), own
 
 
 def _guided(taken: ManyRecording, opened: _Opened, hands: ManyHands | None, plain: bool) -> None:
@@ -191,7 +191,7 @@ def _write(taken: ManyRecording, logs: dict[str, LogState]) -> None:
     """Records of the units that are done; what became of the others."""
     sessions = {m.name: m.session for m in taken.group.members}
     if taken.resumed:
-        sessions = _again(taken)
+        sessions, logs = _again(taken)
     done = [m for m in taken.group.members if not m.aside]
     for member in done:
         setup, bus = member.place.setup, member.place.bus
@@ -212,10 +212,12 @@ def _write(taken: ManyRecording, logs: dict[str, LogState]) -> None:
         )
 
 
-def _again(taken: ManyRecording) -> dict[str, Session]:
-    """Sessions of a resumed recording, put together from its logs."""
+def _again(taken: ManyRecording) -> tuple[dict[str, Session], dict[str, LogState]]:
+    """Sessions of a resumed recording, put together from its logs, and the state of each log."""
     sessions: dict[str, Session] = {}
+    logs: dict[str, LogState] = {}
     for bus in taken.buses:
         names = [m.name for m in taken.group.members if m.place.bus == bus and not m.aside]
-        sessions |= replay_bus(taken.setup, taken.folder, bus, names)
-    return sessions
+        again, logs[bus] = replay_bus(taken.setup, taken.folder, bus, names)
+        sessions |= again
+    return sessions, logs

@@ -102,7 +102,13 @@ class _Count:
                 f"{counter.name} never counts, it is always {self.last}: it is another signal, "
                 "or `counter` of rig.toml is to be left out"
             )
-        if turns < 2 or self.steps[1] < _STEADY * self.steps.total():
+        step, often = self.steps.most_common(1)[0]
+        if step and step != self.use.counter_step and often >= _STEADY * self.steps.total():
+            return (
+                f"{counter.name} grows by {step} from frame to frame, and "
+                f"{self.use.counter_step} is described: counter_step = {step} in rig.toml"
+            )
+        if turns < 2 or step != 1 or often < _STEADY * self.steps.total():
             return ""
         (high, low), count = self.wraps.most_common(1)[0]
         described = self.use.counter_modulus

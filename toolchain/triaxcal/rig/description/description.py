@@ -9,15 +9,31 @@ same make on the same bus, by the offset of its IDs or by its J1939 source addre
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
+from triaxcal.model.types import IntArray
+from triaxcal.rig.bus.frames import ByteArray
 from triaxcal.rig.description.layout import Condition, FrameLayout
 from triaxcal.rig.description.lines import LineFormat
 from triaxcal.rig.description.protection import Guard, Protection
 from triaxcal.rig.description.recorded import Recorded, SignalUnit
 from triaxcal.rig.description.signals import Signal
+
+_HALF, _LOW = 16, 0xFFFF
+"""Half of a counter's bits, 32 at most."""
+
+
+@dataclass(frozen=True)
+class Status:
+    """A status or validity signal, and its raw values that are good."""
+
+    signal: Signal
+    good: tuple[int, ...] = (0,)
 
 
 @dataclass(frozen=True)
@@ -28,13 +44,12 @@ class MessageUse:
     ----------
     layout : FrameLayout
     counter : Signal or None
-    counter_modulus : int
-        Number of the counter's values.
+    counter_modulus, counter_step : int
+        Number of the counter's values; what it grows by from frame to frame.
     guard, protection : Guard and Protection, or None
         The CRC, and how it is made.
-    status : Signal or None
-    status_good : tuple of int
-        Raw values of the status that are good.
+    statuses : tuple of Status
+        Each must be good.
     only : tuple of Condition
         Frames of the message for which these do not hold are not looked at.
     """
@@ -42,16 +57,37 @@ class MessageUse:
     layout: FrameLayout
     counter: Signal | None = None
     counter_modulus: int = 0
+    counter_step: int = 1
     guard: Guard | None = None
     protection: Protection | None = None
-    status: Signal | None = None
-    status_good: tuple[int, ...] = (0,)
+    statuses: tuple[Status, ...] = ()
     only: tuple[Condition, ...] = ()
 
     @property
     def name(self) -> str:
         """Name of the message."""
         return self.layout.name
+
+    @property
+    def turn(self) -> int:
+        """Frames after which the counter has the same value again; 0 without a counter."""
+        return self.counter_modulus // self._divisor if self.counter is not None else 0
+
+    def sequence(self, data: ByteArray) -> IntArray:
+        """Number of each frame (n,) by the counter, modulo `turn`: it grows by 1 a frame."""
+        assert self.counter is not None
+        raw = self.counter.raw(data)
+        if self.counter_step == 1:
+            return raw
+        # Steps of s modulo m: (raw / g) (s / g)^-1 modulo m / g, where g divides both.
+        turn = self.turn
+        back, steps = pow(self.counter_step // self._divisor, -1, turn), raw // self._divisor
+        high = (steps >> _HALF) * back % turn  # in two halves: a product of 64 bits has no room
+        return np.asarray(((high << _HALF) + (steps & _LOW) * back) % turn, np.int64)
+
+    @property
+    def _divisor(self) -> int:
+        return math.gcd(self.counter_step, self.counter_modulus)
 
     def moved(self, frame_id: int) -> MessageUse:
         """The same under another ID."""

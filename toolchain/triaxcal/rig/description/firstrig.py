@@ -170,7 +170,10 @@ def _message(layout: FrameLayout, taken: set[str]) -> list[str]:
             and not signal.is_float
             and name not in layout.multiplexed
         ]
-        lines += [f"# {key} = {toml_value(name)}" for name in names]
+        if key == "status" and len(names) > 1:
+            lines.append(f"# status = [{', '.join(map(toml_value, names))}]")
+        else:
+            lines += [f"# {key} = {toml_value(name)}" for name in names]
         if key == "crc" and names:
             lines.append('# protection = "sae-j1850"')
         if key == "status" and names:

@@ -95,6 +95,8 @@ class Protection:
         Of its counter; 0 where it is that of the counter's bits.
     data_ids : int
         Data IDs that it needs.
+    before : int
+        Bytes before the CRC that belong to it.
     """
 
     name: str
@@ -105,6 +107,7 @@ class Protection:
     fill: Callable[[Guard, ByteArray], None] = _nothing
     counter_modulus: int = 0
     data_ids: int = 0
+    before: int = 0
     rank: int = 100
 
 

@@ -136,7 +136,7 @@ def _refuse_shared_bits(
     every = list(signals)
     for use in uses.values():
         crc = use.guard.signal if use.guard is not None else None
-        inner = (use.counter, crc, use.status)
+        inner = (use.counter, crc, *(status.signal for status in use.statuses))
         every += [SignalUnit(use.name, signal) for signal in inner if signal is not None]
     for i, one in enumerate(every):
         for other in every[:i]:
@@ -157,13 +157,13 @@ def _refuse_two_roles(
     """Refuse a signal that two keys name; a counter may be the time of the sample."""
     every = [(f"[signals] {key}", where.label) for key, where in signals.items()]
     for use in uses.values():
-        inner = {
-            "counter": use.counter,
-            "crc": use.guard.signal if use.guard is not None else None,
-            "status": use.status,
-            "mux": use.only[0].selector if use.only else None,
-        }
-        here = ((f"[message.{use.name}] {key}", s) for key, s in inner.items() if s is not None)
+        inner = [
+            ("counter", use.counter),
+            ("crc", use.guard.signal if use.guard is not None else None),
+            *(("status", status.signal) for status in use.statuses),
+            ("mux", use.only[0].selector if use.only else None),
+        ]
+        here = ((f"[message.{use.name}] {key}", s) for key, s in inner if s is not None)
         every += [(key, f"{use.name}.{s.name}") for key, s in here]
     roles: dict[str, str] = {}
     for role, label in every:
@@ -254,7 +254,7 @@ def _joining(
                 f'"counter", and [message.{without[0]}] has none',
                 expected='a counter in each, or join = "age"',
             )
-        moduli = {uses[m].counter_modulus for m in used}
+        moduli = {uses[m].turn for m in used}
         if len(moduli) > 1:
             raise RefusedError(
                 f"{place} join",

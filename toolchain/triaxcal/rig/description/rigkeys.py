@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from triaxcal.base.keys import DESCRIPTION, FORMAT, FileKeys, TableKeys, setting
-from triaxcal.base.kinds import FLAG, line, listed, number, whole, word
+from triaxcal.base.kinds import FLAG, Kind, line, listed, number, whole, word
 from triaxcal.rig.description.lines import LineFormat
 from triaxcal.rig.description.protection import DATA_ID_MODES, PROTECTIONS
 
@@ -110,6 +111,46 @@ class SignalKeys:
     sample_at: str | None = setting(_NAME, None, words="that of z", example='"IMU"')
 
 
+@dataclass(frozen=True)
+class Goods:
+    """Good values of statuses: one list for all, or one for each."""
+
+    lists: tuple[tuple[int, ...], ...]
+
+    @property
+    def count(self) -> int:
+        """Number of the lists."""
+        return len(self.lists)
+
+    def of(self, place: int) -> tuple[int, ...]:
+        """Good values of a status by its place from 0."""
+        return self.lists[min(place, self.count - 1)]
+
+
+def _one_or_several() -> Kind[tuple[str, ...]]:
+    """A name, or a list of names."""
+    several = listed(_NAME, range(1, 17), "a list of names", different=True)
+
+    def parse(value: Any) -> tuple[str, ...]:
+        return several.parse(value) if isinstance(value, list) else (_NAME.parse(value),)
+
+    schema = {"anyOf": [_NAME.schema, several.schema]}
+    return Kind("a name, or a list of names", parse, schema, example='"Status"')
+
+
+def _goods() -> Kind[Goods]:
+    """A list of whole numbers, or a list of such lists."""
+    expected = "a list of whole numbers, or a list of such lists"
+    one = listed(whole(0, 2**32 - 1), range(1, 257), expected)
+    several = listed(one, range(1, 17), expected)
+
+    def parse(value: Any) -> Goods:
+        nested = isinstance(value, list) and any(isinstance(item, list) for item in value)
+        return Goods(several.parse(value) if nested else (one.parse(value),))
+
+    return Kind(expected, parse, {"anyOf": [one.schema, several.schema]}, example="[0]")
+
+
 @dataclass(frozen=True, kw_only=True)
 class MessageKeys:
     """[message.MESSAGE]: what else one message has; its signals by their names in it.
@@ -120,6 +161,8 @@ class MessageKeys:
         Counter of the message's frames, or of the samples.
     counter_modulus
         Number of values of the counter.
+    counter_step
+        What the counter grows by from frame to frame; of one that counts down, counter_modulus - 1.
     crc
         CRC of the payload.
     protection
@@ -129,9 +172,9 @@ class MessageKeys:
     data_id_mode
         What profile 1 covers of its Data ID.
     status
-        Status or validity.
+        Status or validity; a list where there are several, as one for each axis.
     status_good
-        Raw values of status that are good.
+        Raw values of status that are good: one list for all, or a list of lists, one for each.
     mux
         Selector of a message whose multiplexing the bus description does not state.
     mux_value
@@ -146,16 +189,15 @@ class MessageKeys:
     counter_modulus: int | None = setting(
         whole(2, 2**32), None, words="2^bits, 15 of AUTOSAR profile 1", example="16"
     )
+    counter_step: int = setting(whole(1, 2**32 - 1), 1)
     crc: str | None = setting(_NAME, None, example='"Crc"')
     protection: str | None = setting(_NAME, None, example='"sae-j1850"')
     data_id: tuple[int, ...] = setting(
         listed(whole(0, 2**32 - 1), range(17), "a list of whole numbers"), (), example="[291]"
     )
     data_id_mode: str = setting(word(DATA_ID_MODES), "both")
-    status: str | None = setting(_NAME, None, example='"Status"')
-    status_good: tuple[int, ...] = setting(
-        listed(whole(0, 2**32 - 1), range(1, 257), "a list of whole numbers"), (0,)
-    )
+    status: tuple[str, ...] = setting(_one_or_several(), (), words="none", example='"Status"')
+    status_good: Goods = setting(_goods(), Goods(((0,),)), words="[0]", example="[0]")
     mux: str | None = setting(_NAME, None, example='"Mux"')
     mux_value: int | None = setting(whole(0, 2**32 - 1), None, example="0")
     j1939: bool | None = setting(FLAG, None, words="by the bus description", example="true")

@@ -8,7 +8,7 @@ import numpy as np
 
 from triaxcal.model.types import IntArray
 from triaxcal.rig.bus.frames import BoolArray, ByteArray, Frames
-from triaxcal.rig.description.description import MessageUse
+from triaxcal.rig.description.description import MessageUse, Status
 from triaxcal.rig.description.layout import Condition
 from triaxcal.rig.description.signals import Signal
 
@@ -84,10 +84,17 @@ def is_good(use: MessageUse, length: ByteArray, fd: BoolArray, data: ByteArray) 
 
 
 def status_of(use: MessageUse, data: ByteArray) -> IntArray | None:
-    """Status of payloads (n, bytes): 0 good, else the bits that differ; None without one."""
-    if use.status is None:
-        return None
-    raw, good = use.status.raw(data), use.status_good
+    """Status of payloads (n, bytes): 0 good, else the bits that differ; None without one.
+
+    Of several statuses the bits are or-ed.
+    """
+    said = [_off(status, data) for status in use.statuses]
+    return np.bitwise_or.reduce(said) if said else None
+
+
+def _off(status: Status, data: ByteArray) -> IntArray:
+    """Bits in which a status differs from a good one; 0 where it is good."""
+    raw, good = status.signal.raw(data), status.good
     if good == (0,):
         return raw
     return np.where(np.isin(raw, good), 0, np.maximum(raw ^ good[0], 1))

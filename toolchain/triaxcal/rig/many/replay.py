@@ -11,6 +11,7 @@ from triaxcal.rig.logs.logfile import Left
 from triaxcal.rig.many.recording import log_file, of_unit
 from triaxcal.rig.many.setup import ManySetup
 from triaxcal.rig.records.journal import Record, read_journal
+from triaxcal.rig.records.rawlog import LogState
 from triaxcal.rig.records.recording import JOURNAL_FILE, durable_events, known_log
 from triaxcal.rig.records.replay import chunks, log_state, say
 from triaxcal.rig.samples.split import Splitter
@@ -20,8 +21,8 @@ from triaxcal.rig.session.session import Session
 
 def replay_bus(
     setup: ManySetup, folder: Path, bus: str, names: Collection[str]
-) -> dict[str, Session]:
-    """Sessions of some units of a bus, by name.
+) -> tuple[dict[str, Session], LogState]:
+    """Sessions of some units of a bus, by name, and the state of its log.
 
     Raises
     ------
@@ -32,11 +33,11 @@ def replay_bus(
     path = folder / JOURNAL_FILE
     records = read_journal(path).records
     here = [p for p in setup.places if p.bus == bus and p.name in names]
-    if not here:
-        return {}
     engines = {p.name: Engine(p.setup, bus) for p in here}
     log = folder / log_file(setup.buses.index(bus) + 1)
-    log_state(log, known_log([r for r in records if r.get("bus") == bus]))
+    state = log_state(log, known_log([r for r in records if r.get("bus") == bus]))
+    if not here:
+        return {}, state
     words = [r for r in records if r["kind"] in {"command", "resume"} and r["unit"] in engines]
     parts = chunks(log, here[0].setup.rig.lines, [int(r["log"]["lines"]) for r in words], Left())
     _play(parts, Splitter([p.setup.rig for p in here]), engines, words)
@@ -49,7 +50,7 @@ def replay_bus(
                 "gives other dwells than the journal",
                 remedy="report this session",
             )
-    return {name: engine.session for name, engine in engines.items()}
+    return {name: engine.session for name, engine in engines.items()}, state
 
 
 def _play(

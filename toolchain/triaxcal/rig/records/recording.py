@@ -262,6 +262,15 @@ def session_folders(root: Path) -> list[Path]:
 
 
 def next_folder(root: Path) -> Path:
-    """Folder of a new session."""
+    """Folder of a new session.
+
+    Raises
+    ------
+    RefusedError
+        When another process has the last one: a unit is in one session at a time.
+    """
     there = session_folders(root)
-    return root / f"{int(there[-1].name) + 1 if there else 1:03d}"
+    if not there:
+        return root / "001"
+    with Lock(there[-1] / LOCK_FILE, "a session"):
+        return root / f"{int(there[-1].name) + 1:03d}"

@@ -41,8 +41,7 @@ class FrameCounters:
             mine = rows[name]
             if use.counter is None or not len(mine):
                 continue
-            counter = use.counter.raw(mine.data)
-            modulus = use.counter_modulus
+            counter, modulus = use.sequence(mine.data), use.turn
             before, payload = self._last.get(name, ((int(counter[0]) - 1) % modulus, mine.data[0]))
             self._last[name] = int(counter[-1]), mine.data[-1].copy()
             step = np.diff(counter, prepend=before)

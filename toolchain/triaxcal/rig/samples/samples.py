@@ -118,7 +118,7 @@ class SampleDecoder:
         self._numbering = Numbering(
             Clocks(
                 rate_hz,
-                self._parts[lead].use.counter_modulus if numbers else 0,
+                self._parts[lead].use.turn if numbers else 0,
                 clock.turn if clock else 0,
                 clock.tick_us if clock else 1.0,
             )
@@ -228,7 +228,7 @@ class SampleDecoder:
         return Part(
             place=rows.place,
             t_ns=rows.t_ns,
-            sequence=use.counter.raw(rows.data)
+            sequence=use.sequence(rows.data)
             if use.name in self._counted and use.counter
             else None,
             time=clock.signal.signal.raw(rows.data) if clock is not None and mine else None,

@@ -34,7 +34,7 @@ def _sentences(rig: RigDescription) -> Iterator[str]:
         )
     if rig.serial is None:
         yield "no serial number: a unit that is another one is not noticed"
-    without = [name for name in rig.axis_messages if rig.messages[name].status is None]
+    without = [name for name in rig.axis_messages if not rig.messages[name].statuses]
     if len(without) == len(rig.axis_messages):
         yield "no status: a fault that the sensor reports is not seen"
     if rig.join == "age":

@@ -161,9 +161,11 @@ class FrameMaker:
             if message == use.name and not layout.multiplexed.get(signal)
         }
         if use.counter is not None:
-            raw[use.counter.name] = self._counter(kind, rows) % use.counter_modulus
-        if use.status is not None:
-            raw[use.status.name] = zero + (use.status_good[0] ^ status)
+            raw[use.counter.name] = (
+                self._counter(kind, rows) * use.counter_step % use.counter_modulus
+            )
+        for one in use.statuses:
+            raw[one.signal.name] = zero + (one.good[0] ^ status)
         for condition in use.only:
             raw[condition.selector.name] = zero + condition.values[0]
         data = kind.packer.pack(raw)

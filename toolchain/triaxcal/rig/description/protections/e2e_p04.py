@@ -38,5 +38,6 @@ ENTRY = Protection(
     crc=_crc,
     fill=_fill,
     data_ids=1,
+    before=8,
     rank=32,
 )
