@@ -43,7 +43,7 @@ class _Count:
     def add(self, frames: Frames) -> None:
         """Count those of one more piece."""
         layout = self.use.layout
-        mine = frames.take(layout.mine(frames.can_id))
+        mine = frames.take(self.use.mine(frames))
         self.frames += len(mine)
         fits = (mine.length == layout.sent_bytes) & (mine.fd == layout.fd)
         if not fits.all():
@@ -137,16 +137,16 @@ class Census:
         self.frames = 0
         self._counts = [_Count(use) for use in rig.messages.values()]
         self._ids: Counter[int] = Counter()
-        self._channel = rig.channel
+        self._rig = rig
         self._others: Counter[bytes] = Counter()
 
     def add(self, frames: Frames) -> None:
         """Count those of one more piece."""
         self.frames += len(frames)
-        if self._channel is not None:
-            other = (frames.channel != self._channel.encode()) & (frames.channel != b"")
-            self._others.update(frames.channel[other].tolist())
-            frames = frames.take(~other)
+        heard = self._rig.hears(frames)
+        if not heard.all():
+            self._others.update(frames.channel[~heard].tolist())
+            frames = frames.take(heard)
         ids, counts = np.unique(frames.can_id, return_counts=True)
         self._ids.update(dict(zip(ids.tolist(), counts.tolist(), strict=True)))
         for count in self._counts:
@@ -160,9 +160,13 @@ class Census:
                 f"{n.decode('ascii', 'replace')} ({c})" for n, c in self._others.items()
             )
             missing.insert(
-                0, f"channel {self._channel} of rig.toml is read; frames came on {there}"
+                0, f"channel {self._channels} of rig.toml is read; frames came on {there}"
             )
         return [*missing, *(text for count in self._counts for text in count.faults())]
+
+    @property
+    def _channels(self) -> str:
+        return ", ".join(sorted({str(use.channel) for use in self._rig.messages.values()}))
 
     def said(self) -> list[str]:
         """Frames of each message, and how many are good."""

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from triaxcal.model.types import IntArray
-from triaxcal.rig.bus.frames import ByteArray
+from triaxcal.rig.bus.frames import BoolArray, ByteArray, Frames
 from triaxcal.rig.description.layout import Condition, FrameLayout
 from triaxcal.rig.description.lines import LineFormat
 from triaxcal.rig.description.protection import Guard, Protection
@@ -36,6 +36,12 @@ class Status:
     good: tuple[int, ...] = (0,)
 
 
+def on_channel(frames: Frames, channel: str) -> BoolArray:
+    """Which of the frames came on a channel, or on none that is known."""
+    mine: BoolArray = (frames.channel == channel.encode()) | (frames.channel == b"")
+    return mine
+
+
 @dataclass(frozen=True)
 class MessageUse:
     """One message that the bench reads.
@@ -52,6 +58,8 @@ class MessageUse:
         Each must be good.
     only : tuple of Condition
         Frames of the message for which these do not hold are not looked at.
+    channel : str or None
+        Channel that its frames come on, where there are several; None: any.
     """
 
     layout: FrameLayout
@@ -62,11 +70,25 @@ class MessageUse:
     protection: Protection | None = None
     statuses: tuple[Status, ...] = ()
     only: tuple[Condition, ...] = ()
+    channel: str | None = None
 
     @property
     def name(self) -> str:
         """Name of the message."""
         return self.layout.name
+
+    def mine(self, frames: Frames) -> BoolArray:
+        """Which of the frames are of this message, by ID and channel.
+
+        Frames of no channel are of any.
+        """
+        mine = self.layout.mine(frames.can_id)
+        return mine if self.channel is None else mine & on_channel(frames, self.channel)
+
+    def overlaps(self, other: MessageUse) -> bool:
+        """Whether a frame could be of both messages."""
+        apart = None not in {self.channel, other.channel} and self.channel != other.channel
+        return not apart and self.layout.overlaps(other.layout)
 
     @property
     def turn(self) -> int:
@@ -134,8 +156,6 @@ class RigDescription:
         What breaks the letter of the bus description's format.
     lines : LineFormat or None
         Format of the lines that it sends in place of frames.
-    channel : str or None
-        Channel of a log whose frames count; None: that of all.
     """
 
     name: str
@@ -154,7 +174,6 @@ class RigDescription:
     sample_at: str = ""
     warnings: tuple[str, ...] = field(default=())
     lines: LineFormat | None = None
-    channel: str | None = None
 
     @property
     def bus_file(self) -> Path:
@@ -165,6 +184,16 @@ class RigDescription:
     def fd(self) -> bool:
         """Whether any of its frames is CAN FD."""
         return any(use.layout.fd for use in self.messages.values())
+
+    def hears(self, frames: Frames) -> BoolArray:
+        """Which of the frames come on a channel of the rig."""
+        channels = {use.channel for use in self.messages.values()}
+        every = np.ones(len(frames), np.bool_)
+        if None in channels:
+            return every
+        for channel in channels:
+            every &= ~on_channel(frames, str(channel))
+        return ~every
 
     @property
     def axis_messages(self) -> tuple[str, ...]:

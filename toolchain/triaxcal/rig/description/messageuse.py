@@ -13,8 +13,13 @@ from triaxcal.rig.description.rigkeys import MessageKeys
 from triaxcal.rig.description.signals import Signal
 
 
-def use_of(names: Names, name: str, keys: MessageKeys) -> MessageUse:
+def use_of(names: Names, name: str, keys: MessageKeys, channel: str | None) -> MessageUse:
     """One message as the bench uses it.
+
+    Parameters
+    ----------
+    channel : str or None
+        Where its keys name none.
 
     Raises
     ------
@@ -67,6 +72,7 @@ def use_of(names: Names, name: str, keys: MessageKeys) -> MessageUse:
         protection=protection,
         statuses=_statuses(names, layout, place, keys),
         only=only,
+        channel=keys.channel or channel,
     )
 
 

@@ -30,6 +30,7 @@ def resolved(  # noqa: PLR0917
     files: Sequence[Described],
     keys: SignalKeys,
     messages: Mapping[str, MessageKeys],
+    channel: str | None = None,
 ) -> RigDescription:
     """Description of the keys of a rig.toml.
 
@@ -39,6 +40,8 @@ def resolved(  # noqa: PLR0917
         Of the description, of its file for messages, and of its content.
     files : sequence of Described
         Bus descriptions; the first is the rig's.
+    channel : str, optional
+        Of the messages that name none.
 
     Raises
     ------
@@ -55,7 +58,9 @@ def resolved(  # noqa: PLR0917
     used = [axis.message for axis in axes] + [other.message for other in others.values()]
     for message in messages:
         names.message(f"{source}, [message.{message}]", message)
-    uses = {m: use_of(names, m, messages.get(m, MessageKeys())) for m in dict.fromkeys(used)}
+    uses = {
+        m: use_of(names, m, messages.get(m, MessageKeys()), channel) for m in dict.fromkeys(used)
+    }
     _refuse_overlaps(names, uses)
     _refuse_two_roles(names, dict(zip(AXES, axes, strict=True)) | others, uses)
     _refuse_shared_bits(names, [*axes, *others.values()], uses)
@@ -117,14 +122,14 @@ def _temperature(names: Names, keys: SignalKeys, where: SignalUnit | None) -> Re
 def _refuse_overlaps(names: Names, uses: Mapping[str, MessageUse]) -> None:
     seen: list[MessageUse] = []
     for use in uses.values():
-        other = next((o for o in seen if o.layout.overlaps(use.layout)), None)
+        other = next((o for o in seen if o.overlaps(use)), None)
         if other is not None:
             raise RefusedError(
                 f"{names.source}, [message.{use.name}]",
                 f"its frames cannot be told from those of {other.name}: IDs "
                 f"0x{use.layout.frame_id:X} and 0x{other.layout.frame_id:X}",
                 expected="an ID for each message",
-                remedy="state source_address where J1939 addresses differ",
+                remedy="state source_address where J1939 addresses differ, and channel where buses do",
             )
         seen.append(use)
 

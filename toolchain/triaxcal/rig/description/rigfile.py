@@ -49,8 +49,8 @@ def read_description(path: Path, bus_file: Path | None = None) -> RigDescription
         files += [read_bus_file(file) for file in (first, *more)]
     named = path.parent.parent == descriptions_folder()
     name = path.parent.name if named else str(path)
-    made = resolved(name, str(path), sha256, files, signals, messages)
-    return replace(made, lines=lines, channel=keys.channel)
+    made = resolved(name, str(path), sha256, files, signals, messages, keys.channel)
+    return replace(made, lines=lines)
 
 
 def _lines(path: Path, tables: Mapping[str, Values]) -> LineFormat | None:

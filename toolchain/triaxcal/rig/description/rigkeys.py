@@ -33,9 +33,9 @@ class RigKeys:
     file
         Its description, beside this file: DBC, KCD, SYM or ARXML. Required without [lines].
     more_files
-        More descriptions of the same bus, as of a thermometer of another make.
+        More descriptions, as of a thermometer of another make, on this bus or another one.
     channel
-        Channel of the sensor in logs of several channels with equal IDs.
+        Channel of the sensor, where frames of several come.
     """
 
     file: str | None = setting(_NAME, None, example='"imu.dbc"')
@@ -157,6 +157,8 @@ class MessageKeys:
 
     Attributes
     ----------
+    channel
+        Channel that the message comes on, where it is another one.
     counter
         Counter of the message's frames, or of the samples.
     counter_modulus
@@ -185,6 +187,7 @@ class MessageKeys:
         J1939 source address of the unit; 254: any.
     """
 
+    channel: str | None = setting(_NAME, None, words="that of [rig]", example='"can1"')
     counter: str | None = setting(_NAME, None, example='"Counter"')
     counter_modulus: int | None = setting(
         whole(2, 2**32), None, words="2^bits, 15 of AUTOSAR profile 1", example="16"

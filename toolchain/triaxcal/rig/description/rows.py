@@ -56,7 +56,7 @@ def rows_of(use: MessageUse, frames: Frames, seen: int) -> tuple[Rows, IntArray]
     seen : int
         Frames before these.
     """
-    places = np.flatnonzero(use.layout.mine(frames.can_id))
+    places = np.flatnonzero(use.mine(frames))
     width = use.layout.size
     data = frames.data
     if not len(places):

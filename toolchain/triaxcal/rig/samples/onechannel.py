@@ -16,28 +16,24 @@ _CHANGES = 4
 
 
 class OneChannel:
-    """Frames of one channel; a message that comes on two of them at once is refused."""
+    """Refuses a message that comes on two channels at once."""
 
     def __init__(self, rig: RigDescription) -> None:
         self._rig = rig
-        self._chosen = rig.channel.encode() if rig.channel is not None else None
         self._last: dict[str, tuple[bytes, int]] = {}
         self._changed_ns: dict[str, IntArray] = {}
 
-    def of(self, frames: Frames) -> Frames:
-        """Frames of the chosen channel and of none; all where none is chosen.
+    def watch(self, frames: Frames) -> None:
+        """Look at the channels of messages for which none is chosen.
 
         Raises
         ------
         RefusedError
             When a message comes on two channels in turn within a second.
         """
-        if self._chosen is not None:
-            mine = (frames.channel == self._chosen) | (frames.channel == b"")
-            return frames if mine.all() else frames.take(mine)
         for name, use in self._rig.messages.items():
-            self._watch(name, use, frames)
-        return frames
+            if use.channel is None:
+                self._watch(name, use, frames)
 
     def _watch(self, name: str, use: MessageUse, frames: Frames) -> None:
         places = np.flatnonzero(use.layout.mine(frames.can_id))

@@ -141,7 +141,7 @@ class SampleDecoder:
             joined by age comes in a slower message than the sample.
         """
         rig, seen = self._rig, self._seen
-        frames = self._channel.of(frames)
+        self._channel.watch(frames)
         self._seen += len(frames)
         found = {name: rows_of(use, frames, seen) for name, use in rig.messages.items()}
         rows = {name: good for name, (good, _) in found.items()}
@@ -178,7 +178,7 @@ class SampleDecoder:
         temp_number = number_before(temp_place)
         known = temp_number >= 0
         lost, other = self._counters.feed(rows)
-        error_at = np.flatnonzero(frames.is_error)
+        error_at = np.flatnonzero(frames.is_error & rig.hears(frames))
         at_frames = [
             *((bad, BAD_CRC) for _, bad in found.values()),
             (joined.orphans, ORPHAN),
