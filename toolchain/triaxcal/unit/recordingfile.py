@@ -148,6 +148,9 @@ class WrittenFile:
     dbc
         Bus description (DBC, KCD, SYM, ARXML) of a log of CAN frames, beside it; columns are then
         signals, as "Message.Signal".
+    rig
+        Rig description (rig.toml) of such a log, in place of dbc; columns are then x, y, z and
+        temperature, or x_code and so on.
     """
 
     format: str | None = setting(TEXT, None, words="found by the content")
@@ -158,11 +161,12 @@ class WrittenFile:
     comment: str = setting(TEXT, "#")
     decimal: str = setting(word((".", ",")), ".")
     dbc: str | None = setting(FILE, None, example='"imu.dbc"')
+    rig: str | None = setting(FILE, None, example='"rig.toml"')
 
     def layout(self, table: str, columns: Sequence[Column]) -> FileLayout:
         """Layout of the file of `table`, of which `columns` will be asked for."""
         written = {f.name: getattr(self, f.name) for f in fields(WrittenFile)}
-        if self.dbc is not None and self.format is None:
+        if (self.dbc, self.rig) != (None, None) and self.format is None:
             written["format"] = CAN_LOG
         return FileLayout(table, tuple(columns), **written)
 

@@ -31,7 +31,7 @@ class _CanLog(Source):
             raise RefusedError(
                 f"{path}, [{layout.table}]",
                 "a log of CAN frames, and no bus description",
-                expected='dbc = "FILE", which says where its signals are',
+                expected='dbc = "FILE", or rig = "rig.toml", which say where its signals are',
                 remedy="put the DBC, KCD, SYM or ARXML file beside it, and name it",
             )
         bus = read_bus_file(path.parent / layout.dbc)
@@ -45,7 +45,7 @@ class _CanLog(Source):
         self.clocks = {self.tables[k]: (k, "ns") for k in reversed(times)}
         self._warnings = bus.warnings
         units = {
-            k: _unit(m.signals[n].unit) for k, (m, n) in enumerate(self._columns) if n != _TIME
+            k: unit_of(m.signals[n].unit) for k, (m, n) in enumerate(self._columns) if n != _TIME
         }
         self.units = {k: unit for k, unit in units.items() if unit}
         self._left: list[str] = []
@@ -112,7 +112,7 @@ class _CanLog(Source):
                 f"{name}: {count} frames, and none holds all of {', '.join(names)}: they are "
                 f"multiplexed by {', '.join(sorted(selectors))}",
                 expected="signals of one frame: a row of [recording] is a frame",
-                remedy="`triaxcal rig` joins multiplexed axes by rig.toml",
+                remedy='rig = "rig.toml" in place of dbc: a rig description joins them',
             )
         if left.lines and not left.frames:
             return RefusedError(
@@ -164,10 +164,10 @@ def _unseen(message: FrameLayout, names: Sequence[str]) -> list[str]:
     if not others:
         return []
     said = f"{message.name}: not looked at: {', '.join(others)}"
-    return [f"{said}; a CRC, a counter or a status is checked by `triaxcal rig` alone"]
+    return [f'{said}; a rig description (rig = "rig.toml") checks CRC, counter and status']
 
 
-def _unit(text: str) -> str:
+def unit_of(text: str) -> str:
     """Unit of a bus description as unit.toml names it; "" where it is none that is known."""
     from triaxcal.rig.description.recorded import (  # noqa: PLC0415  with the bench
         ACCELERATIONS,
@@ -195,7 +195,15 @@ def _values(frames: Frames, message: FrameLayout, name: str) -> Any:
 
 
 def _open(path: Path, layout: FileLayout) -> Source:
-    return _CanLog(path, layout)
+    if layout.rig is None:
+        return _CanLog(path, layout)
+    if layout.dbc is not None:
+        raise RefusedError(
+            f"{path}, [{layout.table}]", "dbc and rig", expected="one of them: rig names a dbc"
+        )
+    from triaxcal.rig.formats.rigged import RiggedLog  # noqa: PLC0415  the bench takes its time
+
+    return RiggedLog(path, layout.rig)
 
 
 ENTRY = Format(
@@ -203,7 +211,9 @@ ENTRY = Format(
     label="a log of CAN frames",
     doc="With `dbc`: a column is a signal, as Message.Signal, in the unit of the bus description. "
     "The axes are signals of one message, whose clock is the time of arrival. J1939's "
-    "reserved values are left out, a CRC, a counter and a status are not looked at. ASC, BLF, "
+    "reserved values are left out, a CRC, a counter and a status are not looked at. With `rig`: the "
+    "columns are x, y, z and temperature of a rig description, which joins several messages and "
+    "checks CRCs, counters and statuses. ASC, BLF, "
     "CSV, MF4 (bus logging), SQLite, TRC and text of candump, also compressed by gzip.",
     open=_open,
     extensions=(".asc", ".blf", ".trc"),
