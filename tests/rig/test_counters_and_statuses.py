@@ -90,8 +90,10 @@ def test_a_step_that_is_not_described_is_named(tmp_path):
     census.add(imu_frames(when, [0] * 300, small=when * 4 % 256))
     said = [text for text in census.faults() if "Small" in text]
     assert said == [
-        "IMU (ID 0x100): Small grows by 4 from frame to frame, and 1 is described: "
-        "counter_step = 4 in rig.toml"
+        (
+            "IMU (ID 0x100): Small grows by 4 from frame to frame, and 1 is described: "
+            "counter_step = 4 in rig.toml"
+        )
     ]
 
 
@@ -132,8 +134,8 @@ def test_every_status_of_a_message_must_be_good(tmp_path, keys, good):
         ),
         (
             '[message.IMU]\nstatus = ["GoodX", "GoodY", "Fault"]\nstatus_good = [[1], [1]]\n',
-            "[message.IMU] status_good: 2 lists; expected one list for all, or one for each of "
-            "the 3 of status",
+            ("[message.IMU] status_good: 2 lists; expected one list for all, or one for each of "
+            "the 3 of status"),
         ),
         (
             '[message.IMU]\nmux = "Fault"\nmux_value = 8\n',
@@ -145,19 +147,19 @@ def test_every_status_of_a_message_must_be_good(tmp_path, keys, good):
         ),
         (
             '[message.IMU]\ncounter = "Small"\ncounter_step = 256\n',
-            "[message.IMU] counter_step: found 256; expected at most 255, one less than the "
-            "values of the counter",
+            ("[message.IMU] counter_step: found 256; expected at most 255, one less than the "
+            "values of the counter"),
         ),
         (
-            '[message.IMU]\ncounter = "Small"\ncrc = "Crc"\nprotection = "e2e-p01"\n'
-            'data_id = [300]\ndata_id_mode = "nibble"\n',
-            "[message.IMU] crc: Crc is in byte 15 of 0 to 15; expected a byte behind it, which "
-            "holds four bits of the Data ID",
+            ('[message.IMU]\ncounter = "Small"\ncrc = "Crc"\nprotection = "e2e-p01"\n'
+            'data_id = [300]\ndata_id_mode = "nibble"\n'),
+            ("[message.IMU] crc: Crc is in byte 15 of 0 to 15; expected a byte behind it, which "
+            "holds four bits of the Data ID"),
         ),
         (
             '[message.TEMP]\ncrc = "Crc"\nprotection = "e2e-p04"\ndata_id = [300]\n',
-            "[message.TEMP] crc: Crc is in byte 4 of 0 to 7; expected 8 bytes before it, the "
-            "header of AUTOSAR E2E profile 4",
+            ("[message.TEMP] crc: Crc is in byte 4 of 0 to 7; expected 8 bytes before it, the "
+            "header of AUTOSAR E2E profile 4"),
         ),
     ],
 )  # fmt: skip

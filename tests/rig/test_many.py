@@ -334,6 +334,14 @@ def test_the_command_line_tells_what_became_of_each_unit(tmp_path):
     assert [(tmp_path / "units" / n / "measurements.csv").exists() for n in ("AT-1", "AT-2")] == [
         True, False,
     ]  # fmt: skip
+    listed = triaxcal("rig", "status", "--plan", path).stdout.splitlines()
+    assert listed[0].startswith(f"{tmp_path}/many-sessions/001: ")
+    assert "  AT-1: 6 accepted dwells" in listed
+    assert any(
+        line.startswith("  AT-2: ") and line.endswith("; set aside: no readings for 5 s")
+        for line in listed
+    )
+    assert sum(line.startswith("    TP") for line in listed) >= 6
     alone = triaxcal("rig", "run", *options[:4], "--plain", "--unit", "AT-2")
     assert alone.returncode == 0, alone.stderr
     assert (tmp_path / "units" / "AT-2" / "measurements.csv").exists()

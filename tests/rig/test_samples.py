@@ -7,6 +7,7 @@ import pytest
 from rig_cases import rig_of, short_setup
 
 from triaxcal.rig.bus.frames import concatenate
+from triaxcal.rig.samples.join import AgeJoin, Part
 from triaxcal.rig.samples.samples import BAD_CRC, DUPLICATE, ORPHAN
 from triaxcal.rig.session.blocks import BlockBuilder
 
@@ -109,3 +110,19 @@ def test_sums_are_exact_for_wide_codes(tmp_path):
     n = len(exact)
     variance = (sum(v * v for v in exact) * n - sum(exact) ** 2) / (n * (n - 1))
     assert block.variance[2] == variance
+
+
+def test_a_clock_that_is_set_back_makes_no_old_axis_young():
+    """Axes joined by age: the other message is silent since an hour before the clock's step."""
+
+    def part(places, seconds):
+        t_ns = np.array([round(s * 1e9) for s in seconds], np.int64)
+        codes = np.arange(len(places))
+        return Part(np.array(places), t_ns, None, None, None, (codes,), None)
+
+    join = AgeJoin(1, 0.02)
+    early = join.feed([part([0], [7200.0]), part([1], [7200.005])])
+    assert early.place.tolist() == [1]
+    late = join.feed([part([], []), part([2, 3], [3600.005, 3600.015])])
+    assert late.place.tolist() == []
+    assert late.orphans.tolist() == [2, 3]

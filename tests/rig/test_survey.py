@@ -124,8 +124,10 @@ def test_guesses_stand_there_as_comments(tmp_path):
     axes = ("--x", "IMU_AX.AX", "--y", "IMU_AY.AY", "--z", "IMU_AZ.AZ")
     assert init(tmp_path, IMU, *axes).exit_code == 0
     text = (tmp_path / "rig.toml").read_text()
-    for line in ('# counter = "Counter"', '# crc = "Crc"', '# status = "Status"'):
+    for line in ('# counter = "Counter"', '# crc = "Crc"'):
         assert text.count(line) == 3
+    assert text.count('# status = "Status"') == 2
+    assert text.count('# status = ["ClusterStatus", "Status"]') == 1
     assert "temperature" not in text
     uncommented = text.replace("# counter", "counter").replace('join = "age"\n', "")
     uncommented = uncommented.replace('# join = "counter"', 'join = "counter"')

@@ -408,3 +408,24 @@ def test_the_last_order_opens_a_connection_of_its_own():
     hung = Link("chamber", lambda: Slow(gate, 0.0), timeout_s=0.05, again_s=0.0, attempts=2)
     assert hung.last_order(lambda i: i.write(None)) == "no answer within 0.05 s"
     gate.set()
+
+
+def test_a_question_that_was_given_up_gives_no_order_later():
+    """As one that hangs while its connection is opened, and ends after the safe order."""
+    begin, ordered, closed = threading.Event(), [], threading.Event()
+
+    class Late:
+        def close(self):
+            closed.set()
+
+    def opened():
+        begin.wait(60)
+        return Late()
+
+    link = Link("chamber", opened, timeout_s=0.01, again_s=0.0, attempts=1)
+    link.ask(ordered.append, 0.0)
+    with pytest.raises(RefusedError, match="no answer within"):
+        until_it_answers(link)
+    begin.set()
+    assert closed.wait(60)
+    assert not ordered

@@ -24,6 +24,7 @@ from triaxcal.cli.rig_options import (
     session_options,
     simulated,
 )
+from triaxcal.cli.rig_sessions import last_session, mended, status
 from triaxcal.cli.rig_signals import signals
 
 if TYPE_CHECKING:
@@ -93,41 +94,12 @@ def resume(
     from triaxcal.cli.rig_many import guide_many  # noqa: PLC0415
     from triaxcal.rig.many.setup import ManySetup  # noqa: PLC0415
 
-    folder = _last_session(sessions or setup.sessions)
+    folder = last_session(sessions or setup.sessions)
+    mended(setup, folder, mend)
     if isinstance(setup, ManySetup):
         guide_many(setup, bus, folder, plain, unattended)
         return
-    _mend(setup, folder, mend)
     guide(setup, open_source(setup, bus), folder, plain, unattended)
-
-
-def _mend(setup: Setup, folder: Path, agreed: bool) -> None:
-    """Mend a damaged journal when the operator agrees."""
-    from triaxcal.rig.records import mend  # noqa: PLC0415
-
-    found = mend.damage(folder)
-    if found is None:
-        return
-    text = mend.described(folder, found)
-    if not agreed and sys.stdin.isatty():
-        click.echo(text)
-        agreed = click.confirm("Go on from what is whole? The damaged journal is kept")
-    if not agreed:
-        raise RefusedError(text, "not gone on with", remedy="agree to it with --mend")
-    done = mend.mend(setup, folder)
-    rebuilt = "; the log gave again what was lost" if done.complete else ""
-    click.echo(f"mended: {done.dwells} accepted dwells{rebuilt}; damaged one: {done.kept_as}")
-
-
-def _last_session(root: Path) -> Path:
-    from triaxcal.rig.records.recording import session_folders  # noqa: PLC0415
-
-    there = session_folders(root)
-    if not there:
-        raise RefusedError(
-            str(root), "no session in it", remedy="start one with `triaxcal rig run`"
-        )
-    return there[-1]
 
 
 @rig.command(epilog=example("triaxcal rig replay --unit AT-7 units/AT-7/sessions/001/frames.log"))
@@ -171,28 +143,6 @@ def replay(setup: Setup, log: Path, into: Path | None) -> None:
     for count, first in session.restless.values():
         click.echo(f"not at rest in {count} s: {first}", err=True)
     show_written(store.write_records(target, session, setup.rig, played.log))
-
-
-@rig.command(epilog=example("triaxcal rig status --unit AT-7"))
-@session_options
-@SESSIONS
-def status(setup: Setup, sessions: Path | None) -> None:
-    """List the sessions of a unit and what they hold."""
-    from triaxcal.rig.records.journal import read_journal  # noqa: PLC0415
-    from triaxcal.rig.records.recording import JOURNAL_FILE, durable_events, session_folders  # noqa: PLC0415
-
-    root = sessions or setup.sessions
-    for folder in session_folders(root):
-        found = read_journal(folder / JOURNAL_FILE)
-        dwells = [e for e in durable_events(found.records) if e.dwell is not None]
-        click.echo(f"{folder}: {len(dwells)} accepted dwells, {len(found.records)} records")
-        for event in dwells:
-            click.echo(f"  {event.text}")
-        if found.damaged or found.torn:
-            what = "damaged" if found.damaged else "incomplete at its end, as after a crash"
-            click.echo(f"  journal {what}: only the records above are used")
-    if not session_folders(root):
-        click.echo(f"{root}: no session")
 
 
 @rig.command(epilog=example("triaxcal rig check --bus can0 --unit AT-7"))
@@ -324,3 +274,4 @@ def fil(setup: Setup, samples: int, bus: str | None, listen: bool, seed: int) ->
 
 
 rig.add_command(signals)
+rig.add_command(status)

@@ -43,6 +43,11 @@ _SESSION = (
         help="Bus description in place of the one that the rig description names.",
     ),
 )
+_UNIT_OR_PLAN = click.option(
+    "--unit",
+    type=UnitFolder(),
+    help="Folder, or name in units/; without it, all units that the plan lists.",
+)
 _SIMULATED = (
     click.option(
         "--fault",
@@ -90,29 +95,56 @@ def run_options(command: Callable[..., None]) -> Callable[..., None]:
 
     return _optioned(
         with_both,
-        click.option(
-            "--unit",
-            type=UnitFolder(),
-            help="Folder, or name in units/; without it, all units that the plan lists.",
-        ),
+        _UNIT_OR_PLAN,
         *_SESSION,
         click.option("--bus", cls=_BusOption),
         *_SIMULATED,
     )
 
 
+def status_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options of the sessions of one unit, or of the units that a plan lists.
+
+    `command` gets them as its `setup`, a Setup or a ManySetup.
+    """
+
+    @wraps(command)
+    def with_setup(unit: Path | None, plan: Path | None, dbc: Path | None, **others: Any) -> None:
+        refuse_missing_bench()
+        # A bus is not opened: any name will do where the plan has none.
+        many = _many(unit, plan, dbc, "-")
+        command(setup=_setup(_given(unit), plan, dbc) if many is None else many, **others)
+
+    return _optioned(with_setup, _UNIT_OR_PLAN, *_SESSION)
+
+
+def _many(unit: Path | None, plan: Path | None, dbc: Path | None, bus: str) -> ManySetup | None:
+    """Setup of the units that a plan lists; None where one unit is named, or it lists none."""
+    from triaxcal.rig.many.setup import many_of_plan  # noqa: PLC0415
+    from triaxcal.rig.plan.plan import list_planned  # noqa: PLC0415
+
+    if unit is not None or plan is None or not list_planned(plan):
+        return None
+    return many_of_plan(plan, bus, dbc)
+
+
+def _given(unit: Path | None) -> Path:
+    if unit is None:
+        raise click.UsageError("Missing option '--unit', or a '--plan' that lists units.")
+    return unit
+
+
 def _one_or_many(
     unit: Path | None, plan: Path | None, dbc: Path | None, bus: str | None
 ) -> tuple[Setup | ManySetup, str]:
     """Setup of a session, and its bus."""
-    from triaxcal.rig.many.setup import many_of_plan  # noqa: PLC0415
     from triaxcal.rig.plan.plan import list_planned  # noqa: PLC0415
 
+    many = _many(unit, plan, dbc, bus or "")
+    if many is not None:
+        return many, bus or ""
+    unit = _given(unit)
     planned = list_planned(plan) if plan is not None else {}
-    if unit is None and plan is not None and planned:
-        return many_of_plan(plan, bus or "", dbc), bus or ""
-    if unit is None:
-        raise click.UsageError("Missing option '--unit', or a '--plan' that lists units.")
     known = planned[unit.name].bus if unit.name in planned else None
     if bus is None and known is None:
         raise click.UsageError("Missing option '--bus'.")

@@ -129,7 +129,8 @@ def _refuse_overlaps(names: Names, uses: Mapping[str, MessageUse]) -> None:
                 f"its frames cannot be told from those of {other.name}: IDs "
                 f"0x{use.layout.frame_id:X} and 0x{other.layout.frame_id:X}",
                 expected="an ID for each message",
-                remedy="state source_address where J1939 addresses differ, and channel where buses do",
+                remedy="state source_address where J1939 addresses differ, and channel where "
+                "buses do",
             )
         seen.append(use)
 

@@ -133,7 +133,9 @@ class RiggedLog(Source):
 
     def _rate_hz(self) -> int:
         """Samples a second: by it the turns of a counter are told apart."""
-        first = [p.frames for p in islice(frames_of_log(self._path, self._rig.lines), _FIRST_PIECES)]
+        first = [
+            p.frames for p in islice(frames_of_log(self._path, self._rig.lines), _FIRST_PIECES)
+        ]
         t_ns = SampleDecoder(self._rig, _ANY_RATE_HZ).feed(concatenate(first)).t_ns
         span_ns = int(t_ns[-1] - t_ns[0]) if len(t_ns) > 1 else 0
         return max(1, round((len(t_ns) - 1) * 1e9 / span_ns)) if span_ns > 0 else _ANY_RATE_HZ

@@ -24,6 +24,7 @@ class _Job:
         self.error = ""
         self._link = link
         self._ask = ask
+        self._opened = link.opened
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._end = time.monotonic() + 2.0 * link.timeout_s + _SLACK_S
         if link.at_once:
@@ -33,7 +34,7 @@ class _Job:
 
     def _run(self) -> None:
         try:
-            self.answer = self._ask(self._link.instrument()) or ()
+            self.answer = self._ask(self._link.instrument(self._opened)) or ()
         except Exception as error:  # each driver's library raises what its maker chose
             self.error = " ".join(str(error).split()) or type(error).__name__
 
@@ -65,6 +66,11 @@ class Link:
         Time until a question is tried again.
     at_once : bool
         Questions are answered in the loop itself: for instruments that are simulated.
+
+    Attributes
+    ----------
+    opened : int
+        How often the connection was given up.
     """
 
     def __init__(
@@ -88,12 +94,34 @@ class Link:
         self._ask: Ask | None = None
         self._try_at = 0.0
         self._failed = 0
+        self._lock = threading.Lock()
+        self.opened = 0
 
-    def instrument(self) -> Instrument:
-        """The open connection."""
-        if self._instrument is None:
-            self._instrument = self._open()
-        return self._instrument
+    def instrument(self, opened: int) -> Instrument:
+        """The open connection.
+
+        Parameters
+        ----------
+        opened : int
+            The attribute of this name when the question was put: one that was given up meanwhile
+            must not order anything any more.
+
+        Raises
+        ------
+        RefusedError
+            When it was given up.
+        """
+        with self._lock:
+            if self._instrument is not None and opened == self.opened:
+                return self._instrument
+        made = self._open() if opened == self.opened else None
+        with self._lock:
+            if made is not None and opened == self.opened:
+                self._instrument = made
+                return made
+        if made is not None:
+            made.close()
+        raise RefusedError(self.name, "the question was given up")
 
     @property
     def busy(self) -> bool:
@@ -153,7 +181,9 @@ class Link:
 
     def drop(self) -> None:
         """Close the connection; one that hangs is left alone."""
-        gone, self._instrument = self._instrument, None
+        with self._lock:
+            gone, self._instrument = self._instrument, None
+            self.opened += 1
 
         def close() -> None:
             with contextlib.suppress(Exception):  # it is given up

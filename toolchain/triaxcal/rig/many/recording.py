@@ -100,7 +100,7 @@ class ManyRecording:
         records = read_journal(path).records if path.exists() else ()
         self.resumed = bool(records)
         if records:
-            _refuse_other_units(path, records[0], setup)
+            refuse_other_units(path, records[0], setup)
         self.journal = Journal(path)
         asides = {r["unit"]: r["text"] for r in records if r["kind"] == "aside"}
         members = []
@@ -117,7 +117,7 @@ class ManyRecording:
         self.group = Group(setup.plan, members, follow)
         self._troubles = {member.name: Troubles() for member in self.group.members}
         if not records:
-            self.journal.append(_header(setup))
+            self.journal.append(header_of(setup))
             return
         for member in members:
             self._log(member).flush(sync=True)
@@ -241,7 +241,8 @@ class ManyRecording:
         return self.buses[member.place.bus].log
 
 
-def _header(setup: ManySetup) -> Record:
+def header_of(setup: ManySetup) -> Record:
+    """First record of a journal: the units, and what each of them is about."""
     units = [
         {**header(p.setup), "name": p.name, "bus": p.bus, "log": _log_of(setup, p.bus)}
         for p in setup.places
@@ -253,8 +254,14 @@ def _log_of(setup: ManySetup, bus: str) -> str:
     return log_file(setup.buses.index(bus) + 1)
 
 
-def _refuse_other_units(path: Path, record: Record, setup: ManySetup) -> None:
-    """Refuse a journal that is not of these units and this plan."""
+def refuse_other_units(path: Path, record: Record, setup: ManySetup) -> None:
+    """Refuse a journal that is not of these units and this plan.
+
+    Raises
+    ------
+    RefusedError
+        Naming what differs.
+    """
     units = {unit["name"]: unit for unit in record.get("units", ())}
     places = {place.name: place for place in setup.places}
     if set(units) != set(places):

@@ -6,6 +6,7 @@ ones held, the log gives again, unless a lost one was a word of the operator or 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -67,7 +68,12 @@ def damage(folder: Path) -> ReadJournal | None:
 
 def described(folder: Path, found: ReadJournal) -> str:
     """What is whole and what is not, in one line."""
-    dwells = [e for e in durable_events((*found.records, *found.later)) if e.dwell is not None]
+    return described_by(folder, found, durable_events((*found.records, *found.later)))
+
+
+def described_by(folder: Path, found: ReadJournal, events: Iterable[Event]) -> str:
+    """What is whole and what is not, with these durable events, in one line."""
+    dwells = [event for event in events if event.dwell is not None]
     return (
         f"{folder / JOURNAL_FILE}: damaged behind its {len(found.records)} good records; "
         f"{len(found.later)} behind the damage are whole, {found.lost} are lost; "
@@ -100,7 +106,7 @@ def mend(setup: Setup, folder: Path) -> Mended:
                 "log proves them",
                 remedy="start a new session with `triaxcal rig run`",
             )
-        mended = Mended(again if complete else events, complete, _beside(path))
+        mended = Mended(again if complete else events, complete, beside(path))
         record = {
             "kind": "mended",
             "kept_as": mended.kept_as.name,
@@ -117,7 +123,7 @@ def mend(setup: Setup, folder: Path) -> Mended:
     return mended
 
 
-def _beside(path: Path) -> Path:
+def beside(path: Path) -> Path:
     """Name for the damaged journal, which no file has."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     names = (f"{path.name}.damaged-{stamp}{f'-{n}' if n else ''}" for n in range(1000))

@@ -21,6 +21,8 @@ from triaxcal.rig.session.events import Agree, Event, Redo
 
 _PIECE = 1 << 20
 """Bytes hashed at once."""
+WORDS = frozenset({"command", "resume", "mended"})
+"""Kinds of records that a log alone does not give again."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def replay_records(setup: Setup, log: Path, records: Sequence[Record]) -> Replay
     """
     state = log_state(log, known_log(records))
     engine = Engine(setup, str(log))
-    words = [r for r in records if r["kind"] in {"command", "resume", "mended"}]
+    words = [r for r in records if r["kind"] in WORDS]
     events: list[Event] = []
     lines, left = 0, Left()
     cuts = [int(r["log"]["lines"]) for r in words]

@@ -204,7 +204,9 @@ class AgeJoin:
             at = np.searchsorted(known.place, lead.place, side="right") - 1
             there = at >= 0
             young = np.zeros(len(lead), np.bool_)
-            young[there] = (lead.t_ns[there] - known.t_ns[at[there]]) <= self._age_ns
+            # Without a sign: a clock that was set back must not make an old value young.
+            apart_ns = np.abs(lead.t_ns[there] - known.t_ns[at[there]])
+            young[there] = apart_ns <= self._age_ns
             good &= young
             rows[i] = known, at
             if len(known):

@@ -228,9 +228,7 @@ class SampleDecoder:
         return Part(
             place=rows.place,
             t_ns=rows.t_ns,
-            sequence=use.sequence(rows.data)
-            if use.name in self._counted and use.counter
-            else None,
+            sequence=use.sequence(rows.data) if use.name in self._counted and use.counter else None,
             time=clock.signal.signal.raw(rows.data) if clock is not None and mine else None,
             status=status_of(use, rows.data),
             axes=tuple(axes),
