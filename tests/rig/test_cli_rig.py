@@ -155,3 +155,12 @@ def test_a_log_of_the_simulated_rig_is_whole(tmp_path):
     frames = rig_of(short_setup(tmp_path)).advance()
     assert frames.t_ns[0] == EPOCH_NS
     assert format_frames(frames, "x").count(b"\n") == len(frames)
+
+
+def test_a_session_that_recorded_nothing_hides_no_other(tmp_path):
+    """As one that was killed before its journal was begun."""
+    sessions = tmp_path / "sessions"
+    (sessions / "001").mkdir(parents=True)
+    done = triaxcal("rig", "status", "--unit", BENCH, "--sessions", sessions)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == f"{sessions}/001: no journal, nothing was recorded\n"

@@ -28,7 +28,21 @@ ACCELERATIONS: Mapping[str, float] = MappingProxyType(
 """Units of acceleration in bus descriptions, lower case without blanks, in g."""
 TEMPERATURES: Mapping[str, tuple[float, float]] = MappingProxyType(
     {
-        **dict.fromkeys(("degc", "°c", "c", "celsius", "degreec", "deg.c", "gradc"), (1.0, 0.0)),
+        **dict.fromkeys(
+            (
+                "degc",
+                "°c",
+                "c",
+                "celsius",
+                "degreec",
+                "deg.c",
+                "gradc",
+                "deg_c",
+                "cel",
+                "degcelsius",
+            ),
+            (1.0, 0.0),
+        ),
         **dict.fromkeys(("k", "kelvin", "degk"), (1.0, -273.15)),
         **dict.fromkeys(("degf", "°f", "f"), (5.0 / 9.0, -160.0 / 9.0)),
     }
@@ -45,6 +59,21 @@ CODES = frozenset({"code", "codes", "lsb", "count", "counts", "digit", "digits"}
 def folded(unit: str) -> str:
     """A unit without the differences that mean nothing."""
     return "".join(unit.lower().split()).replace("(", "").replace(")", "").strip("[]")
+
+
+def unit_of(text: str) -> str:
+    """Unit of a bus description as unit.toml names it; "" where it is none that is known."""
+    known = folded(text)
+    names = [
+        *((ACCELERATIONS, name) for name in ("m/s^2", "g", "mg")),
+        *((VOLTAGES, name) for name in ("V", "mV")),
+        *((TEMPERATURES, name) for name in ("degC", "K", "degF")),
+    ]
+    for table, name in names:
+        if known in table and table[known] == table[folded(name)]:
+            return name
+    tables = (ACCELERATIONS, VOLTAGES, TEMPERATURES, CODES)
+    return text if any(known in table for table in tables) else ""
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ class _CanLog(Source):
 
     def __init__(self, path: Path, layout: FileLayout) -> None:
         from triaxcal.rig.description.busfile import read_bus_file  # noqa: PLC0415  cantools takes its time
+        from triaxcal.rig.description.recorded import unit_of  # noqa: PLC0415  with the bench
 
         if layout.dbc is None:
             raise RefusedError(
@@ -165,29 +166,6 @@ def _unseen(message: FrameLayout, names: Sequence[str]) -> list[str]:
         return []
     said = f"{message.name}: not looked at: {', '.join(others)}"
     return [f'{said}; a rig description (rig = "rig.toml") checks CRC, counter and status']
-
-
-def unit_of(text: str) -> str:
-    """Unit of a bus description as unit.toml names it; "" where it is none that is known."""
-    from triaxcal.rig.description.recorded import (  # noqa: PLC0415  with the bench
-        ACCELERATIONS,
-        CODES,
-        TEMPERATURES,
-        VOLTAGES,
-        folded,
-    )
-
-    known = folded(text)
-    names = [
-        *((ACCELERATIONS, name) for name in ("m/s^2", "g", "mg")),
-        *((VOLTAGES, name) for name in ("V", "mV")),
-        *((TEMPERATURES, name) for name in ("degC", "K", "degF")),
-    ]
-    for table, name in names:
-        if known in table and table[known] == table[folded(name)]:
-            return name
-    tables = (ACCELERATIONS, VOLTAGES, TEMPERATURES, CODES)
-    return text if any(known in table for table in tables) else ""
 
 
 def _values(frames: Frames, message: FrameLayout, name: str) -> Any:

@@ -17,9 +17,8 @@ from triaxcal.readings.format import PIECE, Block, Source
 from triaxcal.rig.bus.frames import ERR_FLAG, concatenate
 from triaxcal.rig.check.census import Census
 from triaxcal.rig.description.description import RigDescription
-from triaxcal.rig.description.recorded import ACCELERATIONS, Recorded
+from triaxcal.rig.description.recorded import ACCELERATIONS, Recorded, unit_of
 from triaxcal.rig.description.rigfile import read_description
-from triaxcal.rig.formats.canlog import unit_of
 from triaxcal.rig.logs.linelog import frames_of_log
 from triaxcal.rig.logs.logfile import Left
 from triaxcal.rig.samples.samples import (

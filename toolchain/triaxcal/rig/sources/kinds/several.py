@@ -77,5 +77,5 @@ ENTRY = SourceKind(
     doc="several of these buses; `channel` in rig.toml says which message comes on which",
     takes=_takes,
     open=_open,
-    rank=5,
+    rank=25,
 )
