@@ -70,6 +70,8 @@ class Parsed:
         Frames without a time; they have 0.
     first_bad : str
         The first line that is no frame.
+    cut : str
+        What the file lacks at its end; "" for nothing.
     """
 
     frames: Frames
@@ -77,6 +79,7 @@ class Parsed:
     bad_lines: int
     untimed: int = 0
     first_bad: str = ""
+    cut: str = ""
 
 
 Parse = Callable[[bytes], Parsed]

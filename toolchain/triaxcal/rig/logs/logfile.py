@@ -77,6 +77,8 @@ class Left:
         Those that were not left out.
     falls : int
         Frames with a time before that of the frame before.
+    cut : str
+        What the file lacks at its end.
     """
 
     lines: int = 0
@@ -84,6 +86,7 @@ class Left:
     untimed: int = 0
     frames: int = 0
     falls: int = 0
+    cut: str = ""
     _from_zero: bool = field(default=False, repr=False)
     _last_ns: int = field(default=0, repr=False)
     _latest_ns: int = field(default=0, repr=False)
@@ -104,6 +107,7 @@ class Left:
         self.frames += len(t_ns)
         self.untimed += parsed.untimed
         self.first = self.first or parsed.first_bad
+        self.cut = self.cut or parsed.cut
 
     @property
     def are_differences(self) -> bool:
@@ -140,6 +144,8 @@ class Left:
             what = "line is no frame" if self.lines == 1 else "lines are no frames"
             first = f"; the first: {self.first}" if self.first else ""
             said.append(f"{path}: {self.lines} {what}{first}")
+        if self.cut:
+            said.append(f"{path}: {self.cut}")
         if self.untimed:
             said.append(f"{path}: {self.untimed} frames have no time, 0 is taken")
         if self.are_differences:

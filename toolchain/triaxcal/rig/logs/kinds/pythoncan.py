@@ -6,6 +6,7 @@ import importlib.util
 import io
 import logging
 import re
+import struct
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from itertools import islice
@@ -21,6 +22,10 @@ SUFFIXES = (".asc", ".blf", ".db", ".mf4", ".trc")
 _PIECE = 1 << 14
 _CLASSIC = 8
 """Bytes of a classic frame."""
+_BLF_HEAD, _BLF_OBJECT = struct.Struct("<4sI"), struct.Struct("<8xII")
+_BLF_SIZE, _BLF_SIZE_AT = struct.Struct("<Q"), 16
+"""Of BLF: signature and size of the file's head; signature, versions, size and type of an object
+(8 bytes are skipped, as the type is not used); the size of the whole file in its head."""
 _NO_FRAMES = re.compile(
     r"\s*(|date .*|base .*|(no )?internal events logged.*|//.*|;.*|begin triggerblock.*"
     r"|end triggerblock.*|[\d.]+\s+start of measurement.*)\s*",
@@ -29,18 +34,58 @@ _NO_FRAMES = re.compile(
 """Lines of a text that are not meant to be frames."""
 
 
-class _Lines(io.StringIO):
-    """Lines of a text, counted where they may be frames; python-can takes it for a file."""
+class _Text:
+    """A text, its head, and how many lines so far may be frames."""
 
     def __init__(self, file: TextIO) -> None:
-        super().__init__()
-        self._file = file
+        self.file = file
+        self.head: list[str] = []
         self.counted = 0
 
-    def __next__(self) -> str:  # type: ignore[override]  # a StringIO gives str
-        line = next(self._file)
-        self.counted += not _NO_FRAMES.fullmatch(line)
+    def __next__(self) -> str:
+        line = next(self.file)
+        if not _NO_FRAMES.fullmatch(line):
+            self.counted += 1
+        elif not self.counted:
+            self.head.append(line)
         return line
+
+    def messages(self, kind: Any, options: dict[str, Any]) -> Iterator[Any]:
+        """Messages of a reader; behind a line that it cannot bear, those of another reader.
+
+        Raises
+        ------
+        Exception
+            What it raises in the head, and where no line is a message.
+        """
+        first: Exception | None = None
+        found = False
+        while True:
+            before = self.counted
+            try:
+                for message in kind(_Lines(self), **options):
+                    found = True
+                    yield message
+            except Exception as error:  # each reader raises what its maker chose
+                first = first or error
+                if self.counted == before:
+                    raise
+                continue
+            if first is not None and not found:
+                raise first
+            return
+
+
+class _Lines(io.StringIO):
+    """Lines of a text behind its head, which has been read; python-can takes it for a file."""
+
+    def __init__(self, text: _Text) -> None:
+        super().__init__()
+        self._text = text
+        self._head = list(reversed(text.head))
+
+    def __next__(self) -> str:  # type: ignore[override]  # a StringIO gives str
+        return self._head.pop() if self._head else next(self._text)
 
 
 def _read(path: Path) -> Generator[Parsed, None, None]:
@@ -75,7 +120,27 @@ def _pieces(path: Path, relative: bool) -> Generator[Parsed, None, None]:
                 first = repr(said[0]) if said else ""
                 yield Parsed(frames_of(good), len(good) + bad, bad, first_bad=first)
             if len(piece) < _PIECE:
-                return
+                break
+    if path.suffix.lower() == ".blf" and (cut := _cut_blf(path)):
+        yield Parsed(frames_of([]), 0, 0, cut=cut)
+
+
+def _cut_blf(path: Path) -> str:
+    """What a BLF file lacks at its end, of which its reader says nothing; "" for nothing."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        _, head_bytes = _BLF_HEAD.unpack(file.read(_BLF_HEAD.size))
+        file.seek(_BLF_SIZE_AT)
+        (written,) = _BLF_SIZE.unpack(file.read(_BLF_SIZE.size))
+        at = int(head_bytes)
+        while at + _BLF_OBJECT.size <= size:
+            file.seek(at)
+            object_bytes, _ = _BLF_OBJECT.unpack(file.read(_BLF_OBJECT.size))
+            at += max(int(object_bytes) + int(object_bytes) % 4, _BLF_OBJECT.size)
+    # The padding of the last object may be absent.
+    if at - 3 > size or at < size or written > size:
+        return f"cut at byte {size}, the frames behind are lost"
+    return ""
 
 
 def _is_whole(message: Any) -> bool:
@@ -87,7 +152,7 @@ def _is_whole(message: Any) -> bool:
 
 
 @contextmanager
-def _opened(path: Path, relative: bool) -> Iterator[tuple[Iterator[Any], _Lines | None]]:
+def _opened(path: Path, relative: bool) -> Iterator[tuple[Iterator[Any], _Text | None]]:
     """Messages of a file, and its lines where it is a text."""
     from can.io.generic import BinaryIOMessageReader, TextIOMessageReader  # noqa: PLC0415
     from can.io.player import MESSAGE_READERS  # noqa: PLC0415
@@ -103,8 +168,8 @@ def _opened(path: Path, relative: bool) -> Iterator[tuple[Iterator[Any], _Lines 
             yield iter(reader), None
         return
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        lines = _Lines(file)
-        yield iter(kind(lines, **options)), lines
+        text = _Text(file)
+        yield text.messages(kind, options), text
 
 
 @contextmanager
