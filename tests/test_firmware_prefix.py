@@ -40,7 +40,7 @@ def test_another_prefix_is_the_same_c_with_other_names(folder: Path, tmp_path: P
             continue
         text = content.decode()
         assert name in said
-        # What stays are words for all triads: status bits, TRIAX_ARITHMETIC, the templates' names.
+        # What stays are words for all triads: status bits, the templates' names.
         assert not re.search(r"\btriax_(?:apply|calib_t|set_temperature|state_t)\b", text)
         # Numbers are those of the delivery, in their order.
         theirs = c[name.replace("left_accel", "triax", 1)].decode()

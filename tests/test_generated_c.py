@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import subprocess
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 import oracle
-from builds import Built
+from builds import Built, write_generated
 from mutants import MUTANTS, Mutant
 from plans import (
     COVERING,
@@ -27,10 +28,13 @@ from plans import (
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import VectorSet, python_routine, vector_sets
-from triaxcal.codegen.forms import limb_split
+from triaxcal.codegen.forms import form_of, limb_split, row_words
 from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.routines import Answers, Generated, Reference
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.unit.arithmetic import LIMBS, THUMB1, THUMB2
+from triaxcal.verify.workspace import host_forms
 
 MAIN = Path(__file__).parent / "run_vectors.c"
 STRICT = [flag for flag in FLAGS if flag != "-O2"]
@@ -40,7 +44,7 @@ BUILDS = {
     "O2": ["-O2"],
     "Os": ["-Os"],
     "sanitized": SANITIZERS,
-    "limbs": [*SANITIZERS, "-DTRIAX_ARITHMETIC=1"],
+    "limbs": SANITIZERS,
 }
 JOBS = [
     # Most of the time of this file is the compiler's: the golden shapes stand for the others.
@@ -89,10 +93,12 @@ def input_file(plan: Plan, reference: Reference, rng: Random) -> bytes:
     return np.array(words, dtype=np.int32).tobytes()
 
 
-def compile_program(folder: Path, name: str, flags: Sequence[str]) -> Path:
+def compile_program(
+    folder: Path, name: str, flags: Sequence[str], routine: str = "triax_comp.c"
+) -> Path:
     program = folder / f"run-{name}"
     command = ["gcc", *STRICT, *flags, f"-I{folder}", str(MAIN)]
-    command += [str(folder / name) for name in ("triax_comp.c", "triax_calib.c")]
+    command += [str(folder / name) for name in (routine, "triax_calib.c")]
     done = subprocess.run(
         [*command, "-o", str(program)], capture_output=True, text=True, check=False
     )
@@ -113,7 +119,12 @@ def programs(built: dict[str, Built], reference: Reference) -> Programs:
         inputs = b.folder / "vectors.bin"
         if not inputs.exists():
             inputs.write_bytes(input_file(b.plan, reference, Random(name)))
-        return compile_program(b.folder, build, BUILDS[build])
+        routine = "triax_comp.c"
+        if build == "limbs":
+            routine = host_forms(b.plan).get(LIMBS, routine)
+            texts = render_routine(replace(b.plan, arithmetic=LIMBS))
+            (b.folder / routine).write_text(texts[routine])
+        return compile_program(b.folder, build, BUILDS[build], routine)
 
     return program
 
@@ -162,7 +173,7 @@ def test_the_sanitizers_are_awake(built: dict[str, Built], tmp_path: Path) -> No
 
 
 def test_the_shapes_split_raw_codes_in_every_way() -> None:
-    """TRIAX_LIMBS cuts a code into halves, or multiplies in int64_t where they would not do."""
+    """Limbs cut a code into halves, or multiplies in int64_t where they would not do."""
     splits = {limb_split(shape) for shape in COVERING.values()}
     assert {0, 3, 13} <= splits
     assert max(splits) == 13  # the most that its sums allow
@@ -241,16 +252,43 @@ def test_the_unchanged_routine_survives(
 @pytest.mark.parametrize(
     ("form", "complaint"),
     [
-        (2, "TRIAX_THUMB2 needs a core with Thumb-2 (Cortex-M3, M4, M7, M33): use"),
-        (3, "TRIAX_THUMB1 needs a core with Thumb (Cortex-M0, M0+, M1): use TRIAX_LIMBS"),
-        (4, "TRIAX_ARITHMETIC is none of TRIAX_PORTABLE, TRIAX_LIMBS, TRIAX_THUMB2, TRIAX_THUMB1"),
+        (THUMB2, "this is for cores with Thumb-2 (Cortex-M3, M4, M7, M33): compile triax_comp.c"),
+        (THUMB1, "this is for little-endian cores with Thumb (Cortex-M0, M0+, M1): compile"),
     ],
 )
 def test_a_form_for_another_core_is_refused_by_name(
-    built: dict[str, Built], form: int, complaint: str
+    form: str, complaint: str, tmp_path: Path
 ) -> None:
-    command = ["gcc", "-std=c99", "-fsyntax-only", f"-DTRIAX_ARITHMETIC={form}", "triax_comp.c"]
-    folder = built[next(iter(GOLDEN))].folder
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    write_generated(replace(GOLDEN["direct-checked"], arithmetic=form), tmp_path)
+    command = ["gcc", "-std=c99", "-fsyntax-only", f"triax_comp_{form}.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert f'#error "{complaint}' in done.stderr
+
+
+def test_the_macro_of_earlier_versions_is_refused(built: dict[str, Built]) -> None:
+    """It would choose nothing in silence: a slower routine, or a state of another size."""
+    command = ["gcc", "-std=c99", "-fsyntax-only", "-DTRIAX_ARITHMETIC=2", "triax_comp.c"]
+    folder = built["direct-checked"].folder
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "state [firmware] arithmetic in unit.toml" in done.stderr
+
+
+@pytest.mark.parametrize("name", [*COVERING, *GOLDEN])
+def test_a_form_is_a_file_of_its_own_beside_the_same_portable_one(
+    built: dict[str, Built], name: str
+) -> None:
+    plan = built.plans[name]
+    portable = render_routine(plan)
+    assert list(portable) == ["triax_comp.h", "triax_comp.c"]
+    assert not any(w in portable["triax_comp.c"] for w in ("__asm__", "limb", "_half(", "#if"))
+    for form in (LIMBS, THUMB2, THUMB1):
+        asked = replace(plan, arithmetic=form)
+        texts = render_routine(asked)
+        assert texts["triax_comp.c"] == portable["triax_comp.c"]
+        own = form_of(plan.shape, form)
+        more = [] if own == "portable" else [f"triax_comp_{own}.c"]
+        assert list(texts) == ["triax_comp.h", "triax_comp.c", *more]
+        words = f"#define TRIAX_ROW_WORDS {row_words(plan.shape, own)}"
+        assert words in texts["triax_comp.h"]

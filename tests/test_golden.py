@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import difflib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from builds import PROVENANCE
 from plans import GOLDEN, SENSOR
-from triaxcal.codegen.angles import ANGLES_FILES, render_angles
-from triaxcal.codegen.constants import CONSTANTS_FILES, render_constants
+from triaxcal.codegen.angles import render_angles
+from triaxcal.codegen.constants import render_constants
 from triaxcal.codegen.names import names_of
-from triaxcal.codegen.render import ROUTINE_FILES, render_routine
+from triaxcal.codegen.render import render_routine
 from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.unit.angles import PITCH_ROLL, ZENITH_TOOL_FACE, AnglesChoice
+from triaxcal.unit.arithmetic import LIMBS, THUMB1, THUMB2
 
 FOLDER = Path(__file__).parent / "golden"
 ANGLES_GOLDEN = {
@@ -28,7 +30,13 @@ def rendered(name: str) -> dict[str, str]:
     if name in ANGLES_GOLDEN:
         return render_angles(ANGLES_GOLDEN[name], names_of(GOLDEN["direct-checked"]))
     plan = GOLDEN[name]
+    forms = {
+        file: text
+        for form in (LIMBS, THUMB1, THUMB2)
+        for file, text in render_routine(replace(plan, arithmetic=form)).items()
+    }
     return {
+        **forms,
         **render_routine(plan),
         **render_constants(plan, SENSOR, PROVENANCE),
     }
@@ -54,13 +62,7 @@ def compare_or_update(found: str, golden: Path, *, update: bool) -> None:
     pytest.fail("\n".join([*list(difference)[:60], REMEDY]), pytrace=False)
 
 
-@pytest.mark.parametrize(
-    ("name", "file"),
-    [
-        *((name, file) for name in GOLDEN for file in (*ROUTINE_FILES, *CONSTANTS_FILES)),
-        *((name, file) for name in ANGLES_GOLDEN for file in ANGLES_FILES),
-    ],
-)
+@pytest.mark.parametrize(("name", "file"), [(n, f) for n in ALL for f in rendered(n)])
 def test_generated_c_is_as_it_was(name: str, file: str, request: pytest.FixtureRequest) -> None:
     update = bool(request.config.getoption("--update-golden"))
     compare_or_update(rendered(name)[file], FOLDER / name / file, update=update)

@@ -39,8 +39,6 @@ from triaxcal.targets.matrix import (
     FAILED,
     NOT_DONE,
     PASSED,
-    THUMB1,
-    THUMB2,
     Build,
     compare,
     run_builds,
@@ -56,6 +54,7 @@ from triaxcal.targets.shapes import (
 )
 from triaxcal.targets.table import counts, matrix_table
 from triaxcal.targets.vectors import draw, expected_lines, raw_boundaries, vectors
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE, THUMB1, THUMB2
 
 ROOT = Path(__file__).parents[2]
 FIRMWARE = shipped("firmware_ref")
@@ -74,9 +73,11 @@ def need(*tools: str) -> None:
         pytest.skip(f"{', '.join(missing)} not found: {install_advice(missing)}")
 
 
-def run_on_host(case: Case, folder: Path, arithmetic: int = 0) -> str:
+def run_on_host(case: Case, folder: Path, arithmetic: str = PORTABLE) -> str:
     """test_main.c as a program of this machine."""
-    source = matrix._write_cases([Build(case, Toolset(M3, "gcc", "-O1"))], folder)[case.name]
+    case = case.in_form(arithmetic)
+    way = Toolset(M3, "gcc", "-O1", arithmetic)
+    source = matrix._write_cases([Build(case, way)], folder)[case.name, arithmetic]
     target = FIRMWARE / "target"
     program = folder / "program"
     files = [
@@ -85,7 +86,6 @@ def run_on_host(case: Case, folder: Path, arithmetic: int = 0) -> str:
         FIRMWARE / "triax_ref_image.c",
     ]
     command = ["gcc", "-std=c99", "-O1", "-DTARGET_HOSTED", f"-DCASE_VECTORS={VECTORS}u"]
-    command += [f"-DTRIAX_ARITHMETIC={arithmetic}"]
     command += [f"-I{d}" for d in (source, FIRMWARE, target)]
     command += map(str, [*files, target / "test_main.c", target / "target_io.c"])
     subprocess.run([*command, "-o", str(program)], check=True)
@@ -117,12 +117,12 @@ def test_vectors_meet_every_boundary_and_stay_where_they_should(case: Case) -> N
 QUICK = (CUBIC, "inverse", "fine thermometer")
 
 
-@pytest.mark.parametrize("arithmetic", [0, 1])
+@pytest.mark.parametrize("arithmetic", [PORTABLE, LIMBS])
 @pytest.mark.parametrize(
     "case",
     [pytest.param(c, marks=() if c.name in QUICK else pytest.mark.slow, id=c.name) for c in CASES],
 )
-def test_host_prints_what_python_expects(case: Case, arithmetic: int, tmp_path: Path) -> None:
+def test_host_prints_what_python_expects(case: Case, arithmetic: str, tmp_path: Path) -> None:
     assert compare(run_on_host(case, tmp_path, arithmetic), expected_lines(case)) == ""
 
 
@@ -146,12 +146,12 @@ def test_a_fault_in_the_generated_c_is_seen(old: str, new: str, line: str, tmp_p
 
 
 def test_a_fault_in_the_limb_form_is_seen(tmp_path: Path) -> None:
-    case = case_named("fine thermometer")
-    text = case.files["triax_comp.c"]
+    case = case_named("fine thermometer").in_form(LIMBS)
+    text = case.files["triax_comp_limbs.c"]
     old = "(int32_t)(low >> 16)"
     assert old in text
-    broken = replace(case, files={**case.files, "triax_comp.c": text.replace(old, "0", 1)})
-    assert compare(run_on_host(broken, tmp_path, 1), expected_lines(case)).startswith("printed")
+    broken = replace(case, files={**case.files, "triax_comp_limbs.c": text.replace(old, "0", 1)})
+    assert compare(run_on_host(broken, tmp_path, LIMBS), expected_lines(case)).startswith("printed")
 
 
 def test_compare_names_the_first_difference() -> None:
@@ -185,7 +185,7 @@ def test_every_tool_has_a_package() -> None:
 
 def test_matrix_is_as_large_as_promised() -> None:
     builds = matrix.shipped_builds(CASES)
-    cubic = [b for b in builds if b.case.name == CUBIC and b.toolset.arithmetic == 0]
+    cubic = [b for b in builds if b.case.name == CUBIC and b.toolset.arithmetic == PORTABLE]
     assert len(cubic) == 8 * 2 * 5 + 5  # AVR: gcc only
     assert {b.toolset.core.name for b in builds} == {core.name for core in cores.CORES}
     assert VECTORS >= 20000
@@ -198,7 +198,7 @@ def test_unit_case_is_the_shipped_shape() -> None:
 def test_a_core_under_qemu() -> None:
     need(*M3.tools("gcc"))
     case = case_named("AT-CHERNIAK")
-    ways = [Toolset(M3, "gcc", "-O2", arithmetic) for arithmetic in (0, 1, 2)]
+    ways = [Toolset(M3, "gcc", "-O2", arithmetic) for arithmetic in (PORTABLE, LIMBS, THUMB2)]
     assert [o.detail for o in run_builds([Build(case, way) for way in ways])] == ["", "", ""]
 
 
@@ -265,12 +265,14 @@ def test_thumb2_on_a_core_without_it_is_refused_by_name() -> None:
     need(*m0.tools("gcc"))
     outcome = run_builds([Build(case_named(CUBIC), Toolset(m0, "gcc", "-O2", THUMB2))])[0]
     assert outcome.status == FAILED
-    assert "TRIAX_THUMB2 needs a core with Thumb-2 (Cortex-M3, M4, M7, M33)" in outcome.detail
+    assert "this is for cores with Thumb-2 (Cortex-M3, M4, M7, M33)" in outcome.detail
 
 
 def known_program(tmp_path: Path, rounds: str) -> Path:
     """The benchmark program of the cubic with other loops than `counting.LOOP_ROUNDS`."""
-    sources, include, _ = _write_subject(Subject(case_named(CUBIC), 0, ""), tmp_path / "work")
+    sources, include, _ = _write_subject(
+        Subject(case_named(CUBIC), PORTABLE, ""), tmp_path / "work"
+    )
     target = FIRMWARE / "target"
     main = tmp_path / "bench_main.c"
     text = (target / "bench_main.c").read_text()
@@ -297,7 +299,7 @@ def test_rates_and_forces_are_given_and_counted(tmp_path: Path) -> None:
     need(*M3.tools("gcc"))
     plugin = build_plugin(tmp_path)
     costs = {
-        name: cost_of(Subject(case_named(name), 0, ""), M3, tmp_path / str(i), plugin)
+        name: cost_of(Subject(case_named(name), PORTABLE, ""), M3, tmp_path / str(i), plugin)
         for i, name in enumerate((CUBIC, RATE_ALONE, GYRO))
     }
     assert [c.failure for c in costs.values()] == ["", "", ""]
@@ -381,11 +383,11 @@ def test_the_assembly_leaves_r9_to_the_platform(
 ) -> None:
     """gcc has no macro for -ffixed-r9, so the routine could not refuse it."""
     need("arm-none-eabi-gcc", "arm-none-eabi-objdump")
-    case = case_named(name)
+    case = case_named(name).in_form(THUMB2)
     for file, text in case.files.items():
         (tmp_path / file).write_text(text)
     toolset = Toolset(M3, "gcc", optimisation, THUMB2, ("-ffixed-r9",))
-    (made,) = compiled(toolset, [tmp_path / "triax_comp.c"], [tmp_path], tmp_path / "made")
+    (made,) = compiled(toolset, [tmp_path / case.sources[0]], [tmp_path], tmp_path / "made")
     shown = subprocess.run(
         ["arm-none-eabi-objdump", "-d", made], capture_output=True, text=True, check=True
     ).stdout

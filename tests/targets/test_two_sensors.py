@@ -13,9 +13,10 @@ from triaxcal.codegen.shim import write_shim
 from triaxcal.model.terms import NO_TERMS
 from triaxcal.targets.build import Toolset, _support, compiled, emulate, link_command, run
 from triaxcal.targets.cores.registry import CORES
-from triaxcal.targets.matrix import PORTABLE, THUMB2, compare
+from triaxcal.targets.matrix import compare
 from triaxcal.targets.shapes import Case, made_case
 from triaxcal.targets.vectors import case_header, expected_lines
+from triaxcal.unit.arithmetic import PORTABLE, THUMB2
 
 UNITS = Path(__file__).parents[2] / "units"
 FIRMWARE = shipped("firmware_ref")
@@ -39,7 +40,7 @@ def objects_of(toolset: Toolset, case: Case, folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("arithmetic", [PORTABLE, THUMB2])
-def test_two_shapes_give_the_digests_of_each_alone(arithmetic: int, tmp_path: Path) -> None:
+def test_two_shapes_give_the_digests_of_each_alone(arithmetic: str, tmp_path: Path) -> None:
     core = next(c for c in CORES if c.name == "Cortex-M3")
     toolset = Toolset(core, "gcc", "-O2", arithmetic)
     missing = missing_tools(core.tools("gcc"))
@@ -49,6 +50,7 @@ def test_two_shapes_give_the_digests_of_each_alone(arithmetic: int, tmp_path: Pa
         made_case(UNITS / unit, prefix, "", lambda u, p=prefix: replace(u, prefix=p), NO_TERMS)
         for unit, prefix in (("AT-SIM", "left"), ("AT-CHERNIAK", "right"))
     ]
+    cases = [case.in_form(arithmetic) for case in cases]
     assert cases[0].names.shape != cases[1].names.shape
     objects = [o for c in cases for o in objects_of(toolset, c, tmp_path / c.plan.prefix)]
     (tmp_path / "both.c").write_text(MAIN)

@@ -8,73 +8,42 @@
  */
 #include "triax_comp.h"
 
-#if (TRIAX_ARITHMETIC == TRIAX_THUMB2) && !defined(__thumb2__)
-#error "TRIAX_THUMB2 needs a core with Thumb-2 (Cortex-M3, M4, M7, M33): use TRIAX_THUMB1 or TRIAX_LIMBS"
-#endif
-#if (TRIAX_ARITHMETIC == TRIAX_THUMB1) && !defined(__thumb__)
-#error "TRIAX_THUMB1 needs a core with Thumb (Cortex-M0, M0+, M1): use TRIAX_LIMBS"
-#endif
-#if (TRIAX_ARITHMETIC < TRIAX_PORTABLE) || (TRIAX_ARITHMETIC > TRIAX_THUMB1)
-#error "TRIAX_ARITHMETIC is none of TRIAX_PORTABLE, TRIAX_LIMBS, TRIAX_THUMB2, TRIAX_THUMB1"
-#endif
-
 /* |n_i0| + |n_i1| + |n_i2| + 2 |b_i| stays below this, so that no sum leaves its type. */
 #define ROW_LIMIT INT64_C(4294967288)
 
 /* The int32_t with these 32 bits: two's complement whatever the compiler does in a cast. */
 static int32_t s32(uint32_t bits)
 {
-    const uint32_t inverted = ~bits;
+    const uint32_t inverted = UINT32_MAX - bits;
     return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits : (-1 - (int32_t)inverted);
 }
 
-#if TRIAX_ARITHMETIC == TRIAX_PORTABLE
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
 static int32_t high_word(int64_t value)
 {
-    return (value < 0) ? (-1 - (int32_t)(~value >> 32)) : (int32_t)(value >> 32);
-}
-#endif
-
-#if TRIAX_ARITHMETIC != TRIAX_THUMB2
-/* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
-static int32_t asr32(int32_t value, uint32_t shift)
-{
-    return (value < 0) ? (~(~value >> shift)) : (value >> shift);
-}
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* value = high_half 2^16 + low_half, 0 <= low_half < 2^16. */
-static int32_t high_half(int32_t value)
-{
-    return asr32(value, 16u);
-}
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-static int32_t low_bits(int32_t value, uint32_t mask)
-{
-    const uint32_t bits = (uint32_t)value & mask;
-    return (int32_t)bits;
+    return (value < 0) ? (-1 - (int32_t)((-1 - value) >> 32)) : (int32_t)(value >> 32);
 }
 
-static int32_t low_half(int32_t value)
+/* floor(value / 2^3) */
+static int32_t asr32_3(int32_t value)
 {
-    return low_bits(value, 0xFFFFu);
+    return (value < 0) ? (-1 - ((-1 - value) >> 3)) : (value >> 3);
 }
-#endif
 
 static int64_t magnitude(int32_t value)
 {
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
-#if TRIAX_ARITHMETIC == TRIAX_PORTABLE
+static int64_t times(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
-    return c + high_word((int64_t)x_q31 * p);
+    return c + high_word(times(x_q31, p));
 }
 
 static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
@@ -96,462 +65,16 @@ static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t
         row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
     }
 }
-#endif
-
-#if TRIAX_ARITHMETIC == TRIAX_LIMBS
-/* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
-static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
-{
-    return c + ((x_high * high_half(p)) + high_half(x_high * low_half(p)));
-}
-
-static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
-{
-    int32_t p = c[2];
-    p = short_step(c[1], x_high, p);
-    p = short_step(c[0], x_high, p);
-    return p;
-}
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
-static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
-{
-    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
-    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
-    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
-    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
-}
-
-static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, int32_t x_low)
-{
-    int32_t p = c[2];
-    p = long_step(c[1], x_high, x_low, p);
-    p = long_step(c[0], x_high, x_low, p);
-    return p;
-}
-
-static void long_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
-                      int32_t x_high, int32_t x_low)
-{
-    uint32_t j;
-    for (j = 0u; j < 4u; j++) {
-        row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
-        row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
-        row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
-    }
-}
-#endif
-
-#if TRIAX_ARITHMETIC == TRIAX_LIMBS
-/* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
-static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
-                          int32_t x_q31)
-{
-    const int32_t x_high = high_half(x_q31);
-    const int32_t x_low = low_half(x_q31);
-
-    if (x_low == 0) {
-        uint32_t j;
-        for (j = 0u; j < 4u; j++) {
-            row[0][j] = short_evaluate(segment->coefficient[j], x_high);
-            row[1][j] = short_evaluate(segment->coefficient[4u + j], x_high);
-            row[2][j] = short_evaluate(segment->coefficient[8u + j], x_high);
-        }
-    } else {
-        long_rows(row, segment, x_high, x_low);
-    }
-}
-#endif
-
-#if TRIAX_ARITHMETIC == TRIAX_THUMB2
-/* Horner's rule row by row; the offset 2^29 is what the sum of triax_apply starts from. */
-static void evaluate_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_q31)
-{
-    const int32_t *c = segment->coefficient[0];
-    int32_t *row = state->row[0];
-    uint32_t left = 3u;
-#if defined(__ARM_FEATURE_DSP)
-    __asm__ volatile(
-        "1:\n\t"
-        "ldmia %[c]!, {r8, r10, r11}\n\t"
-        "smmla r12, r11, %[x], r10\n\t"
-        "smmla r4, r12, %[x], r8\n\t"
-        "ldmia %[c]!, {r8, r10, r11}\n\t"
-        "smmla r12, r11, %[x], r10\n\t"
-        "smmla r5, r12, %[x], r8\n\t"
-        "ldmia %[c]!, {r8, r10, r11}\n\t"
-        "smmla r12, r11, %[x], r10\n\t"
-        "smmla r6, r12, %[x], r8\n\t"
-        "ldmia %[c]!, {r8, r10, r11}\n\t"
-        "smmla r12, r11, %[x], r10\n\t"
-        "smmla r8, r12, %[x], r8\n\t"
-        "asr r10, r8, #3\n\t"
-        "lsl r8, r8, #29\n\t"
-        "stmia %[row]!, {r4, r5, r6, r8, r10}\n\t"
-        "subs %[left], %[left], #1\n\t"
-        "bne 1b"
-        : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
-        : [x] "r"(x_q31)
-        : "r4", "r5", "r6", "r8", "r10", "r11", "r12", "lr", "cc", "memory");
-#else
-    __asm__ volatile(
-        "1:\n\t"
-        "ldmia %[c]!, {r8, r10, r11}\n\t"
-        "smull lr, r12, r11, %[x]\n\t"
-        "add r12, r10, r12\n\t"
-        "smull lr, r12, r12, %[x]\n\t"
-        "add r4, r8, r12\n\t"
-        "ldmia %[c]!, {r8, r10, r11}\n\t"
-        "smull lr, r12, r11, %[x]\n\t"
-        "add r12, r10, r12\n\t"
-        "smull lr, r12, r12, %[x]\n\t"
-        "add r5, r8, r12\n\t"
-        "ldmia %[c]!, {r8, r10, r11}\n\t"
-        "smull lr, r12, r11, %[x]\n\t"
-        "add r12, r10, r12\n\t"
-        "smull lr, r12, r12, %[x]\n\t"
-        "add r6, r8, r12\n\t"
-        "ldmia %[c]!, {r8, r10, r11}\n\t"
-        "smull lr, r12, r11, %[x]\n\t"
-        "add r12, r10, r12\n\t"
-        "smull lr, r12, r12, %[x]\n\t"
-        "add r8, r8, r12\n\t"
-        "asr r10, r8, #3\n\t"
-        "lsl r8, r8, #29\n\t"
-        "stmia %[row]!, {r4, r5, r6, r8, r10}\n\t"
-        "subs %[left], %[left], #1\n\t"
-        "bne 1b"
-        : [c] "+&r"(c), [row] "+&r"(row), [left] "+&r"(left)
-        : [x] "r"(x_q31)
-        : "r4", "r5", "r6", "r8", "r10", "r11", "r12", "lr", "cc", "memory");
-#endif
-}
-
-/* The sum starts from the offset. r0 to r4 are for operands; r7 may be a frame pointer, r9 the platform's. */
-static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz,
-                       int32_t accel[3])
-{
-    const int32_t *row = state->row[0];
-    __asm__ volatile(
-        "ldmia %[row]!, {r5, r6, r8, r10, r11}\n\t"
-        "smlal r10, r11, r5, %[ux]\n\t"
-        "smlal r10, r11, r6, %[uy]\n\t"
-        "smlal r10, r11, r8, %[uz]\n\t"
-        "ldmia %[row]!, {r5, r6, r8, r10, r12}\n\t"
-        "smlal r10, r12, r5, %[ux]\n\t"
-        "smlal r10, r12, r6, %[uy]\n\t"
-        "smlal r10, r12, r8, %[uz]\n\t"
-        "ldmia %[row]!, {r5, r6, r8, r10, lr}\n\t"
-        "smlal r10, lr, r5, %[ux]\n\t"
-        "smlal r10, lr, r6, %[uy]\n\t"
-        "smlal r10, lr, r8, %[uz]\n\t"
-        "stmia %[accel], {r11, r12, lr}"
-        : [row] "+&r"(row)
-        : [ux] "r"(ux), [uy] "r"(uy), [uz] "r"(uz), [accel] "r"(accel)
-        : "r5", "r6", "r8", "r10", "r11", "r12", "lr", "memory");
-}
-#endif
-
-#if TRIAX_ARITHMETIC == TRIAX_THUMB1
-#if defined(__ARM_BIG_ENDIAN)
-#error "TRIAX_THUMB1 takes the lower halves of words at their first byte: use TRIAX_LIMBS"
-#endif
-
-/* Gains in halves, so that triax_apply need not take them apart. */
-static void complete_rows(int32_t row[3][TRIAX_ROW_WORDS])
-{
-    uint32_t i;
-    for (i = 0u; i < 3u; i++) {
-        uint32_t j;
-        for (j = 0u; j < 3u; j++) {
-            const int32_t gain = row[i][j];
-            row[i][j] = low_half(gain);
-            row[i][4u + j] = high_half(gain);
-        }
-    }
-}
-
-/*
- * Horner's rule by halves, row by row, where the lower half of x is 0. r6 is the value so far,
- * r4 on are coefficients, r12 is the end of the rows; r7 is saved by hand because it may be a frame
- * pointer.
- */
-static void short_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_high)
-{
-    const int32_t *const first = segment->coefficient[0];
-    int32_t *const first_row = state->row[0];
-    register const int32_t *c __asm__("r0") = first;
-    register int32_t *row __asm__("r1") = first_row;
-    register int32_t x __asm__("r2") = x_high;
-    __asm__ volatile(
-        ".syntax unified\n\t"
-        "push {r7}\n\t"
-        "movs r3, r1\n\t"
-        "adds r3, #84\n\t"
-        "mov r12, r3\n\t"
-        "1:\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "asrs r3, r6, #16\n\t"
-        "muls r3, r2, r3\n\t"
-        "uxth r6, r6\n\t"
-        "muls r6, r2, r6\n\t"
-        "asrs r6, r6, #16\n\t"
-        "adds r6, r6, r3\n\t"
-        "adds r6, r6, r5\n\t"
-        "asrs r3, r6, #16\n\t"
-        "muls r3, r2, r3\n\t"
-        "uxth r6, r6\n\t"
-        "muls r6, r2, r6\n\t"
-        "asrs r6, r6, #16\n\t"
-        "adds r6, r6, r3\n\t"
-        "adds r6, r6, r4\n\t"
-        "uxth r3, r6\n\t"
-        "str r3, [r1, #0]\n\t"
-        "asrs r6, r6, #16\n\t"
-        "str r6, [r1, #16]\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "asrs r3, r6, #16\n\t"
-        "muls r3, r2, r3\n\t"
-        "uxth r6, r6\n\t"
-        "muls r6, r2, r6\n\t"
-        "asrs r6, r6, #16\n\t"
-        "adds r6, r6, r3\n\t"
-        "adds r6, r6, r5\n\t"
-        "asrs r3, r6, #16\n\t"
-        "muls r3, r2, r3\n\t"
-        "uxth r6, r6\n\t"
-        "muls r6, r2, r6\n\t"
-        "asrs r6, r6, #16\n\t"
-        "adds r6, r6, r3\n\t"
-        "adds r6, r6, r4\n\t"
-        "uxth r3, r6\n\t"
-        "str r3, [r1, #4]\n\t"
-        "asrs r6, r6, #16\n\t"
-        "str r6, [r1, #20]\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "asrs r3, r6, #16\n\t"
-        "muls r3, r2, r3\n\t"
-        "uxth r6, r6\n\t"
-        "muls r6, r2, r6\n\t"
-        "asrs r6, r6, #16\n\t"
-        "adds r6, r6, r3\n\t"
-        "adds r6, r6, r5\n\t"
-        "asrs r3, r6, #16\n\t"
-        "muls r3, r2, r3\n\t"
-        "uxth r6, r6\n\t"
-        "muls r6, r2, r6\n\t"
-        "asrs r6, r6, #16\n\t"
-        "adds r6, r6, r3\n\t"
-        "adds r6, r6, r4\n\t"
-        "uxth r3, r6\n\t"
-        "str r3, [r1, #8]\n\t"
-        "asrs r6, r6, #16\n\t"
-        "str r6, [r1, #24]\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "asrs r3, r6, #16\n\t"
-        "muls r3, r2, r3\n\t"
-        "uxth r6, r6\n\t"
-        "muls r6, r2, r6\n\t"
-        "asrs r6, r6, #16\n\t"
-        "adds r6, r6, r3\n\t"
-        "adds r6, r6, r5\n\t"
-        "asrs r3, r6, #16\n\t"
-        "muls r3, r2, r3\n\t"
-        "uxth r6, r6\n\t"
-        "muls r6, r2, r6\n\t"
-        "asrs r6, r6, #16\n\t"
-        "adds r6, r6, r3\n\t"
-        "adds r6, r6, r4\n\t"
-        "str r6, [r1, #12]\n\t"
-        "adds r1, #28\n\t"
-        "cmp r1, r12\n\t"
-        "bne 1b\n\t"
-        "pop {r7}"
-        : "+&r"(c), "+&r"(row)
-        : "r"(x)
-        : "r3", "r4", "r5", "r6", "r12", "cc", "memory");
-}
-
-static void evaluate_state(triax_state_t *state, const triax_segment_t *segment, int32_t x_q31)
-{
-    const int32_t x_high = high_half(x_q31);
-    const int32_t x_low = low_half(x_q31);
-    if (x_low == 0) {
-        short_state(state, segment, x_high);
-    } else {
-        long_rows(state->row, segment, x_high, x_low);
-        complete_rows(state->row);
-    }
-}
-
-/*
- * The limb form: gains in halves, codes in parts of 11 and 13 bits.
- * Once over the rows with the lower parts of the codes in r1 to r3, leaving two words a row on the
- * stack, and once with the higher parts. r7 is the sum so far, shifted right where the next is of a
- * higher weight; it is saved by hand because it may be a frame pointer. Results wait on the stack.
- */
-static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz,
-                       int32_t accel[3])
-{
-    const int32_t *const first_row = state->row[0];
-    register const int32_t *row __asm__("r0") = first_row;
-    register int32_t x __asm__("r1") = ux;
-    register int32_t y __asm__("r2") = uy;
-    register int32_t z __asm__("r3") = uz;
-    register int32_t *out __asm__("r4") = accel;
-    __asm__ volatile(
-        ".syntax unified\n\t"
-        "push {r4, r7}\n\t"
-        "asrs r4, r1, #11\n\t"
-        "lsls r1, r1, #21\n\t"
-        "lsrs r1, r1, #21\n\t"
-        "asrs r5, r2, #11\n\t"
-        "lsls r2, r2, #21\n\t"
-        "lsrs r2, r2, #21\n\t"
-        "asrs r6, r3, #11\n\t"
-        "lsls r3, r3, #21\n\t"
-        "lsrs r3, r3, #21\n\t"
-        "push {r4, r5, r6}\n\t"
-        "ldmia r0!, {r4, r5, r6, r7}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r7, r4, r6\n\t"
-        "asrs r7, r7, #11\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r4, r4, r6\n\t"
-"push {r4, r7}\n\t"
-        "ldmia r0!, {r4, r5, r6, r7}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r7, r4, r6\n\t"
-        "asrs r7, r7, #11\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r4, r4, r6\n\t"
-"push {r4, r7}\n\t"
-        "ldmia r0!, {r4, r5, r6, r7}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r7, r4, r6\n\t"
-        "asrs r7, r7, #11\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r4, r4, r6\n\t"
-"push {r4, r7}\n\t"
-        "subs r0, #84\n\t"
-        "add r4, sp, #24\n\t"
-        "ldmia r4!, {r1, r2, r3}\n\t"
-        "ldmia r0!, {r4, r5, r6, r7}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r4, r4, r6\n\t"
-"mov r12, r7\n\t"
-        "ldr r7, [sp, #20]\n\t"
-        "adds r7, r7, r4\n\t"
-        "asrs r7, r7, #5\n\t"
-"ldr r4, [sp, #16]\n\t"
-        "adds r7, r7, r4\n\t"
-        "asrs r7, r7, #8\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r4, r4, r6\n\t"
-"lsls r4, r4, #3\n\t"
-        "adds r4, r4, r7\n\t"
-        "add r4, r12\n\t"
-        "asrs r4, r4, #3\n\t"
-        "str r4, [sp, #28]\n\t"
-        "ldmia r0!, {r4, r5, r6, r7}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r4, r4, r6\n\t"
-"mov r12, r7\n\t"
-        "ldr r7, [sp, #12]\n\t"
-        "adds r7, r7, r4\n\t"
-        "asrs r7, r7, #5\n\t"
-"ldr r4, [sp, #8]\n\t"
-        "adds r7, r7, r4\n\t"
-        "asrs r7, r7, #8\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r4, r4, r6\n\t"
-"lsls r4, r4, #3\n\t"
-        "adds r4, r4, r7\n\t"
-        "add r4, r12\n\t"
-        "asrs r4, r4, #3\n\t"
-        "str r4, [sp, #32]\n\t"
-        "ldmia r0!, {r4, r5, r6, r7}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r4, r4, r6\n\t"
-"mov r12, r7\n\t"
-        "ldr r7, [sp, #4]\n\t"
-        "adds r7, r7, r4\n\t"
-        "asrs r7, r7, #5\n\t"
-"ldr r4, [sp, #0]\n\t"
-        "adds r7, r7, r4\n\t"
-        "asrs r7, r7, #8\n\t"
-        "ldmia r0!, {r4, r5, r6}\n\t"
-        "muls r4, r1, r4\n\t"
-        "muls r5, r2, r5\n\t"
-        "muls r6, r3, r6\n\t"
-        "adds r4, r4, r5\n\t"
-        "adds r4, r4, r6\n\t"
-"lsls r4, r4, #3\n\t"
-        "adds r4, r4, r7\n\t"
-        "add r4, r12\n\t"
-        "asrs r4, r4, #3\n\t"
-        "add sp, #28\n\t"
-        "pop {r0, r1, r2, r7}\n\t"
-        "stmia r2!, {r0, r1, r4}"
-        : "+&r"(row), "+&r"(x), "+&r"(y), "+&r"(z), "+&r"(out)
-        :
-        : "r5", "r6", "r12", "cc", "memory");
-}
-#endif
 
 static int32_t clamp_raw(int32_t code)
 {
     int32_t result = code;
-#if TRIAX_ARITHMETIC == TRIAX_THUMB2
-    __asm__("ssat %0, #24, %1" : "=r"(result) : "r"(code));
-#else
     if (result < TRIAX_RAW_MIN) {
         result = TRIAX_RAW_MIN;
     }
     if (result > TRIAX_RAW_MAX) {
         result = TRIAX_RAW_MAX;
     }
-#endif
     return result;
 }
 
@@ -560,7 +83,6 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
-    int32_t x_q31;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -570,75 +92,26 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    x_q31 = (code - segment->origin_code) * segment->gain;
-#if (TRIAX_ARITHMETIC == TRIAX_THUMB2) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-    evaluate_state(state, segment, x_q31);
-#else
-    evaluate_rows(state->row, segment, x_q31);
-#endif
+    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
     return status;
 }
 
-#if TRIAX_ARITHMETIC == TRIAX_PORTABLE
 /* The offset holds half an output LSB; floor(floor(v / 2^32) / 2^3) = floor(v / 2^35). */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
 {
-    const int64_t sum_x = ((int64_t)state->row[0][0] * ux) + ((int64_t)state->row[0][1] * uy) +
-            ((int64_t)state->row[0][2] * uz);
-    const int64_t sum_y = ((int64_t)state->row[1][0] * ux) + ((int64_t)state->row[1][1] * uy) +
-            ((int64_t)state->row[1][2] * uz);
-    const int64_t sum_z = ((int64_t)state->row[2][0] * ux) + ((int64_t)state->row[2][1] * uy) +
-            ((int64_t)state->row[2][2] * uz);
-    const int32_t x = asr32(high_word(sum_x) + state->row[0][3], 3u);
-    const int32_t y = asr32(high_word(sum_y) + state->row[1][3], 3u);
-    const int32_t z = asr32(high_word(sum_z) + state->row[2][3], 3u);
+    const int64_t sum_x = times(state->row[0][0], ux) + times(state->row[0][1], uy) +
+            times(state->row[0][2], uz);
+    const int64_t sum_y = times(state->row[1][0], ux) + times(state->row[1][1], uy) +
+            times(state->row[1][2], uz);
+    const int64_t sum_z = times(state->row[2][0], ux) + times(state->row[2][1], uy) +
+            times(state->row[2][2], uz);
+    const int32_t x = asr32_3(high_word(sum_x) + state->row[0][3]);
+    const int32_t y = asr32_3(high_word(sum_y) + state->row[1][3]);
+    const int32_t z = asr32_3(high_word(sum_z) + state->row[2][3]);
     accel[0] = x;
     accel[1] = y;
     accel[2] = z;
 }
-#elif TRIAX_ARITHMETIC == TRIAX_LIMBS
-/*
- * The same from halves of the raw codes, high 2^11 + low, and of the gains, high 2^16 + low: every
- * sum of three products stays within int32_t, so that no carry has to be kept. h is
- * floor(sum / 2^32) + b modulo 2^32, and that fits int32_t (docs/targets.md).
- */
-static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
-{
-    const int32_t x_low = low_bits(ux, 2047u);
-    const int32_t y_low = low_bits(uy, 2047u);
-    const int32_t z_low = low_bits(uz, 2047u);
-    const int32_t x_high = asr32(ux, 11u);
-    const int32_t y_high = asr32(uy, 11u);
-    const int32_t z_high = asr32(uz, 11u);
-    uint32_t i;
-    for (i = 0u; i < 3u; i++) {
-        const int32_t *const row = state->row[i];
-        int32_t low = low_half(row[0]);
-        int32_t high = high_half(row[0]);
-        int32_t low_low = low * x_low;
-        int32_t low_high = low * x_high;
-        int32_t high_low = high * x_low;
-        int32_t high_high = high * x_high;
-        uint32_t h;
-        low = low_half(row[1]);
-        high = high_half(row[1]);
-        low_low += low * y_low;
-        low_high += low * y_high;
-        high_low += high * y_low;
-        high_high += high * y_high;
-        low = low_half(row[2]);
-        high = high_half(row[2]);
-        low_low += low * z_low;
-        low_high += low * z_high;
-        high_low += high * z_low;
-        high_high += high * z_high;
-        high_low += asr32(low_high + asr32(low_low, 11u), 5u);
-        high_low = asr32(high_low, 8u);
-        h = ((uint32_t)high_high * 8u) + (uint32_t)high_low + (uint32_t)row[3];
-        accel[i] = asr32(s32(h), 3u);
-    }
-}
-#endif
 
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3])
 {
@@ -655,17 +128,10 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
         uz = clamp_raw(uz);
         status = TRIAX_STATUS_RAW_RANGE;
     }
-#if TRIAX_ARITHMETIC == TRIAX_PORTABLE
     /* Left-justified: |u| 2^8 <= 2^31. */
     ux *= 256;
     uy *= 256;
     uz *= 256;
-#elif TRIAX_ARITHMETIC == TRIAX_THUMB2
-    /* 3 bits fewer: the high word of a sum is then shifted right already. */
-    ux *= 32;
-    uy *= 32;
-    uz *= 32;
-#endif
     apply_rows(state, ux, uy, uz, accel);
     return status;
 }
@@ -813,21 +279,10 @@ static uint32_t identity_fits(const uint8_t *image)
 static uint32_t image_fits(const uint8_t *image, size_t size)
 {
     static const uint32_t header[HEADER_WORDS] = {
-        0x43585254u, /* magic TRXC */
-        0x00000001u, /* version of the layout */
-        0x000000E4u, /* size in bytes */
-        0x00000000u, /* form: 0 direct, 1 inverse */
-        0x00000001u, /* segments */
-        0x00000002u, /* order */
-        0x00000018u, /* output Q */
-        0x00000023u, /* output shift */
-        0xFF800000u, /* raw code min */
-        0x007FFFFFu, /* raw code max */
-        0x00000008u, /* raw shift */
-        0x00000000u, /* adjugate shift */
-        0x00000000u, /* determinant shift */
-        0x00000000u, /* log2 of the reciprocal */
-        0x00000000u, /* gain shift */
+        0x43585254u, 0x00000001u, 0x000000E4u, 0x00000000u, /* magic TRXC; version of the layout; size in bytes; form: 0 direct, 1 inverse */
+        0x00000001u, 0x00000002u, 0x00000018u, 0x00000023u, /* segments; order; output Q; output shift */
+        0xFF800000u, 0x007FFFFFu, 0x00000008u, 0x00000000u, /* raw code min; raw code max; raw shift; adjugate shift */
+        0x00000000u, 0x00000000u, 0x00000000u, /* determinant shift; log2 of the reciprocal; gain shift */
     };
     uint32_t fits = 0u;
 

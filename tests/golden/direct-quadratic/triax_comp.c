@@ -8,69 +8,42 @@
  */
 #include "triax_comp.h"
 
-#if (TRIAX_ARITHMETIC == TRIAX_THUMB2) && !defined(__thumb2__)
-#error "TRIAX_THUMB2 needs a core with Thumb-2 (Cortex-M3, M4, M7, M33): use TRIAX_THUMB1 or TRIAX_LIMBS"
-#endif
-#if (TRIAX_ARITHMETIC == TRIAX_THUMB1) && !defined(__thumb__)
-#error "TRIAX_THUMB1 needs a core with Thumb (Cortex-M0, M0+, M1): use TRIAX_LIMBS"
-#endif
-#if (TRIAX_ARITHMETIC < TRIAX_PORTABLE) || (TRIAX_ARITHMETIC > TRIAX_THUMB1)
-#error "TRIAX_ARITHMETIC is none of TRIAX_PORTABLE, TRIAX_LIMBS, TRIAX_THUMB2, TRIAX_THUMB1"
-#endif
-
 /* |n_i0| + |n_i1| + |n_i2| + 2 |b_i| stays below this, so that no sum leaves its type. */
 #define ROW_LIMIT INT64_C(3221225472)
 
 /* The int32_t with these 32 bits: two's complement whatever the compiler does in a cast. */
 static int32_t s32(uint32_t bits)
 {
-    const uint32_t inverted = ~bits;
+    const uint32_t inverted = UINT32_MAX - bits;
     return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits : (-1 - (int32_t)inverted);
 }
 
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
 static int32_t high_word(int64_t value)
 {
-    return (value < 0) ? (-1 - (int32_t)(~value >> 32)) : (int32_t)(value >> 32);
+    return (value < 0) ? (-1 - (int32_t)((-1 - value) >> 32)) : (int32_t)(value >> 32);
 }
 
-/* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
-static int32_t asr32(int32_t value, uint32_t shift)
+/* floor(value / 2^3) */
+static int32_t asr32_3(int32_t value)
 {
-    return (value < 0) ? (~(~value >> shift)) : (value >> shift);
+    return (value < 0) ? (-1 - ((-1 - value) >> 3)) : (value >> 3);
 }
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* value = high_half 2^16 + low_half, 0 <= low_half < 2^16. */
-static int32_t high_half(int32_t value)
-{
-    return asr32(value, 16u);
-}
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-static int32_t low_bits(int32_t value, uint32_t mask)
-{
-    const uint32_t bits = (uint32_t)value & mask;
-    return (int32_t)bits;
-}
-
-static int32_t low_half(int32_t value)
-{
-    return low_bits(value, 0xFFFFu);
-}
-#endif
 
 static int64_t magnitude(int32_t value)
 {
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
-#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_THUMB2)
+static int64_t times(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
-    return c + high_word((int64_t)x_q31 * p);
+    return c + high_word(times(x_q31, p));
 }
 
 static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
@@ -92,88 +65,16 @@ static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t
         row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
     }
 }
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
-static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
-{
-    return c + ((x_high * high_half(p)) + high_half(x_high * low_half(p)));
-}
-
-static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
-{
-    int32_t p = c[2];
-    p = short_step(c[1], x_high, p);
-    p = short_step(c[0], x_high, p);
-    return p;
-}
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
-static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
-{
-    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
-    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
-    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
-    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
-}
-
-static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, int32_t x_low)
-{
-    int32_t p = c[2];
-    p = long_step(c[1], x_high, x_low, p);
-    p = long_step(c[0], x_high, x_low, p);
-    return p;
-}
-
-static void long_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
-                      int32_t x_high, int32_t x_low)
-{
-    uint32_t j;
-    for (j = 0u; j < 4u; j++) {
-        row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
-        row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
-        row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
-    }
-}
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
-static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
-                          int32_t x_q31)
-{
-    const int32_t x_high = high_half(x_q31);
-    const int32_t x_low = low_half(x_q31);
-
-    if (x_low == 0) {
-        uint32_t j;
-        for (j = 0u; j < 4u; j++) {
-            row[0][j] = short_evaluate(segment->coefficient[j], x_high);
-            row[1][j] = short_evaluate(segment->coefficient[4u + j], x_high);
-            row[2][j] = short_evaluate(segment->coefficient[8u + j], x_high);
-        }
-    } else {
-        long_rows(row, segment, x_high, x_low);
-    }
-}
-#endif
 
 static int32_t clamp_raw(int32_t code)
 {
     int32_t result = code;
-#if TRIAX_ARITHMETIC == TRIAX_THUMB2
-    __asm__("ssat %0, #24, %1" : "=r"(result) : "r"(code));
-#else
     if (result < TRIAX_RAW_MIN) {
         result = TRIAX_RAW_MIN;
     }
     if (result > TRIAX_RAW_MAX) {
         result = TRIAX_RAW_MAX;
     }
-#endif
     return result;
 }
 
@@ -193,7 +94,6 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
-    int32_t x_q31;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -203,8 +103,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    x_q31 = (code - segment->origin_code) * segment->gain;
-    evaluate_rows(state->row, segment, x_q31);
+    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
     copy_terms(state, calib);
     return status;
 }
@@ -219,20 +118,20 @@ static void products_of(const triax_state_t *state, int64_t sum_x, int64_t sum_y
     const int32_t x = high_word(sum_x) + state->row[0][3];
     const int32_t y = high_word(sum_y) + state->row[1][3];
     const int32_t z = high_word(sum_z) + state->row[2][3];
-    product[0] = high_word((int64_t)x * x);
-    product[1] = high_word((int64_t)y * y);
-    product[2] = high_word((int64_t)z * z);
-    product[3] = high_word((int64_t)x * y);
-    product[4] = high_word((int64_t)x * z);
-    product[5] = high_word((int64_t)y * z);
+    product[0] = high_word(times(x, x));
+    product[1] = high_word(times(y, y));
+    product[2] = high_word(times(z, z));
+    product[3] = high_word(times(x, y));
+    product[4] = high_word(times(x, z));
+    product[5] = high_word(times(y, z));
 }
 
 /* Below 5 * 2^58 in magnitude, as the words of a row sum to 2147483647 at most. */
 static int64_t quadratic_sum(const int32_t q[6], const int32_t product[6])
 {
-    return ((int64_t)q[0] * product[0]) + ((int64_t)q[1] * product[1]) +
-           ((int64_t)q[2] * product[2]) + ((int64_t)q[3] * product[3]) +
-           ((int64_t)q[4] * product[4]) + ((int64_t)q[5] * product[5]);
+    return times(q[0], product[0]) + times(q[1], product[1]) +
+           times(q[2], product[2]) + times(q[3], product[3]) +
+           times(q[4], product[4]) + times(q[5], product[5]);
 }
 
 /* floor(floor(v / 2^32) / 2^3) = floor(v / 2^35); half an output LSB is 4. */
@@ -240,19 +139,19 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
                        int32_t accel[3])
 {
     int32_t product[6];
-    int64_t sum_x = ((int64_t)state->row[0][0] * ux) + ((int64_t)state->row[0][1] * uy) +
-            ((int64_t)state->row[0][2] * uz);
-    int64_t sum_y = ((int64_t)state->row[1][0] * ux) + ((int64_t)state->row[1][1] * uy) +
-            ((int64_t)state->row[1][2] * uz);
-    int64_t sum_z = ((int64_t)state->row[2][0] * ux) + ((int64_t)state->row[2][1] * uy) +
-            ((int64_t)state->row[2][2] * uz);
+    int64_t sum_x = times(state->row[0][0], ux) + times(state->row[0][1], uy) +
+            times(state->row[0][2], uz);
+    int64_t sum_y = times(state->row[1][0], ux) + times(state->row[1][1], uy) +
+            times(state->row[1][2], uz);
+    int64_t sum_z = times(state->row[2][0], ux) + times(state->row[2][1], uy) +
+            times(state->row[2][2], uz);
     products_of(state, sum_x, sum_y, sum_z, product);
     sum_x += quadratic_sum(state->quadratic[0], product);
     sum_y += quadratic_sum(state->quadratic[1], product);
     sum_z += quadratic_sum(state->quadratic[2], product);
-    accel[0] = asr32((high_word(sum_x) + state->row[0][3]) + 4, 3u);
-    accel[1] = asr32((high_word(sum_y) + state->row[1][3]) + 4, 3u);
-    accel[2] = asr32((high_word(sum_z) + state->row[2][3]) + 4, 3u);
+    accel[0] = asr32_3((high_word(sum_x) + state->row[0][3]) + 4);
+    accel[1] = asr32_3((high_word(sum_y) + state->row[1][3]) + 4);
+    accel[2] = asr32_3((high_word(sum_z) + state->row[2][3]) + 4);
 }
 
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3])
@@ -278,7 +177,7 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
     return status;
 }
 
-/* Words of the image: the header (magic, version, size, shape), two temperature codes, segments. */
+/* Words of the image: the header (magic, version, size, shape), two temperature codes, segments, terms. */
 #define HEADER_WORDS 16u
 #define SEGMENTS_AT ((size_t)HEADER_WORDS + 2u)
 #define SEGMENT_WORDS ((size_t)3u + (12u * ((size_t)TRIAX_ORDER + 1u)))
@@ -442,22 +341,10 @@ static uint32_t identity_fits(const uint8_t *image)
 static uint32_t image_fits(const uint8_t *image, size_t size)
 {
     static const uint32_t header[HEADER_WORDS] = {
-        0x43585254u, /* magic TRXC */
-        0x00000002u, /* version of the layout */
-        0x00000130u, /* size in bytes */
-        0x00000000u, /* form: 0 direct, 1 inverse */
-        0x00000001u, /* segments */
-        0x00000002u, /* order */
-        0x00000018u, /* output Q */
-        0x00000023u, /* output shift */
-        0xFF800000u, /* raw code min */
-        0x007FFFFFu, /* raw code max */
-        0x00000008u, /* raw shift */
-        0x00000000u, /* adjugate shift */
-        0x00000000u, /* determinant shift */
-        0x00000000u, /* log2 of the reciprocal */
-        0x00000000u, /* gain shift */
-        0x00000001u, /* terms: 1 quadratic, 2 dT/dt, 4 g-sensitivity, force Q << 8 */
+        0x43585254u, 0x00000002u, 0x00000130u, 0x00000000u, /* magic TRXC; version of the layout; size in bytes; form: 0 direct, 1 inverse */
+        0x00000001u, 0x00000002u, 0x00000018u, 0x00000023u, /* segments; order; output Q; output shift */
+        0xFF800000u, 0x007FFFFFu, 0x00000008u, 0x00000000u, /* raw code min; raw code max; raw shift; adjugate shift */
+        0x00000000u, 0x00000000u, 0x00000000u, 0x00000001u, /* determinant shift; log2 of the reciprocal; gain shift; terms: 1 quadratic, 2 dT/dt, 4 g-sensitivity, force Q << 8 */
     };
     uint32_t fits = 0u;
 

@@ -8,46 +8,44 @@
  */
 #include "triax_comp.h"
 
-#if (TRIAX_ARITHMETIC == TRIAX_THUMB2) && !defined(__thumb2__)
-#error "TRIAX_THUMB2 needs a core with Thumb-2 (Cortex-M3, M4, M7, M33): use TRIAX_THUMB1 or TRIAX_LIMBS"
-#endif
-#if (TRIAX_ARITHMETIC == TRIAX_THUMB1) && !defined(__thumb__)
-#error "TRIAX_THUMB1 needs a core with Thumb (Cortex-M0, M0+, M1): use TRIAX_LIMBS"
-#endif
-#if (TRIAX_ARITHMETIC < TRIAX_PORTABLE) || (TRIAX_ARITHMETIC > TRIAX_THUMB1)
-#error "TRIAX_ARITHMETIC is none of TRIAX_PORTABLE, TRIAX_LIMBS, TRIAX_THUMB2, TRIAX_THUMB1"
-#endif
-
 /* |n_i0| + |n_i1| + |n_i2| + 2 |b_i| stays below this, so that no sum leaves its type. */
 #define ROW_LIMIT INT64_C(4294967288)
 
 /* The int32_t with these 32 bits: two's complement whatever the compiler does in a cast. */
 static int32_t s32(uint32_t bits)
 {
-    const uint32_t inverted = ~bits;
+    const uint32_t inverted = UINT32_MAX - bits;
     return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits : (-1 - (int32_t)inverted);
 }
 
-#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_THUMB2)
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
 static int32_t high_word(int64_t value)
 {
-    return (value < 0) ? (-1 - (int32_t)(~value >> 32)) : (int32_t)(value >> 32);
+    return (value < 0) ? (-1 - (int32_t)((-1 - value) >> 32)) : (int32_t)(value >> 32);
 }
-#endif
 
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
-static int32_t asr32(int32_t value, uint32_t shift)
+/* floor(value / 2^2) */
+static int64_t asr64_2(int64_t value)
 {
-    return (value < 0) ? (~(~value >> shift)) : (value >> shift);
+    return (value < 0) ? (-1 - ((-1 - value) >> 2)) : (value >> 2);
 }
-#endif
 
-/* floor(value / 2^shift): >> of a negative value is left to the compiler by C99. */
-static int64_t asr64(int64_t value, uint32_t shift)
+/* floor(value / 2^29) */
+static int64_t asr64_29(int64_t value)
 {
-    return (value < 0) ? (~(~value >> shift)) : (value >> shift);
+    return (value < 0) ? (-1 - ((-1 - value) >> 29)) : (value >> 29);
+}
+
+/* floor(value / 2^30) */
+static int64_t asr64_30(int64_t value)
+{
+    return (value < 0) ? (-1 - ((-1 - value) >> 30)) : (value >> 30);
+}
+
+/* floor(value / 2^31) */
+static int64_t asr64_31(int64_t value)
+{
+    return (value < 0) ? (-1 - ((-1 - value) >> 31)) : (value >> 31);
 }
 
 static int32_t saturate32(int64_t value)
@@ -62,37 +60,20 @@ static int32_t saturate32(int64_t value)
     return (int32_t)result;
 }
 
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* value = high_half 2^16 + low_half, 0 <= low_half < 2^16. */
-static int32_t high_half(int32_t value)
-{
-    return asr32(value, 16u);
-}
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-static int32_t low_bits(int32_t value, uint32_t mask)
-{
-    const uint32_t bits = (uint32_t)value & mask;
-    return (int32_t)bits;
-}
-
-static int32_t low_half(int32_t value)
-{
-    return low_bits(value, 0xFFFFu);
-}
-#endif
-
 static int64_t magnitude(int32_t value)
 {
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
-#if (TRIAX_ARITHMETIC == TRIAX_PORTABLE) || (TRIAX_ARITHMETIC == TRIAX_THUMB2)
+static int64_t times(int32_t a, int32_t b)
+{
+    return (int64_t)a * b;
+}
+
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
-    return c + high_word((int64_t)x_q31 * p);
+    return c + high_word(times(x_q31, p));
 }
 
 static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
@@ -114,79 +95,11 @@ static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t
         row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
     }
 }
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* c + x p / 2, floored, x = x_high 2^16: what falls below 2^16 is the same for the whole product. */
-static int32_t short_step(int32_t c, int32_t x_high, int32_t p)
-{
-    return c + ((x_high * high_half(p)) + high_half(x_high * low_half(p)));
-}
-
-static int32_t short_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high)
-{
-    int32_t p = c[2];
-    p = short_step(c[1], x_high, p);
-    p = short_step(c[0], x_high, p);
-    return p;
-}
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* The same for x = x_high 2^16 + x_low, 0 <= x_low < 2^16; each sum stays within int32_t. */
-static int32_t long_step(int32_t c, int32_t x_high, int32_t x_low, int32_t p)
-{
-    const uint32_t low = (uint32_t)x_low * (uint32_t)low_half(p);
-    const int32_t middle = (x_high * low_half(p)) + (int32_t)(low >> 16);
-    const int32_t middle_2 = (x_low * high_half(p)) + low_half(middle);
-    return c + ((x_high * high_half(p)) + high_half(middle) + high_half(middle_2));
-}
-
-static int32_t long_evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_high, int32_t x_low)
-{
-    int32_t p = c[2];
-    p = long_step(c[1], x_high, x_low, p);
-    p = long_step(c[0], x_high, x_low, p);
-    return p;
-}
-
-static void long_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
-                      int32_t x_high, int32_t x_low)
-{
-    uint32_t j;
-    for (j = 0u; j < 4u; j++) {
-        row[0][j] = long_evaluate(segment->coefficient[j], x_high, x_low);
-        row[1][j] = long_evaluate(segment->coefficient[4u + j], x_high, x_low);
-        row[2][j] = long_evaluate(segment->coefficient[8u + j], x_high, x_low);
-    }
-}
-#endif
-
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-/* A gain of at least 2^16, that is up to 2^15 temperature codes either side, leaves x_low 0. */
-static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
-                          int32_t x_q31)
-{
-    const int32_t x_high = high_half(x_q31);
-    const int32_t x_low = low_half(x_q31);
-
-    if (x_low == 0) {
-        uint32_t j;
-        for (j = 0u; j < 4u; j++) {
-            row[0][j] = short_evaluate(segment->coefficient[j], x_high);
-            row[1][j] = short_evaluate(segment->coefficient[4u + j], x_high);
-            row[2][j] = short_evaluate(segment->coefficient[8u + j], x_high);
-        }
-    } else {
-        long_rows(row, segment, x_high, x_low);
-    }
-}
-#endif
 
 /* a d - b c; |a|, |b|, |c|, |d| < 2^31, so the result stays below 2^63. */
 static int64_t minor_of(int32_t a, int32_t b, int32_t c, int32_t d)
 {
-    return ((int64_t)a * d) - ((int64_t)b * c);
+    return times(a, d) - times(b, c);
 }
 
 /* 2^61 / determinant towards zero, the determinant kept away from zero. */
@@ -219,24 +132,24 @@ static uint32_t invert(int32_t row[3][TRIAX_ROW_WORDS])
             const int32_t *const p = row[(j + 1u) % 3u];
             const int32_t *const q = row[(j + 2u) % 3u];
             const int64_t minor_ji = minor_of(p[i1], p[i2], q[i1], q[i2]);
-            adjugate[i][j] = saturate32(asr64(minor_ji, 31u));
+            adjugate[i][j] = saturate32(asr64_31(minor_ji));
         }
     }
     for (j = 0u; j < 3u; j++) {
-        determinant += asr64((int64_t)row[0][j] * adjugate[j][0], 2u);
+        determinant += asr64_2(times(row[0][j], adjugate[j][0]));
     }
-    inverse = reciprocal(saturate32(asr64(determinant, 29u)));
+    inverse = reciprocal(saturate32(asr64_29(determinant)));
     for (i = 0u; i < 3u; i++) {
         int64_t product = 0;
         int64_t row_sum = 0;
         for (j = 0u; j < 3u; j++) {
-            const int64_t gain = ((int64_t)adjugate[i][j] * inverse) + INT64_C(1073741824);
-            row[i][j] = saturate32(asr64(gain, 31u));
-            product += asr64((int64_t)row[i][j] * u0[j], 2u);
+            const int64_t gain = times(adjugate[i][j], inverse) + INT64_C(1073741824);
+            row[i][j] = saturate32(asr64_31(gain));
+            product += asr64_2(times(row[i][j], u0[j]));
             row_sum += magnitude(row[i][j]);
         }
         /* Half up, and half an output LSB for the rounding of triax_apply. */
-        row[i][3] = saturate32(-asr64(product + INT64_C(536870912), 30u));
+        row[i][3] = saturate32(-asr64_30(product + INT64_C(536870912)));
         row_sum += 2 * magnitude(row[i][3]);
         if (row_sum >= ROW_LIMIT) {
             fits = 0u;
@@ -257,12 +170,22 @@ static int32_t clamp_raw(int32_t code)
     return result;
 }
 
+static void clear_rows(int32_t row[3][TRIAX_ROW_WORDS])
+{
+    uint32_t i;
+    uint32_t j;
+    for (i = 0u; i < 3u; i++) {
+        for (j = 0u; j < 4u; j++) {
+            row[i][j] = 0;
+        }
+    }
+}
+
 uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib, int32_t temp_code)
 {
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
-    int32_t x_q31;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -272,16 +195,9 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    x_q31 = (code - segment->origin_code) * segment->gain;
-    evaluate_rows(state->row, segment, x_q31);
+    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
     if (invert(state->row) == 0u) {
-        uint32_t axis;
-        uint32_t column;
-        for (axis = 0u; axis < 3u; axis++) {
-            for (column = 0u; column < 4u; column++) {
-                state->row[axis][column] = 0;
-            }
-        }
+        clear_rows(state->row);
         status |= TRIAX_STATUS_BAD_IMAGE;
     }
     return status;
@@ -309,26 +225,26 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
     ux *= 256;
     uy *= 256;
     uz *= 256;
-    sum_x = ((int64_t)state->row[0][0] * ux) + ((int64_t)state->row[0][1] * uy) +
-            ((int64_t)state->row[0][2] * uz);
-    sum_y = ((int64_t)state->row[1][0] * ux) + ((int64_t)state->row[1][1] * uy) +
-            ((int64_t)state->row[1][2] * uz);
-    sum_z = ((int64_t)state->row[2][0] * ux) + ((int64_t)state->row[2][1] * uy) +
-            ((int64_t)state->row[2][2] * uz);
+    sum_x = times(state->row[0][0], ux) + times(state->row[0][1], uy) +
+            times(state->row[0][2], uz);
+    sum_y = times(state->row[1][0], ux) + times(state->row[1][1], uy) +
+            times(state->row[1][2], uz);
+    sum_z = times(state->row[2][0], ux) + times(state->row[2][1], uy) +
+            times(state->row[2][2], uz);
     sum_x += ((int64_t)state->row[0][3] * INT64_C(4294967296)) + INT64_C(268435456);
-    sum_x = asr64(sum_x, 29u);
+    sum_x = asr64_29(sum_x);
     accel[0] = saturate32(sum_x);
     if ((int64_t)accel[0] != sum_x) {
         status |= TRIAX_STATUS_SATURATED;
     }
     sum_y += ((int64_t)state->row[1][3] * INT64_C(4294967296)) + INT64_C(268435456);
-    sum_y = asr64(sum_y, 29u);
+    sum_y = asr64_29(sum_y);
     accel[1] = saturate32(sum_y);
     if ((int64_t)accel[1] != sum_y) {
         status |= TRIAX_STATUS_SATURATED;
     }
     sum_z += ((int64_t)state->row[2][3] * INT64_C(4294967296)) + INT64_C(268435456);
-    sum_z = asr64(sum_z, 29u);
+    sum_z = asr64_29(sum_z);
     accel[2] = saturate32(sum_z);
     if ((int64_t)accel[2] != sum_z) {
         status |= TRIAX_STATUS_SATURATED;
@@ -473,21 +389,10 @@ static uint32_t identity_fits(const uint8_t *image)
 static uint32_t image_fits(const uint8_t *image, size_t size)
 {
     static const uint32_t header[HEADER_WORDS] = {
-        0x43585254u, /* magic TRXC */
-        0x00000001u, /* version of the layout */
-        0x000000E4u, /* size in bytes */
-        0x00000001u, /* form: 0 direct, 1 inverse */
-        0x00000001u, /* segments */
-        0x00000002u, /* order */
-        0x0000001Eu, /* output Q */
-        0x0000001Du, /* output shift */
-        0xFF953040u, /* raw code min */
-        0x007270E0u, /* raw code max */
-        0x00000008u, /* raw shift */
-        0x0000001Fu, /* adjugate shift */
-        0x0000001Du, /* determinant shift */
-        0x0000003Du, /* log2 of the reciprocal */
-        0x0000001Fu, /* gain shift */
+        0x43585254u, 0x00000001u, 0x000000E4u, 0x00000001u, /* magic TRXC; version of the layout; size in bytes; form: 0 direct, 1 inverse */
+        0x00000001u, 0x00000002u, 0x0000001Eu, 0x0000001Du, /* segments; order; output Q; output shift */
+        0xFF953040u, 0x007270E0u, 0x00000008u, 0x0000001Fu, /* raw code min; raw code max; raw shift; adjugate shift */
+        0x0000001Du, 0x0000003Du, 0x0000001Fu, /* determinant shift; log2 of the reciprocal; gain shift */
     };
     uint32_t fits = 0u;
 

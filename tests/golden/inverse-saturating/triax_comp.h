@@ -17,25 +17,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef TRIAX_ARITHMETIC
+#error "TRIAX_ARITHMETIC chooses nothing now: state [firmware] arithmetic in unit.toml, and compile the file that it gives"
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 #define TRIAX_ACCEL_Q 30 /* acceleration LSB = 2^-30 g = 0.0009313 micro-g */
-
-/*
- * How products are formed; every choice gives the same bits. TRIAX_PORTABLE multiplies in int64_t
- * and suits every core. TRIAX_LIMBS multiplies halves of words, for cores without a 32x32->64
- * multiplication. TRIAX_THUMB2 (Cortex-M3, M4, M7, M33) and TRIAX_THUMB1 (Cortex-M0, M0+, M1) are
- * assembly for GNU-compatible compilers. To choose, say -DTRIAX_ARITHMETIC=2 for every file.
- */
-#define TRIAX_PORTABLE 0
-#define TRIAX_LIMBS 1
-#define TRIAX_THUMB2 2
-#define TRIAX_THUMB1 3
-#ifndef TRIAX_ARITHMETIC
-#define TRIAX_ARITHMETIC TRIAX_PORTABLE
-#endif
 
 /* Status bits. */
 #define TRIAX_STATUS_OK 0u

@@ -25,7 +25,10 @@ def load_delivered(unit: str | Path, build: str | Path) -> Calibration | ImuCali
 
 
 def delivered_firmware(
-    unit: str | Path, build: str | Path = "build", prefix: str | None = None
+    unit: str | Path,
+    build: str | Path = "build",
+    prefix: str | None = None,
+    arithmetic: str | None = None,
 ) -> Firmware | ImuFirmware:
     """The firmware of a unit or an IMU that was calibrated, without a new fit.
 
@@ -37,11 +40,14 @@ def delivered_firmware(
         Folder with the delivered units.
     prefix : str or None
         What names in the C begin with; None is that of the unit.
+    arithmetic : str or None
+        How the C forms its products; None is that of the unit.
 
     Raises
     ------
     RefusedError
-        When there is no calibration, or no prefix; as `firmware` and `firmware_imu`.
+        When there is no calibration, or no such prefix or arithmetic; as `firmware` and
+        `firmware_imu`.
     """
     from triaxcal.api.calibration import Calibration  # noqa: PLC0415
     from triaxcal.api.firmware import firmware  # noqa: PLC0415
@@ -49,8 +55,8 @@ def delivered_firmware(
 
     found = load_delivered(unit, build)
     if isinstance(found, Calibration):
-        return firmware(found, prefix)
-    return firmware_imu(found, prefix)
+        return firmware(found, prefix, arithmetic)
+    return firmware_imu(found, prefix, arithmetic)
 
 
 def _of_an_imu(path: Path) -> bool:

@@ -38,6 +38,8 @@ def export(
     into: str | Path | None = None,
     build: str | Path = "build",
     prefix: str | None = None,
+    *,
+    arithmetic: str | None = None,
 ) -> ExportedFiles:
     """Write a delivered unit for a build system or an autopilot.
 
@@ -53,6 +55,8 @@ def export(
         Folder with the delivered units.
     prefix : str or None
         What names in the C begin with: it is made and checked again. None takes the delivered C.
+    arithmetic : str or None
+        How the C forms its products; as `prefix`.
 
     Raises
     ------
@@ -63,7 +67,8 @@ def export(
     target = TARGETS[to]
     delivered = delivered_file(Path(unit), Path(build)).parent
     done = load_delivered(unit, build).fitted
-    c = None if prefix is None else _checked_c(unit, build, prefix, target)
+    same = prefix is None and arithmetic is None
+    c = None if same else _checked_c(unit, build, prefix, arithmetic, target)
     made = target.make(Source(delivered, done, c))
     name = done.unit.name if isinstance(done, Fitted) else done.name
     parts = (name, to) if prefix is None else (name, prefix, to)
@@ -81,15 +86,19 @@ def export(
 
 
 def _checked_c(
-    unit: str | Path, build: str | Path, prefix: str, target: Target
+    unit: str | Path,
+    build: str | Path,
+    prefix: str | None,
+    arithmetic: str | None,
+    target: Target,
 ) -> dict[str, bytes]:
     """C and image under a prefix, checked as those of a delivery."""
     if not target.takes_c:
         raise RefusedError(
-            "prefix",
-            f'found "{prefix}"',
+            "arithmetic" if prefix is None else "prefix",
+            f'found "{prefix or arithmetic}"',
             expected=f"none: {target.label} gets parameters, no C",
         )
-    firmware = delivered_firmware(unit, build, prefix)
+    firmware = delivered_firmware(unit, build, prefix, arithmetic)
     firmware.check()
     return dict(firmware.files)

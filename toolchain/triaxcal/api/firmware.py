@@ -27,6 +27,7 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.types import FloatArray
+from triaxcal.unit.arithmetic import checked_arithmetic
 from triaxcal.unit.prefix import checked_prefix
 
 Answers = tuple[Int32Array, UInt32Array]
@@ -54,11 +55,16 @@ class Firmware:
         Name and content of the generated C and the image.
     """
 
-    def __init__(self, calibration: Calibration, prefix: str | None = None) -> None:
+    def __init__(
+        self, calibration: Calibration, prefix: str | None = None, arithmetic: str | None = None
+    ) -> None:
         self.calibration = calibration
         fitted = calibration.fitted
         if prefix is not None:
             fitted = replace(fitted, unit=replace(fitted.unit, prefix=checked_prefix(prefix)))
+        if arithmetic is not None:
+            form = checked_arithmetic(arithmetic)
+            fitted = replace(fitted, unit=replace(fitted.unit, arithmetic=form))
         self._made = made = make_firmware(fitted)
         self.plan: Plan = made.plan
         self.files = made.files
@@ -330,7 +336,9 @@ def _one_or_all(name: str, value: Any, count: int) -> Int32Array:
     return np.ascontiguousarray(np.broadcast_to(codes, (count,)))
 
 
-def firmware(calibration: Calibration, prefix: str | None = None) -> Firmware:
+def firmware(
+    calibration: Calibration, prefix: str | None = None, arithmetic: str | None = None
+) -> Firmware:
     """Integers of a calibration, by the method and formats that its unit states.
 
     Parameters
@@ -338,16 +346,18 @@ def firmware(calibration: Calibration, prefix: str | None = None) -> Firmware:
     calibration : Calibration
     prefix : str or None
         What names in the C begin with; None is the unit's [firmware] prefix.
+    arithmetic : str or None
+        How the C forms its products; None is the unit's [firmware] arithmetic.
 
     Raises
     ------
     RefusedError
-        When the calibration is beyond its unit's limits, its integers do not fit the format, or the
-        prefix is none.
+        When the calibration is beyond its unit's limits, its integers do not fit the format, or
+        there is no such prefix or arithmetic.
     """
     if not isinstance(calibration, Calibration):
         raise RefusedError(
             "calibration", f"found a {type(calibration).__name__}", expected="a Calibration"
         )
     refuse_beyond_limits(calibration.fitted)
-    return Firmware(calibration, prefix)
+    return Firmware(calibration, prefix, arithmetic)

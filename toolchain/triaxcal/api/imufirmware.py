@@ -16,6 +16,7 @@ from triaxcal.base.publish import publish
 from triaxcal.codegen.imu import ImuBuild, imu_answers
 from triaxcal.codegen.routines import Int32Array, UInt32Array
 from triaxcal.delivery.imu import ImuC, imu_c
+from triaxcal.unit.arithmetic import checked_arithmetic
 from triaxcal.unit.prefix import checked_prefix
 
 
@@ -116,7 +117,9 @@ class ImuFirmware:
         return write_linked_a2l(elf, path, triads, provenance, variables=variables, xcp=xcp)
 
 
-def firmware_imu(calibration: ImuCalibration, prefix: str | None = None) -> ImuFirmware:
+def firmware_imu(
+    calibration: ImuCalibration, prefix: str | None = None, arithmetic: str | None = None
+) -> ImuFirmware:
     """Firmware of an IMU whose unit has [device].
 
     Parameters
@@ -125,14 +128,20 @@ def firmware_imu(calibration: ImuCalibration, prefix: str | None = None) -> ImuF
         By `fit_imu`, or by `load_imu`: then the C is made, proven and checked once more.
     prefix : str or None
         What names in the C begin with; None is that of [device].
+    arithmetic : str or None
+        How the C forms its products; None is that of [device].
 
     Raises
     ------
     RefusedError
-        Where there is no [device], the prefix is none, or a check fails.
+        Where there is no [device], no such prefix or arithmetic, or a check fails.
     """
-    if prefix is None:
+    if prefix is None and arithmetic is None:
         return ImuFirmware(calibration.c)
     fitted = calibration.fitted
-    device = replace(fitted.device, prefix=checked_prefix(prefix))
+    device = fitted.device
+    if prefix is not None:
+        device = replace(device, prefix=checked_prefix(prefix))
+    if arithmetic is not None:
+        device = replace(device, arithmetic=checked_arithmetic(arithmetic))
     return ImuFirmware(imu_c(replace(fitted, saved=replace(fitted.saved, device=device))))

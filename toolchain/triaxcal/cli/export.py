@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from triaxcal.cli.options import DELIVERED, HELP, PREFIX, UnitFolder, example
+from triaxcal.cli.options import ARITHMETIC, DELIVERED, HELP, PREFIX, UnitFolder, example
 
 
 class _WithTargets(click.Command):
@@ -33,20 +33,30 @@ class _WithTargets(click.Command):
 @DELIVERED
 @click.option("--to", required=True, help="What to write, below.")
 @PREFIX
+@ARITHMETIC
 @click.option(
     "--into",
     type=click.Path(path_type=Path),
     help="Folder; default: build/UNIT-TO, with a prefix build/UNIT-PREFIX-TO.",
 )
-def export(unit: Path, build: Path, to: str, prefix: str | None, into: Path | None) -> None:
+def export(
+    unit: Path,
+    build: Path,
+    to: str,
+    prefix: str | None,
+    *,
+    arithmetic: str | None,
+    into: Path | None,
+) -> None:
     """Write a delivered unit for a build system or an autopilot.
 
     UNIT is a unit, whose delivery is build/UNIT, or a delivered folder. A build system gets the C
-    that was checked, byte for byte; under another prefix it is made and checked again. An autopilot
+    that was checked, byte for byte; under another prefix
+    or in another arithmetic it is made and checked again. An autopilot
     gets the parameters of its own, simpler model, and what that costs at readings of this unit.
     """
     import triaxcal  # noqa: PLC0415
 
-    made = triaxcal.export(unit, to, into, build, prefix)
+    made = triaxcal.export(unit, to, into, build, prefix, arithmetic=arithmetic)
     click.echo(made.summary)
     click.echo(f"\n{len(made.files)} files in {made.folder}/")

@@ -113,6 +113,12 @@ PREFIX = click.option(
 )
 
 
+ARITHMETIC = click.option(
+    "--arithmetic",
+    help="Form of products: portable, limbs, thumb2 or thumb1; default: that of unit.toml.",
+)
+
+
 _OPTIONS = {
     "gravity_m_per_s2": "--gravity",
     "bias_drift_mg": "--bias-drift",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from triaxcal.fixedpoint.shape import Shape
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE, THUMB1, THUMB2
 
 
 def limb_split(shape: Shape) -> int:
-    """Bits of the lower half of a raw code for TRIAX_LIMBS; 0 when the sums would not fit int32.
+    """Bits of the lower half of a raw code for limbs; 0 when the sums would not fit int32.
 
     With k = 16 + spare - raw_shift the halves of a code are below 2^k and at most 2^(15 - spare),
     and the high halves of a row of gains sum to at most 2^16 + 3. Then three products of two low
@@ -41,58 +42,60 @@ def assembly(shape: Shape) -> dict[str, int]:
     }
 
 
-def forms_using(shape: Shape) -> dict[str, str]:
-    """Condition of the preprocessor under which each helper of the routine is used.
+def form_of(shape: Shape, asked: str) -> str:
+    """The arithmetic that a shape has for the one asked: that one, or the next best.
 
-    "1" stands for every form and "" for none: such a helper is left out.
+    Limbs stand for Thumb-1 assembly and the portable form for the others.
     """
     given = assembly(shape)
-    limbs, order = limb_split(shape) > 0, shape.order > 0
-    in_asm_2 = bool(given["thumb2"]) and bool(given["evaluate"])
-    in_asm_1 = bool(given["thumb1"]) and bool(given["evaluate"])
-    plain_apply = not shape.saturates and not shape.adds_to_sums
-    in_every_high_word = bool(shape.adds_to_sums or shape.rate)
-    in_every_asr32 = bool(shape.adds_to_sums) and not shape.saturates
+    if asked == THUMB1 and not given["thumb1"]:
+        asked = LIMBS
+    has = {THUMB2: given["thumb2"], LIMBS: shape.order or limb_split(shape)}.get(asked, True)
+    return asked if has else PORTABLE
+
+
+def row_words(shape: Shape, form: str) -> int:
+    """Words of a row of the state; those beyond 4 are the assembly's own."""
+    return {THUMB2: 5, THUMB1: 7 if limb_split(shape) else 10}.get(form, 4)
+
+
+def helpers(shape: Shape, form: str) -> dict[str, int]:
+    """Which functions the routine has in a form; what it does not use is left out.
+
+    `left_shift` is the number of bits by which it shifts raw codes to the left.
+    """
+    given, limbs, order = assembly(shape), limb_split(shape) > 0, shape.order > 0
+    thumb = form in (THUMB1, THUMB2)
+    in_assembly = thumb and given["evaluate"] > 0
+    halved = form in (LIMBS, THUMB1)
+    sums = form == PORTABLE or (form == LIMBS and not limbs)
+    horner = order and not halved and not in_assembly
+    adds = shape.quadratic or shape.rate
+    halves = halved and (order or limbs)
+    shift = {
+        LIMBS: 0 if limbs else shape.raw_shift,
+        THUMB1: 0 if given["thumb1"] == 2 else shape.raw_shift,
+        THUMB2: shape.raw_shift - given["in_sum"],
+    }
     return {
-        "high_word": _condition(
-            portable=order or plain_apply or in_every_high_word,
-            limbs=(plain_apply and not limbs) or in_every_high_word,
-            thumb2=(order and not in_asm_2) or in_every_high_word,
-            thumb1=in_every_high_word,
-        ),
-        "asr32": _condition(
-            portable=plain_apply or in_every_asr32,
-            limbs=plain_apply or order or in_every_asr32,
-            thumb2=(given["completes"] and given["in_sum"] > 0) or in_every_asr32,
-            thumb1=plain_apply or order or in_every_asr32,
-        ),
-        "high_half": _condition(limbs=limbs or order, thumb1=given["thumb1"] == 2 or order),
-        "low_half": _condition(limbs=limbs or order, thumb1=given["thumb1"] == 2 or order),
-        "int64_horner": _condition(portable=order, thumb2=order and not in_asm_2),
-        "limb_horner": _condition(limbs=order, thumb1=order),
-        "short_horner": _condition(limbs=order, thumb1=order and not in_asm_1),
-        "evaluate_state": _condition(thumb2=in_asm_2, thumb1=in_asm_1),
-        "int64_apply": _condition(portable=plain_apply, limbs=plain_apply and not limbs),
-        "left_justify": _condition(
-            portable=True, limbs=not limbs, thumb1=given["thumb1"] != 2, thumb2=not plain_apply
-        ),
-        "complete": _condition(
-            thumb2=bool(given["completes"]), thumb1=plain_apply and not in_asm_1
-        ),
+        "high_word": horner or adds or (sums and not shape.saturates),
+        "asr32": halved or (form == THUMB2 and given["completes"] and given["in_sum"]),
+        "asr32_spare": sums and not shape.saturates,
+        "times": horner or sums or adds or shape.inverse is not None,
+        "horner": horner,
+        "halves": halves,
+        "long_horner": order and halved,
+        "short_horner": order and halved and not in_assembly,
+        "evaluate_state": in_assembly,
+        "complete": given["completes"] if form == THUMB2 else thumb and not in_assembly,
+        "left_shift": shift.get(form, shape.raw_shift),
     }
 
 
-def _condition(
-    *, portable: bool = False, limbs: bool = False, thumb2: bool = False, thumb1: bool = False
-) -> str:
-    """The shortest #if that holds for just these forms; "1" for all, "" for none."""
-    wanted = {"PORTABLE": portable, "LIMBS": limbs, "THUMB2": thumb2, "THUMB1": thumb1}
-    inside = [name for name, wants in wanted.items() if wants]
-    outside = [name for name, wants in wanted.items() if not wants]
-    if not outside:
-        return "1"
-    if len(outside) == 1:
-        return f"TRIAX_ARITHMETIC != TRIAX_{outside[0]}"
-    if len(inside) == 1:
-        return f"TRIAX_ARITHMETIC == TRIAX_{inside[0]}"
-    return " || ".join(f"(TRIAX_ARITHMETIC == TRIAX_{name})" for name in inside)
+def shifts_64(shape: Shape) -> list[int]:
+    """Shifts of 64-bit sums to the right."""
+    shifts = {shape.output_shift} if shape.saturates else set()
+    i = shape.inverse
+    if i is not None:
+        shifts |= {2, 30, i.adjugate_shift, i.determinant_shift, i.gain_shift}
+    return sorted(shifts)

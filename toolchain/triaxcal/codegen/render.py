@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from triaxcal.codegen.forms import assembly, forms_using, limb_split
+from triaxcal.codegen.forms import (
+    assembly,
+    form_of,
+    helpers,
+    limb_split,
+    row_words,
+    shifts_64,
+)
 from triaxcal.codegen.identity import FIELDS, IDENTITY_SIZE, MAGIC, VERSION
 from triaxcal.codegen.image import header_names, header_words, image_size
 from triaxcal.codegen.names import names_of
@@ -15,6 +22,7 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.quadratic import QUADRATIC_LIMIT
 from triaxcal.fixedpoint.rate import RATE_Q
 from triaxcal.model.terms import PRODUCT_NAMES
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE, THUMB1, THUMB2
 
 ROUTINE_FILES = ("triax_comp.h", "triax_comp.c")
 TERM_TABLES = (
@@ -24,11 +32,45 @@ TERM_TABLES = (
 """The table of terms of an accelerometer and of a gyro."""
 
 
+FORM_NOTES = {
+    PORTABLE: "",
+    LIMBS: ",\n * for cores without a 32x32->64 multiplication: products of halves of words",
+    THUMB2: ",\n * for Cortex-M3, M4, M7, M33: both calls in assembly for GNU-compatible compilers",
+    THUMB1: ",\n * for Cortex-M0, M0+, M1: both calls in assembly for GNU-compatible compilers",
+}
+"""What the heading of a file says of its arithmetic."""
+
+
 def render_routine(plan: Plan) -> dict[str, str]:
-    """Texts of `ROUTINE_FILES`, or a gyro's, by name; they depend on the plan's shape only."""
-    context = _routine_context(plan)
+    """Texts of `ROUTINE_FILES`, or a gyro's, by name; they depend on the plan's shape only.
+
+    Where the plan asks for another arithmetic and its shape has it, the file of that is the last.
+    """
     names = names_of(plan)
-    return dict(render(n, f"shape {names.shape}", names, **context) for n in ROUTINE_FILES)
+    context = {**_routine_context(plan), "row_words": row_words(plan.shape, arithmetic_of(plan))}
+    texts = dict([render(ROUTINE_FILES[0], f"shape {names.shape}", names, **context)])
+    for form in dict.fromkeys((PORTABLE, arithmetic_of(plan))):
+        file = routine_file(plan, form)
+        own = {
+            "form": form,
+            "form_note": FORM_NOTES[form],
+            "uses": helpers(plan.shape, form),
+        }
+        _, texts[file] = render(
+            ROUTINE_FILES[1], f"shape {names.shape}", names, file=file, **context, **own
+        )
+    return texts
+
+
+def arithmetic_of(plan: Plan) -> str:
+    """The arithmetic that a plan asks for, or the next best that its shape has."""
+    return form_of(plan.shape, plan.arithmetic)
+
+
+def routine_file(plan: Plan, form: str) -> str:
+    """Name of the C file of a form: triax_comp.c, triax_comp_thumb2.c; a firmware compiles one."""
+    suffix = "" if form == PORTABLE else f"_{form}"
+    return names_of(plan).file(f"triax_comp{suffix}.c")
 
 
 def _routine_context(plan: Plan) -> dict[str, Any]:
@@ -49,11 +91,10 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "raw_bits": span.bit_length(),
         "raw_min": macro_literal(shape.raw_min),
         "raw_max": macro_literal(shape.raw_max),
-        "raw_scale": 1 << shape.raw_shift,
         "limb_split": limb_split(shape),
         "limb_mask": (1 << limb_split(shape)) - 1,
         "assembly": assembly(shape),
-        "forms_using": forms_using(shape),
+        "shifts_64": shifts_64(shape),
         "orders_down": list(range(shape.order - 1, -1, -1)),
         "lsb_micro_g": f"{1e6 / 2**shape.output_q:.4g}",
         "lsb_deg_per_h": f"{3600 / 2**shape.output_q:.4g}",
@@ -64,7 +105,7 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "identity_magic": MAGIC,
         "identity_version": VERSION,
         "header": header_words(plan),
-        "header_names": header_names(plan),
+        "header_lines": _header_lines(plan),
         "row_limit": shape.row_limit,
         "products": PRODUCT_NAMES,
         "terms": TERM_TABLES[shape.gyro],
@@ -72,3 +113,15 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "rate_q": RATE_Q,
         "final_rounding": 1 << max(0, shape.output_shift - 33),
     }
+
+
+def _header_lines(plan: Plan, together: int = 4) -> list[dict[str, str]]:
+    """The words of the header, some a line, and what they are."""
+    words, names = header_words(plan), header_names(plan)
+    return [
+        {
+            "words": " ".join(f"0x{word:08X}u," for word in words[at : at + together]),
+            "names": "; ".join(names[at : at + together]),
+        }
+        for at in range(0, len(words), together)
+    ]

@@ -140,8 +140,10 @@ def imu_c(fitted: FittedImu) -> ImuC:
     )
     name, sensor = fitted.name, device.temperature_sensor
     triads = (
-        TriadDescription(name, adcs[0], sensor, device.accel_q, device.prefix),
-        TriadDescription(name, adcs[1], sensor, device.gyro_rate_q, device.prefix),
+        TriadDescription(name, adcs[0], sensor, device.accel_q, device.prefix, device.arithmetic),
+        TriadDescription(
+            name, adcs[1], sensor, device.gyro_rate_q, device.prefix, device.arithmetic
+        ),
     )
     build = build_imu(functions, triads, fitted.provenances)
     errors = _model_errors(model, functions, device, build.accel)

@@ -9,6 +9,7 @@ from triaxcal.base.keys import TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import interval, number, whole
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.unit.adc import Adc, whole_adc
+from triaxcal.unit.arithmetic import ARITHMETIC, PORTABLE
 from triaxcal.unit.choices import OUTPUT_Q_RANGE
 from triaxcal.unit.prefix import DEFAULT_PREFIX, PREFIX
 from triaxcal.unit.thermometer import TemperatureSensor
@@ -37,6 +38,9 @@ class Device:
     prefix
         What the names of functions, types, macros and files in the C begin with. Give each sensor
         of a program its own.
+    arithmetic
+        How the C forms its products, as in [firmware]. The gyro has limbs for thumb1 and the
+        portable form for thumb2.
     """
 
     temperature_sensor: TemperatureSensor
@@ -50,6 +54,7 @@ class Device:
     accel_q: int = setting(whole(*OUTPUT_Q_RANGE), 24)
     gyro_rate_q: int = setting(whole(*OUTPUT_Q_RANGE), 19)
     prefix: str = setting(PREFIX, DEFAULT_PREFIX)
+    arithmetic: str = setting(ARITHMETIC, PORTABLE)
 
     @property
     def accel_adc(self) -> Adc:

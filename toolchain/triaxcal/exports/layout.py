@@ -9,6 +9,7 @@ from triaxcal import __version__
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.templates import environment
 from triaxcal.exports.target import Exported, Source
+from triaxcal.unit.arithmetic import ARITHMETICS
 
 _TO_INCLUDE = ("_calib.h", "_imu.h", "_angles.h")
 """What a program includes: the constants, of an IMU the call for both triads, and angles."""
@@ -24,8 +25,8 @@ def layout(source: Source, name: str, sources: str = "src", headers: str = "incl
     sources, headers : str
         Folders for *.c with the image, and for *.h.
     """
-    delivered = source.c_files()
-    prefix = next(n for n in delivered if n.endswith("_comp.c")).removesuffix("_comp.c")
+    delivered = _one_routine(source.c_files())
+    prefix = next(n for n in delivered if n.endswith("_comp.h")).removesuffix("_comp.h")
     files = {
         str(PurePosixPath(headers if file.endswith(".h") else sources) / file): content
         for file, content in delivered.items()
@@ -48,6 +49,13 @@ def layout(source: Source, name: str, sources: str = "src", headers: str = "incl
         files[target] = made.encode()
     added = sorted(path for path in files if PurePosixPath(path).name not in delivered)
     return Exported(files, f"{len(delivered)} delivered files and {', '.join(added)}")
+
+
+def _one_routine(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Without the portable routine of a triad where one in another arithmetic stands for it."""
+    forms = tuple(f"_comp_{form}.c" for form in ARITHMETICS)
+    replaced = {f"{name.rsplit('_', 1)[0]}.c" for name in files if name.endswith(forms)}
+    return {name: content for name, content in files.items() if name not in replaced}
 
 
 def _link_names(delivered: dict[str, bytes]) -> dict[str, str]:

@@ -17,6 +17,7 @@ from triaxcal.model.methods.imu import ImuCompensation
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.unit.adc import Adc
+from triaxcal.unit.arithmetic import PORTABLE
 from triaxcal.unit.prefix import DEFAULT_PREFIX
 from triaxcal.unit.thermometer import TemperatureSensor
 
@@ -37,6 +38,7 @@ class TriadDescription:
     temperature_sensor: TemperatureSensor
     output_q: int
     prefix: str = DEFAULT_PREFIX
+    arithmetic: str = PORTABLE
 
 
 def make_gyro_plan(imu: ImuCompensation, unit: Triad, accel_q: int) -> Plan:

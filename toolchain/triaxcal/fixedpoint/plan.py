@@ -29,6 +29,7 @@ from triaxcal.model.methods.compensation import Compensation
 from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unit.adc import Adc
+from triaxcal.unit.arithmetic import PORTABLE
 from triaxcal.unit.prefix import DEFAULT_PREFIX
 from triaxcal.unit.thermometer import TemperatureSensor
 
@@ -70,6 +71,8 @@ class Plan:
         The term in dT/dt.
     prefix : str
         What the names in its C begin with.
+    arithmetic : str
+        One of `ARITHMETICS`: which form of the routine is delivered beside the portable one.
     reading : str
         Unit of the readings, which the names of variables call volts.
     """
@@ -87,6 +90,7 @@ class Plan:
     force_q: int = 0
     rate: RatePlan | None = None
     prefix: str = DEFAULT_PREFIX
+    arithmetic: str = PORTABLE
     reading: str = "V"
 
     @property
@@ -135,6 +139,10 @@ class Triad(Protocol):
         """Result's LSB is 2^-output_q."""
 
     @property
+    def arithmetic(self) -> str:
+        """Which form of the routine is asked for."""
+
+    @property
     def prefix(self) -> str:
         """What the names in the C of the unit begin with."""
 
@@ -181,7 +189,16 @@ def triad_plan(compensation: Compensation, unit: Triad, *, gyro: bool) -> Plan:
         rate=compensation.terms.rate is not None,
         gyro=gyro,
     )
-    plan = Plan(shape, low, high, tuple(frames), real, volts_per_lsb, prefix=unit.prefix)
+    plan = Plan(
+        shape,
+        low,
+        high,
+        tuple(frames),
+        real,
+        volts_per_lsb,
+        prefix=unit.prefix,
+        arithmetic=unit.arithmetic,
+    )
     terms = compensation.terms
     room = np.zeros(3)
     if terms.rate is not None:

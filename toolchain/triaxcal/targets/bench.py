@@ -18,9 +18,9 @@ from triaxcal.targets.build import TargetError, Toolset, build, in_parallel, run
 from triaxcal.targets.cores.core import Core
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import Counts, build_plugin, measure
-from triaxcal.targets.matrix import ARITHMETIC_NAMES, LIMBS, PORTABLE, THUMB1, THUMB2
 from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, GYRO, QUADRATIC, RATE_ALONE, Case
 from triaxcal.targets.sizes import Flash, flash_of
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE, THUMB1, THUMB2
 
 OPTIMISATION = "-O2"
 """gcc -O1 does not fuse the multiply-accumulates."""
@@ -37,13 +37,13 @@ class Subject:
     """
 
     case: Case
-    arithmetic: int
+    arithmetic: str
     real: str
 
     @property
     def label(self) -> str:
         """Text for readers."""
-        kind = self.real or ARITHMETIC_NAMES[self.arithmetic]
+        kind = self.real or self.arithmetic
         return f"{self.case.name}, {kind}"
 
     @property
@@ -75,7 +75,7 @@ def subjects(cases: Sequence[Case]) -> list[Subject]:
     return [*result, Subject(cubic, PORTABLE, DOUBLE), Subject(cubic, PORTABLE, FLOAT)]
 
 
-def _has(case: Case, form: int) -> bool:
+def _has(case: Case, form: str) -> bool:
     """Whether a shape has the form; another form would stand for it."""
     given = assembly(case.plan.shape)
     return {THUMB2: given["thumb2"] > 0, THUMB1: given["thumb1"] > 0}.get(form, True)
@@ -113,14 +113,14 @@ def run_bench(
         return in_parallel(jobs, progress)
 
 
-def _meant_for(arithmetic: int, core: Core) -> bool:
+def _meant_for(arithmetic: str, core: Core) -> bool:
     if arithmetic in (LIMBS, THUMB1):
         return core.no_long_multiply
     return arithmetic != THUMB2 or core.thumb2_multiply
 
 
-def best_form(core: Core) -> int:
-    """The value of TRIAX_ARITHMETIC that is fastest on a core."""
+def best_form(core: Core) -> str:
+    """The arithmetic that is fastest on a core."""
     if core.no_long_multiply:
         return THUMB1
     return THUMB2 if core.thumb2_multiply else PORTABLE
@@ -157,7 +157,7 @@ def cost_of(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
 def _write_subject(subject: Subject, work: Path) -> tuple[list[Path], list[Path], tuple[str, ...]]:
     """Sources, include folders and macros of a subject."""
     target = shipped("firmware_ref") / "target"
-    case = subject.case
+    case = subject.case.in_form(subject.arithmetic)
     work.mkdir(parents=True)
     (work / "bench_case.h").write_text(case_header(case.plan))
     if subject.real:

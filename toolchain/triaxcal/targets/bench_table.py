@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
 from triaxcal.targets.bench import DOUBLE, FLOAT, OPTIMISATION, SIZE_OPTIMISATION, Cost
-from triaxcal.targets.matrix import ARITHMETIC_NAMES
 from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT
 
 FORMAT = 1
@@ -75,7 +74,7 @@ def _ratios(costs: Sequence[Cost]) -> list[str]:
             best = min(ours, key=_both)
             both = _both(best)
             lines.append(
-                f"| {core} | {codes} | {ARITHMETIC_NAMES[best.subject.arithmetic]} | {both:.0f} "
+                f"| {core} | {codes} | {best.subject.arithmetic} | {both:.0f} "
                 f"| {base[DOUBLE]:.0f}, {base[DOUBLE] / both:.1f} times "
                 f"| {base[FLOAT]:.0f}, {base[FLOAT] / both:.1f} times |"
             )
@@ -92,7 +91,7 @@ def bench_json(costs: Sequence[Cost], compilers: Sequence[str]) -> str:
     rows = [
         {
             "shape": c.subject.case.name,
-            "form": c.subject.real or ARITHMETIC_NAMES[c.subject.arithmetic],
+            "form": c.subject.real or c.subject.arithmetic,
             "core": c.core.name,
             "counts": None if c.counts is None else dataclasses.asdict(c.counts),
             "flash": None if c.flash is None else dataclasses.asdict(c.flash),

@@ -13,6 +13,7 @@ from typing import TypeVar
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import WARNINGS
 from triaxcal.targets.cores.core import Core
+from triaxcal.unit.arithmetic import PORTABLE
 
 T = TypeVar("T")
 RUN_SECONDS = 600.0
@@ -33,8 +34,8 @@ class Toolset:
         "gcc" or "clang".
     optimisation : str
         As "-O2".
-    arithmetic : int
-        TRIAX_ARITHMETIC of the generated routine.
+    arithmetic : str
+        That of the generated routine: it says which of its files are compiled.
     defines : tuple of str
         More macros, as "-DNAME=value".
     """
@@ -42,7 +43,7 @@ class Toolset:
     core: Core
     compiler: str
     optimisation: str
-    arithmetic: int = 0
+    arithmetic: str = PORTABLE
     defines: tuple[str, ...] = ()
 
     def command(self) -> list[str]:
@@ -55,8 +56,7 @@ class Toolset:
         return [
             *driver, *core.flags, *WARNINGS, *hosted, self.optimisation,
             "-ffunction-sections", "-fdata-sections",
-            f"-DTRIAX_ARITHMETIC={self.arithmetic}", "-DTRIAX_REF_MAX_SEGMENTS=8",
-            f"-DCASE_VECTORS={core.vectors}u", *self.defines,
+            "-DTRIAX_REF_MAX_SEGMENTS=8", f"-DCASE_VECTORS={core.vectors}u", *self.defines,
         ]  # fmt: skip
 
 

@@ -17,10 +17,7 @@ from triaxcal.targets.cores.core import COMPILERS
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.shapes import CUBIC, Case
 from triaxcal.targets.vectors import case_header, expected_lines
-
-PORTABLE, LIMBS, THUMB2, THUMB1 = 0, 1, 2, 3
-ARITHMETIC_NAMES = ("portable", "limbs", "thumb2", "thumb1")
-"""Values of TRIAX_ARITHMETIC."""
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE, THUMB1, THUMB2
 
 OPTIMISATIONS = ("-O0", "-O1", "-O2", "-O3", "-Os")
 EVERY_WAY = tuple((c, o) for c in COMPILERS for o in OPTIMISATIONS)
@@ -38,10 +35,7 @@ class Build:
     def label(self) -> str:
         """Text for readers."""
         t = self.toolset
-        return (
-            f"{self.case.name}, {t.core.label}, {t.compiler} {t.optimisation}, "
-            f"{ARITHMETIC_NAMES[t.arithmetic]}"
-        )
+        return f"{self.case.name}, {t.core.label}, {t.compiler} {t.optimisation}, {t.arithmetic}"
 
 
 @dataclass(frozen=True)
@@ -99,7 +93,7 @@ def run_builds(
             partial(
                 _outcome,
                 b,
-                sources[b.case.name],
+                sources[b.case.name, b.toolset.arithmetic],
                 expected[b.case.name, b.toolset.core.vectors],
                 work / f"build-{i}",
             )
@@ -108,16 +102,17 @@ def run_builds(
         return in_parallel(jobs, lambda outcome: progress(outcome, next(done)))
 
 
-def _write_cases(builds: Sequence[Build], work: Path) -> dict[str, Path]:
-    """Folder of each shape."""
-    written: dict[str, Path] = {}
-    for case in {b.case.name: b.case for b in builds}.values():
+def _write_cases(builds: Sequence[Build], work: Path) -> dict[tuple[str, str], Path]:
+    """Folder of each shape in each arithmetic."""
+    written: dict[tuple[str, str], Path] = {}
+    wanted = {(b.case.name, b.toolset.arithmetic): b.case for b in builds}
+    for (name, arithmetic), case in wanted.items():
         folder = work / f"case-{len(written)}"
         folder.mkdir()
-        for name, text in case.files.items():
-            (folder / name).write_text(text)
+        for file, text in case.in_form(arithmetic).files.items():
+            (folder / file).write_text(text)
         (folder / "target_case.h").write_text(case_header(case))
-        written[case.name] = folder
+        written[name, arithmetic] = folder
     return written
 
 
@@ -134,8 +129,9 @@ def _outcome(planned: Build, folder: Path, expected: dict[str, int], place: Path
         detail = f"{', '.join(missing)} not found: {install_advice(missing)}"
         return Outcome(planned, NOT_DONE, detail)
     firmware = shipped("firmware_ref")
+    case = planned.case.in_form(toolset.arithmetic)
     sources = [
-        *(folder / name for name in (*planned.case.sources, planned.case.selftest)),
+        *(folder / name for name in (*case.sources, case.selftest)),
         firmware / "triax_ref.c",
         firmware / "triax_ref_image.c",
         firmware / "target" / "test_main.c",

@@ -11,7 +11,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.names import Names, names_of
-from triaxcal.codegen.render import render_routine
+from triaxcal.codegen.render import arithmetic_of, render_routine, routine_file
 from triaxcal.codegen.selftest import render_selftest
 from triaxcal.delivery.firmware import compensation_of
 from triaxcal.delivery.inputs import inputs_sha256
@@ -45,10 +45,18 @@ class Case:
     files: dict[str, str]
     image: bytes
 
+    def in_form(self, arithmetic: str) -> Case:
+        """The same with the files of another arithmetic."""
+        if arithmetic == self.plan.arithmetic:
+            return self
+        plan = replace(self.plan, arithmetic=arithmetic)
+        return replace(self, plan=plan, files=self.files | render_routine(plan))
+
     @property
     def sources(self) -> list[str]:
         """Names of the C files that a firmware needs, the routine first."""
-        return [self.names.file(name) for name in ("triax_comp.c", "triax_calib.c")]
+        routine = routine_file(self.plan, arithmetic_of(self.plan))
+        return [routine, self.names.file("triax_calib.c")]
 
     @property
     def selftest(self) -> str:

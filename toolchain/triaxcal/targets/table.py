@@ -10,7 +10,6 @@ from triaxcal.base.screentext import table
 from triaxcal.targets.cores.core import COMPILERS, VECTORS
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.matrix import (
-    ARITHMETIC_NAMES,
     FAILED,
     NOT_DONE,
     PASSED,
@@ -36,7 +35,7 @@ def matrix_table(outcomes: Sequence[Outcome]) -> str:
             if o.build.case.name == shape and o.build.toolset.arithmetic == arithmetic
         ]  # fmt: skip
         cells = [_cell([o for o in row if o.build.toolset.core is core]) for core in CORES]
-        rows.append([shape, ARITHMETIC_NAMES[arithmetic], *cells])
+        rows.append([shape, arithmetic, *cells])
     head = ["shape", "arithmetic", *names]
     return "\n".join([*table(head, rows, left=(0, 1)), "", *_summary(outcomes)])
 
@@ -78,7 +77,7 @@ def matrix_json(outcomes: Sequence[Outcome]) -> str:
                 "core": o.build.toolset.core.label,
                 "compiler": o.build.toolset.compiler,
                 "optimisation": o.build.toolset.optimisation,
-                "arithmetic": ARITHMETIC_NAMES[o.build.toolset.arithmetic],
+                "arithmetic": o.build.toolset.arithmetic,
                 "vectors": o.build.toolset.core.vectors,
                 "status": o.status,
                 "detail": o.detail,

@@ -13,6 +13,7 @@ from triaxcal.base.keys import DESCRIPTION, FileKeys, TableKeys, Values, many_of
 from triaxcal.base.tomltable import content_of, shown, text_of, toml_document
 from triaxcal.unit.adc import ADC, RECORDED_ADC, Adc, adc_of, recorded_adc
 from triaxcal.unit.angles import AnglesChoice, angles_choice
+from triaxcal.unit.arithmetic import PORTABLE
 from triaxcal.unit.certificate import CERTIFICATE, CertificateDetails, certificate_details
 from triaxcal.unit.choices import FIT, SENSOR, Compensation, Fit, Sensor, compensation_table
 from triaxcal.unit.equipment import (
@@ -126,6 +127,8 @@ class UnitDescription:
         Stated vibrations by name.
     languages : tuple of str
         Codes of the languages of the passport.
+    arithmetic : str
+        How the C forms its products, one of `ARITHMETICS`.
     source : str
         Path of its unit.toml, for messages.
     toml : str
@@ -157,6 +160,7 @@ class UnitDescription:
     firmware_terms: str = AUTO
     prefix: str = DEFAULT_PREFIX
     angles: AnglesChoice | None = None
+    arithmetic: str = PORTABLE
 
     @property
     def reading_unit(self) -> str:
@@ -254,6 +258,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         angles=angles_choice(
             firmware.angles, firmware.rest_within_g, firmware.second_angle_from_deg
         ),
+        arithmetic=firmware.arithmetic,
         nominal_v_per_g=sensor.nominal_v_per_g,
         nominal_tolerance=sensor.nominal_tolerance,
         gravity_difference_m_per_s2=gravity_difference_m_per_s2(site),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from triaxcal.base.keys import TableKeys, setting
 from triaxcal.base.kinds import number, word
 from triaxcal.unit.angles import ANGLES, NONE, REST_WITHIN_G, SECOND_FROM_DEG
+from triaxcal.unit.arithmetic import ARITHMETIC, PORTABLE
 from triaxcal.unit.prefix import DEFAULT_PREFIX, PREFIX
 
 AUTO, LINEAR, OWN_SQUARES, QUADRATIC_TERMS = "auto", "linear", "own-squares", "quadratic"
@@ -66,6 +67,11 @@ class FirmwareChoice:
     second_angle_from_deg
         Of triax_angles: tool face, or roll, is flagged as poor where its axis is nearer to the
         plumb line than this.
+    arithmetic
+        How the C forms its products. Another one than portable gives a second file, as
+        triax_comp_thumb2.c, which is compiled in place of triax_comp.c and gives the same bits.
+        limbs: 32-bit products of halves. thumb2: assembly for Cortex-M3, M4, M7, M33. thumb1:
+        assembly for Cortex-M0, M0+, M1.
     """
 
     terms: str = setting(word(FIRMWARE_TERMS), AUTO)
@@ -73,6 +79,7 @@ class FirmwareChoice:
     angles: str = setting(word(ANGLES), NONE)
     rest_within_g: float = setting(number(1e-4, 0.9), REST_WITHIN_G, "g")
     second_angle_from_deg: float = setting(number(1e-3, 45.0), SECOND_FROM_DEG, "deg")
+    arithmetic: str = setting(ARITHMETIC, PORTABLE)
 
 
 PRIORS, FIRMWARE = TableKeys.of(Priors), TableKeys.of(FirmwareChoice)

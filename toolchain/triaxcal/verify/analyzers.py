@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from triaxcal.codegen.names import names_of
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.rows import rows_of
 from triaxcal.verify.tools import Answer, run
-from triaxcal.verify.workspace import CONSTANTS, FORMS, IMAGE, ROUTINE, SHIM, Workspace
+from triaxcal.verify.workspace import CONSTANTS, IMAGE, SHIM, Workspace
 
 GCC, CLANG = TOOLS["gcc"], TOOLS["clang"]
 MEANT_WRAPS = Path(__file__).with_name("meant_unsigned_wraps.txt")
@@ -58,15 +59,15 @@ SANITIZERS = (
 
 def check_gcc_analyzer(work: Workspace) -> Outcome:
     """gcc -fanalyzer with every warning an error, on both forms."""
-    return analyse_with_gcc(work.folder, work.named(ROUTINE))
+    return analyse_with_gcc(work.folder, work.forms)
 
 
-def analyse_with_gcc(folder: Path, routine: str) -> Outcome:
-    """The same for a file of a folder."""
+def analyse_with_gcc(folder: Path, forms: Mapping[str, str]) -> Outcome:
+    """The same for files of a folder, by the name of the form."""
     complaints: list[str] = []
     good = True
-    for name, form in FORMS.items():
-        flags = [*FLAGS, *form, "-fanalyzer", "-c", "-o", f"verify_analyzer_{name}.o"]
+    for name, routine in forms.items():
+        flags = [*FLAGS, "-fanalyzer", "-c", "-o", f"verify_analyzer_{name}.o"]
         answer = run([GCC.find(), *flags, routine], folder)
         complaints += complaints_of(answer)
         good = good and answer.code == 0
@@ -96,7 +97,7 @@ def check_sanitizer(work: Workspace, sanitizer: Sanitizer) -> Outcome:
     subject = Subject(
         work.folder,
         work.render(f"verify_{sanitizer.key}.c", "verify/driver.c.j2", {"triad": names.triad}),
-        (work.named(ROUTINE), work.named(CONSTANTS), str(batch)),
+        {form: (file, work.named(CONSTANTS), str(batch)) for form, file in work.forms.items()},
         work.named(IMAGE),
         b"".join(rows_of(work.plan, v) for v in vectors),
         _expected(work, vectors),
@@ -106,11 +107,14 @@ def check_sanitizer(work: Workspace, sanitizer: Sanitizer) -> Outcome:
 
 @dataclass(frozen=True)
 class Subject:
-    """What runs under a sanitizer: a driver and files, an image, vectors and the right answers."""
+    """What runs under a sanitizer: a driver and files, an image, vectors and the right answers.
+
+    `sources` are by the name of the form.
+    """
 
     folder: Path
     driver: Path
-    sources: tuple[str, ...]
+    sources: Mapping[str, tuple[str, ...]]
     image: str
     vectors: bytes
     answers: bytes
@@ -127,30 +131,31 @@ def run_sanitizer(sanitizer: Sanitizer, subject: Subject, count: int) -> Outcome
     _probe(subject.folder, sanitizer)
     complaints = [
         f"{name} form: {complaint}"
-        for name, form in FORMS.items()
-        for complaint in _run_form(subject, sanitizer, form)
+        for name in subject.sources
+        for complaint in _run_form(subject, sanitizer, name)
     ]
     figures = {"version": sanitizer.tool.version(), "vectors": count, "findings": len(complaints)}
     return judged(
         sanitizer.key,
         sanitizer.title,
         good=not complaints,
-        finding=f"{len(complaints)} findings on {count} vectors, constants and image, both forms",
+        finding=f"{len(complaints)} findings on {count} vectors, constants and image, "
+        f"{' and '.join(subject.sources)} form",
         figures=figures,
         details=complaints,
     )
 
 
-def _run_form(subject: Subject, sanitizer: Sanitizer, form: tuple[str, ...]) -> list[str]:
+def _run_form(subject: Subject, sanitizer: Sanitizer, form: str) -> list[str]:
     """Complaints of one form, or that its answers differ."""
     folder = subject.folder
     program = folder / f"verify_{sanitizer.key}"
     given, found = program.with_suffix(".in"), program.with_suffix(".out")
     given.write_bytes(subject.vectors)
     command = [
-        sanitizer.tool.find(), "-std=c99", "-O1", "-g", *form, *sanitizer.flags,
+        sanitizer.tool.find(), "-std=c99", "-O1", "-g", *sanitizer.flags,
         f"-I{folder}", f"-I{folder / SHIM}", f"-I{shipped('firmware_ref')}",
-        "-o", str(program), subject.driver.name, *subject.sources,
+        "-o", str(program), subject.driver.name, *subject.sources[form],
     ]  # fmt: skip
     built = run(command, folder)
     if built.code:

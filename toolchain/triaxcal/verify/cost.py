@@ -7,11 +7,11 @@ from functools import partial
 
 from triaxcal.base.tools import install_advice, missing_tools
 from triaxcal.codegen.forms import assembly
+from triaxcal.codegen.render import render_routine
 from triaxcal.targets.bench import Cost, Subject, best_form, compiler_versions, cost_of
 from triaxcal.targets.build import TargetError, in_parallel
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import build_plugin
-from triaxcal.targets.matrix import ARITHMETIC_NAMES
 from triaxcal.targets.shapes import Case
 from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
 from triaxcal.verify.tools import BrokenToolError
@@ -35,7 +35,8 @@ def check(work: Workspace) -> Outcome:
         finding = f"{', '.join(missing)} not found; {install_advice(missing)}"
         return Outcome(_KEY, _TITLE, NOT_DONE, finding)
     names = [work.named(name) for name in _FILES]
-    files = {name: (work.folder / name).read_text() for name in names}
+    files = render_routine(work.plan)
+    files |= {name: (work.folder / name).read_text() for name in names}
     case = Case("unit", "as delivered", work.plan, files, work.image)
     folder = work.folder / "cost"
     folder.mkdir(exist_ok=True)
@@ -72,7 +73,7 @@ def outcome_of(costs: list[Cost]) -> Outcome:
             promised = bool(assembly(cost.subject.case.plan.shape)["thumb1"])
             failed = failed or promised or not cost.core.no_long_multiply
         figures[cost.core.name] = {
-            "form": ARITHMETIC_NAMES[cost.subject.arithmetic],
+            "form": cost.subject.arithmetic,
             "set_temperature": [n.set.least, n.set.most],
             "apply": [n.apply.least, n.apply.most],
             "flash_bytes": {**asdict(cost.flash), "total": cost.flash.total},

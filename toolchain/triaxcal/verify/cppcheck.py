@@ -5,16 +5,19 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 from triaxcal.base.tools import TOOLS
+from triaxcal.codegen.forms import form_of
 from triaxcal.codegen.names import names_of
+from triaxcal.codegen.render import render_routine, routine_file
 from triaxcal.fixedpoint.plan import Plan
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE, THUMB1, THUMB2
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.tools import BrokenToolError, run
-from triaxcal.verify.workspace import CONSTANTS, ROUTINE, SELFTEST, Workspace
+from triaxcal.verify.workspace import CONSTANTS, SELFTEST, Workspace
 
 CPPCHECK = TOOLS["cppcheck"]
 DEVIATIONS = Path(__file__).with_name("misra_deviations.toml")
@@ -23,13 +26,8 @@ OPTIONS = (
     "--template={file}\t{line}\t{id}\t{message}", "--error-exitcode=0",
 )  # fmt: skip
 
-FORMS = (
-    ("-DTRIAX_ARITHMETIC=0",), ("-DTRIAX_ARITHMETIC=1",),
-    ("-DTRIAX_ARITHMETIC=2", "-D__thumb__", "-D__thumb2__"),
-    ("-DTRIAX_ARITHMETIC=3", "-D__thumb__"),
-)  # fmt: skip
-"""Each form alone; without them cppcheck looks at the portable one only. Thumb is claimed, or
-the assembly would be refused."""
+FORMS = {PORTABLE: (), LIMBS: (), THUMB2: ("-D__thumb__", "-D__thumb2__"), THUMB1: ("-D__thumb__",)}
+"""What is defined for each form. Thumb is claimed, or the assembly would be refused."""
 
 USER = "verify_user.c"
 _USES = """#include "{triad}_calib.h"
@@ -115,11 +113,29 @@ def find_all(work: Workspace) -> list[Finding]:
     ------
     MissingToolError, BrokenToolError
     """
-    sources = [work.named(file) for file in (ROUTINE, CONSTANTS, SELFTEST)]
-    return find_in(work.folder, sources, [work.plan])
+    findings = find_in(work.folder, _sources(work.plan, PORTABLE), [work.plan])
+    for form in sorted({form_of(work.plan.shape, form) for form in FORMS} - {PORTABLE}):
+        plan = replace(work.plan, arithmetic=form)
+        folder = work.folder / f"cppcheck_{form}"
+        folder.mkdir(exist_ok=True)
+        for path in work.folder.glob("*.[ch]"):
+            (folder / path.name).write_bytes(path.read_bytes())
+        # The assembly has a state of its own: its header is another one.
+        for name, text in render_routine(plan).items():
+            (folder / name).write_text(text)
+        found = find_in(folder, _sources(plan, form), [plan], FORMS[form])
+        findings += [f for f in found if f.file == routine_file(plan, form)]
+    return findings
 
 
-def find_in(folder: Path, sources: Sequence[str], plans: Sequence[Plan]) -> list[Finding]:
+def _sources(plan: Plan, form: str) -> list[str]:
+    names = names_of(plan)
+    return [routine_file(plan, form), *(names.file(file) for file in (CONSTANTS, SELFTEST))]
+
+
+def find_in(
+    folder: Path, sources: Sequence[str], plans: Sequence[Plan], defines: Sequence[str] = ()
+) -> list[Finding]:
     """Every complaint about C files of a folder, which a firmware uses from a file of its own.
 
     Raises
@@ -127,14 +143,11 @@ def find_in(folder: Path, sources: Sequence[str], plans: Sequence[Plan]) -> list
     MissingToolError, BrokenToolError
     """
     (folder / USER).write_text("".join(_USES.format(**names_of(plan).context) for plan in plans))
-    lines: dict[str, None] = {}
-    for form in FORMS:
-        answer = run([CPPCHECK.find(), *OPTIONS, *form, *sources, USER], folder)
-        if answer.code:
-            raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
-        lines |= dict.fromkeys(answer.text.splitlines())
+    answer = run([CPPCHECK.find(), *OPTIONS, *defines, *sources, USER], folder)
+    if answer.code:
+        raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
     findings = []
-    for line in lines:
+    for line in dict.fromkeys(answer.text.splitlines()):
         file, number, identity, text = [*line.split("\t", 3), "", "", ""][:4]
         if not number.isdigit():
             raise BrokenToolError(f"cppcheck: {line[:200]}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +17,10 @@ from triaxcal.base.shipped import shipped
 from triaxcal.codegen.identity import IDENTITY_SIZE
 from triaxcal.codegen.imu import IMU_FILES, IMU_IMAGE_FILE, ImuBuild, imu_answers, imu_vectors
 from triaxcal.codegen.names import names_of
+from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.shim import write_shim
 from triaxcal.codegen.templates import environment
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE
 from triaxcal.verify import analyzers, cppcheck, eva
 from triaxcal.verify.campaign import delivery_outcomes, guarded, verify_work
 from triaxcal.verify.image_reader import image_length
@@ -26,12 +28,11 @@ from triaxcal.verify.outcome import Outcome
 from triaxcal.verify.workspace import (
     CONSTANTS,
     IMAGE,
-    LIMBS,
-    PORTABLE,
     ROUTINE,
     SELFTEST,
     SHIM,
     Workspace,
+    host_forms,
 )
 
 ACCELEROMETER, GYRO, BOTH = "accelerometer", "gyro", "both_triads"
@@ -51,6 +52,10 @@ class Both:
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in build.files.items():
             (folder / name).write_bytes(content)
+        for plan in (build.accel, build.gyro):
+            texts = render_routine(replace(plan, arithmetic=LIMBS))
+            for name in host_forms(plan).values():
+                (folder / name).write_text(texts[name])
         write_shim(folder / SHIM, build.accel.prefix)
         return cls(folder, build)
 
@@ -64,9 +69,14 @@ class Both:
     @property
     def sources(self) -> tuple[str, ...]:
         """Names of the C files, that of both triads first."""
-        triads = [names_of(self.build.accel), names_of(self.build.gyro)]
-        own = triads[0].file("triax_imu.c")
-        return own, *(names.file(name) for names in triads for name in (ROUTINE, CONSTANTS))
+        return self.sources_in(PORTABLE)
+
+    def sources_in(self, form: str) -> tuple[str, ...]:
+        """The same with the routines in a form, where their shape has it."""
+        plans = self.build.accel, self.build.gyro
+        own = names_of(plans[0]).file("triax_imu.c")
+        routines = [host_forms(plan).get(form, names_of(plan).file(ROUTINE)) for plan in plans]
+        return own, *routines, *(names_of(plan).file(CONSTANTS) for plan in plans)
 
     @property
     def selftests(self) -> tuple[str, ...]:
@@ -114,10 +124,10 @@ def _verify_both(folder: Path, build: ImuBuild) -> tuple[Outcome, ...]:
         return tuple(pool.map(lambda c: guarded(c[0], c[1], lambda: c[2](work)), CHECKS))
 
 
-def _eva(work: Both, key: str, title: str, entry: str, form: tuple[str, ...]) -> Outcome:
+def _eva(work: Both, key: str, title: str, entry: str, form: str) -> Outcome:
     driver = work.render(f"{key}_{_DRIVER}", "verify/eva_imu.c.j2", _ranges(work.build))
     ends = {entry, "sample" if entry == "verify_imu_codes" else "accepted"}
-    asked = eva.Analysis(key, title, entry, ends, (*work.sources, driver.name), form)
+    asked = eva.Analysis(key, title, entry, ends, (*work.sources_in(form), driver.name))
     return eva.analyse(work.folder, asked)
 
 
@@ -146,7 +156,10 @@ def _sanitizer(work: Both, sanitizer: analyzers.Sanitizer) -> Outcome:
     subject = analyzers.Subject(
         work.folder,
         work.render(f"verify_{sanitizer.key}.c", "verify/driver_imu.c.j2", {}),
-        (*work.sources, str(shipped("firmware_ref") / "triax_imu_batch.c")),
+        {
+            form: (*work.sources_in(form), str(shipped("firmware_ref") / "triax_imu_batch.c"))
+            for form in (PORTABLE, LIMBS)
+        },
         names_of(build.accel).file(IMU_IMAGE_FILE),
         np.column_stack([temp, raw_accel, raw_gyro]).astype(np.int32).tobytes(),
         answers * 2,
@@ -167,7 +180,7 @@ CHECKS: tuple[tuple[str, str, Callable[[Both], Outcome]], ...] = (
     (
         "gcc_analyzer",
         "gcc -fanalyzer",
-        lambda w: analyzers.analyse_with_gcc(w.folder, w.sources[0]),
+        lambda w: analyzers.analyse_with_gcc(w.folder, {PORTABLE: w.sources[0]}),
     ),
     *(
         (sanitizer.key, sanitizer.title, lambda w, s=sanitizer: _sanitizer(w, s))

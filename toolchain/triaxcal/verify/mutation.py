@@ -21,24 +21,27 @@ from pathlib import Path
 from triaxcal.codegen.compiler import FLAGS as DELIVERY_FLAGS
 from triaxcal.codegen.names import Names, names_of
 from triaxcal.codegen.templates import environment
+from triaxcal.unit.arithmetic import LIMBS
 from triaxcal.verify.analyzers import GCC, SANITIZERS
 from triaxcal.verify.c_mutants import Mutant, mutants_of
 from triaxcal.verify.mutation_inputs import write_images, write_vectors
 from triaxcal.verify.tools import BrokenToolError, run
-from triaxcal.verify.workspace import CONSTANTS, FORMS, HEADERS, IMAGE, ROUTINE, Workspace
+from triaxcal.verify.workspace import CONSTANTS, HEADERS, IMAGE, ROUTINE, Workspace
 
 EQUIVALENTS = Path(__file__).with_name("equivalent_mutants.toml")
 KILLED = "killed by the vectors"
 BY_SANITIZER = "killed under sanitizers"
 BY_COMPILER = "refused by the compiler's warnings"
 EQUIVALENT = "equivalent"
-ELSEWHERE = "for another core"
 STILLBORN = "does not compile"
 SURVIVED = "survived"
-FATES = (KILLED, BY_SANITIZER, BY_COMPILER, EQUIVALENT, ELSEWHERE, STILLBORN, SURVIVED)
+FATES = (KILLED, BY_SANITIZER, BY_COMPILER, EQUIVALENT, STILLBORN, SURVIVED)
 FLAGS = ("-std=c99", "-O1", "-fwrapv", "-w", "-DCPU_SECONDS=5")
 SANITIZED = ("-std=c99", "-O1", "-w", "-g", *SANITIZERS[0].flags, "-DCPU_SECONDS=60")
 """-fwrapv: what a mutant does shall not depend on what the compiler makes of an overflow."""
+
+LIMBS_ROUTINE = "triax_comp_limbs.c"
+ROUTINES = (ROUTINE, LIMBS_ROUTINE)
 
 _INTEGER = re.compile(r"^ +(\(-2147483647 - 1\)|-?\d+), /\*", re.MULTILINE)
 
@@ -118,25 +121,22 @@ class Bench:
         write_vectors(work.plan, self.vectors, self.answers)
         write_images(work, self.images)
 
-    def survives(self, folder: Path, flags: Sequence[str] = FLAGS) -> bool | None:
-        """Run what is in `folder`, changed or not, in both forms; None when it does not compile."""
-        fates = []
-        for form in FORMS.values():
-            fates.append(self._survives(folder, [*flags, *form], None))
-            if fates[-1] is False:
-                return False
-        # What does not compile in one form is not seen by the others.
-        return None if None in fates else True
+    def survives(
+        self,
+        folder: Path,
+        flags: Sequence[str] = FLAGS,
+        file: str = ROUTINE,
+        image: Path | None = None,
+    ) -> bool | None:
+        """Run what is in `folder`, changed or not; None when it does not compile.
 
-    def survives_image(self, folder: Path, image: Path) -> bool | None:
-        """The same for an image, of which the form is no matter."""
-        return self._survives(folder, FLAGS, image)
-
-    def _survives(self, folder: Path, flags: Sequence[str], image: Path | None) -> bool | None:
+        `file` is that of the routine's form, where it is one, by the name of an accelerometer's.
+        """
+        routine = file if file in ROUTINES else ROUTINE
         program = folder / "mutant"
         command = [
             GCC.find(), *flags, f"-I{folder}", "-o", str(program),
-            str(self.harness), *(str(folder / self.work.named(f)) for f in (ROUTINE, CONSTANTS)),
+            str(self.harness), *(str(folder / self.work.named(f)) for f in (routine, CONSTANTS)),
         ]  # fmt: skip
         if run(command, folder).code:
             return None
@@ -146,31 +146,30 @@ class Bench:
             raise BrokenToolError("the harness of the mutants was called wrongly")
         return code == 0
 
-    def is_seen(self, folder: Path) -> bool:
-        """Whether a change reaches this host's compiler: assembly for another core does not."""
-        routine = self.work.named(ROUTINE)
-        return any(
-            _preprocessed(folder, form, routine) != _preprocessed(self.work.folder, form, routine)
-            for form in FORMS.values()
-        )
-
 
 def _is_clean(folder: Path, routine: str) -> bool:
     """Whether the delivery would compile it: there every warning is an error."""
-    return not any(
-        run([GCC.find(), *DELIVERY_FLAGS, *form, "-c", "-o", "/dev/null", routine], folder).code
-        for form in FORMS.values()
-    )
-
-
-def _preprocessed(folder: Path, form: Sequence[str], routine: str) -> str:
-    return run([GCC.find(), "-E", "-P", *form, routine], folder).text
+    command = [GCC.find(), *DELIVERY_FLAGS, "-c", "-o", "/dev/null", routine]
+    return not run(command, folder).code
 
 
 def c_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
     """Mutants of triax_comp.c, each `every`-th."""
     source = (bench.work.folder / bench.work.named(ROUTINE)).read_text()
     return judge_all(bench, mutants_of(source)[::every], ROUTINE)
+
+
+def limbs_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
+    """Mutants of the functions of triax_comp_limbs.c that triax_comp.c does not have."""
+    if LIMBS not in bench.work.forms:
+        return []
+    source = (bench.work.folder / bench.work.forms[LIMBS]).read_text()
+    known = {
+        (m.function, m.before, m.after)
+        for m in mutants_of((bench.work.folder / bench.work.named(ROUTINE)).read_text())
+    }
+    own = [m for m in mutants_of(source) if (m.function, m.before, m.after) not in known]
+    return judge_all(bench, own[::every], LIMBS_ROUTINE)
 
 
 def constants_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
@@ -202,7 +201,7 @@ def image_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
             path = folder / "changed.bin"
             path.write_bytes(payload + struct.pack("<I", zlib.crc32(payload)))
             mutant = Mutant(IMAGE, at, str(word), str(other), "")
-            fate = SURVIVED if bench.survives_image(folder, path) else KILLED
+            fate = SURVIVED if bench.survives(folder, image=path) else KILLED
             verdicts.append(Verdict(mutant, fate))
     return verdicts
 
@@ -216,18 +215,16 @@ def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
         folder = bench.work.folder / f"mutant_{file}_{number}"
         _fill(folder, bench.work)
         (folder / bench.work.named(file)).write_text(mutant.source)
-        survives = bench.survives(folder)
+        survives = bench.survives(folder, file=file)
         if survives is None:
             fate = STILLBORN
         elif not survives:
             fate = KILLED
         elif any(e.covers(mutant, bench.shape) for e in equivalents):
             fate = EQUIVALENT
-        elif file == ROUTINE and not bench.is_seen(folder):
-            fate = ELSEWHERE
-        elif not bench.survives(folder, SANITIZED):
+        elif not bench.survives(folder, SANITIZED, file):
             fate = BY_SANITIZER
-        elif file == ROUTINE and not _is_clean(folder, bench.work.named(ROUTINE)):
+        elif file in ROUTINES and not _is_clean(folder, bench.work.named(file)):
             fate = BY_COMPILER
         else:
             fate = SURVIVED
@@ -242,14 +239,15 @@ def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
 
 def _fill(folder: Path, work: Workspace) -> None:
     folder.mkdir(exist_ok=True)
-    for name in map(work.named, (ROUTINE, CONSTANTS, *HEADERS)):
+    for name in (*work.forms.values(), *map(work.named, (CONSTANTS, *HEADERS))):
         (folder / name).write_bytes((work.folder / name).read_bytes())
 
 
 Campaign = Callable[[Bench, int], list[Verdict]]
 
 CAMPAIGNS: Mapping[str, Campaign] = {
-    "triax_comp.c": c_campaign,
+    ROUTINE: c_campaign,
+    LIMBS_ROUTINE: limbs_campaign,
     "triax_calib.c": constants_campaign,
     "triax_calib.bin": image_campaign,
 }

@@ -10,7 +10,7 @@ from pathlib import Path
 from triaxcal.verify.analyzers import GCC
 from triaxcal.verify.mutation import FLAGS, SANITIZED, Bench
 from triaxcal.verify.tools import BrokenToolError, run
-from triaxcal.verify.workspace import CONSTANTS, FORMS, ROUTINE, SELFTEST, Workspace
+from triaxcal.verify.workspace import CONSTANTS, ROUTINE, SELFTEST, Workspace
 
 
 class SelftestBench(Bench):
@@ -24,9 +24,7 @@ class SelftestBench(Bench):
         files = [source, *(work.folder / work.named(name) for name in (SELFTEST, CONSTANTS))]
         self.objects: dict[tuple[str, ...], list[str]] = {}
         for flags in (FLAGS, SANITIZED):
-            for form in FORMS.values():
-                key = (*flags, *form)
-                self.objects[key] = [self._object(file, key) for file in files]
+            self.objects[flags] = [self._object(file, flags) for file in files]
 
     def _object(self, source: Path, flags: tuple[str, ...]) -> str:
         made = source.with_name(f"{source.stem}_{zlib.crc32(repr(flags).encode()):08x}.o")
@@ -36,8 +34,15 @@ class SelftestBench(Bench):
             raise BrokenToolError(answer.text)
         return str(made)
 
-    def _survives(self, folder: Path, flags: Sequence[str], image: Path | None) -> bool | None:
-        del image
+    def survives(
+        self,
+        folder: Path,
+        flags: Sequence[str] = FLAGS,
+        file: str = ROUTINE,
+        image: Path | None = None,
+    ) -> bool | None:
+        """As of `Bench`; the image and the form are no matter."""
+        del file, image
         program = folder / "mutant"
         routine = str(folder / self.work.named(ROUTINE))
         others = self.objects[tuple(flags)]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from triaxcal.codegen.forms import form_of
 from triaxcal.codegen.names import names_of
+from triaxcal.codegen.render import render_routine, routine_file
 from triaxcal.codegen.shim import write_shim
 from triaxcal.codegen.templates import environment
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE
 from triaxcal.verify.image_reader import image_length
 
 ROUTINE = "triax_comp.c"
@@ -19,17 +22,19 @@ CONSTANTS = "triax_calib.c"
 SELFTEST = "triax_selftest.c"
 HEADERS = ("triax_comp.h", "triax_calib.h")
 IMAGE = "triax_calib.bin"
-PORTABLE: tuple[str, ...] = ()
-LIMBS: tuple[str, ...] = ("-DTRIAX_ARITHMETIC=1",)
 SHIM = "names"
 """Folder of headers of the default names, where the unit has a prefix."""
-FORMS = {"portable": PORTABLE, "limbs": LIMBS}
-"""Flags of the forms of the routine that a host can run; the assembly form needs its core."""
+
+
+def host_forms(plan: Plan) -> dict[str, str]:
+    """Forms of the routine that a host can run, each with its C file; assembly needs its core."""
+    forms = dict.fromkeys((PORTABLE, form_of(plan.shape, LIMBS)))
+    return {form: routine_file(plan, form) for form in forms}
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """Delivered files on disk.
+    """Delivered files on disk, and the routine in limbs where the shape has that form.
 
     Attributes
     ----------
@@ -50,6 +55,10 @@ class Workspace:
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
             (folder / name).write_bytes(content)
+        texts = render_routine(replace(plan, arithmetic=LIMBS))
+        for name in host_forms(plan).values():
+            if name not in files:
+                (folder / name).write_text(texts[name])
         write_shim(folder / SHIM, plan.prefix)
         return cls(folder, plan, bound)
 
@@ -58,6 +67,11 @@ class Workspace:
         """The delivered constants, without the identity behind them."""
         content = (self.folder / self.named(IMAGE)).read_bytes()
         return content[: image_length(content)]
+
+    @property
+    def forms(self) -> dict[str, str]:
+        """Forms of the routine that a host can run, each with its C file."""
+        return host_forms(self.plan)
 
     def named(self, name: str) -> str:
         """Name of a file of the triad that is verified, from an accelerometer's."""
