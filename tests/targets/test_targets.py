@@ -278,7 +278,7 @@ def known_program(tmp_path: Path, rounds: str) -> Path:
     text = (target / "bench_main.c").read_text()
     assert "{1, 10, 100, 1000}" in text
     main.write_text(text.replace("{1, 10, 100, 1000}", rounds))
-    harness = [main, target / "bench_call.c", target / "bench_known.S"]
+    harness = [main, *(target / f"bench_{n}" for n in ("call.c", "stack.c", "known.S"))]
     program = tmp_path / "program.elf"
     build(Toolset(M3, "gcc", "-O2"), [*sources, *harness], include, program)
     return program

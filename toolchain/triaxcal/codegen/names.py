@@ -12,7 +12,7 @@ from triaxcal.unit.prefix import DEFAULT_PREFIX
 
 @dataclass(frozen=True)
 class Names:
-    """Names in the C of a triad; status bits and TRIAX_ARITHMETIC are common to all.
+    """Names in the C of a triad; status bits are common to all.
 
     Attributes
     ----------

@@ -143,7 +143,7 @@ def cost_of(subject: Subject, core: Core, work: Path, plugin: Path) -> Cost:
         sources, include, defines = _write_subject(subject, work)
         toolset = Toolset(core, "gcc", OPTIMISATION, subject.arithmetic, defines)
         target = shipped("firmware_ref") / "target"
-        harness = [target / f"bench_{n}" for n in ("main.c", "call.c", "known.S")]
+        harness = [target / f"bench_{n}" for n in ("main.c", "call.c", "stack.c", "known.S")]
         program = work / "fast" / "program.elf"
         build(toolset, [*sources, *harness], include, program)
         counts = measure(core, program, plugin)
