@@ -44,6 +44,7 @@ def covered(seeds: range, count: int, truth: dict[str, float]) -> dict[str, int]
     return hits
 
 
+@pytest.mark.long
 def test_intervals_cover_the_truth() -> None:
     """12 series: at 95 %, 8 or fewer covered have a chance of 2e-3 each; the seeds are fixed."""
     for symbol, hits in covered(range(12), 8192, {"N": 30.0, "B": 8.0, "K": 0.5}).items():

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import triaxcal
-from performance_cases import T0, TEST, Campaign, truths, voltage, write_campaign
+from performance_cases import T0, TEST, UNIT, UP, Campaign, truths, voltage, write_campaign
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
 from triaxcal.delivery.fitted import Fitted
@@ -257,3 +257,51 @@ def test_hostile_names_are_escaped(fitted: tuple[Fitted, Path], tmp_path: Path) 
     assert "<b>&" not in page
     assert "<script" not in page
     assert "&lt;script&gt;x&lt;/script&gt;" in page
+
+
+@pytest.mark.long
+def test_own_squares_of_a_tilter_and_their_rectification(tmp_path: Path) -> None:
+    """A unit with squares of its own: the C removes them, the report predicts with and without."""
+    K2 = np.array([300.0, -200.0, 400.0])
+    rows = ["position,temp_degc,ux_v,uy_v,uz_v"]
+    random = np.random.default_rng(1)
+    for temp in (-40.0, 0.0, 20.0, 70.0):
+        for name, up in UP.items():
+            force = np.array(up, dtype=np.float64)
+            volts = voltage((force + K2 * 1e-6 * force**2)[None], np.array([temp]))[0]
+            volts = volts + 0.55 * 0.3e-6 * random.standard_normal(3)
+            rows.append(f"{name},{temp}," + ",".join(f"{v:.12f}" for v in volts))
+    (tmp_path / "C").mkdir()
+    (tmp_path / "C" / "measurements.csv").write_text("\n".join(rows) + "\n")
+    shaken = "\n[vibration.d]\ndirection = [1, 1, 1]\ngrms = 0.5\nsine_g = 0.8\n"
+    text = UNIT.format(seed=1).replace("bits = 32", "bits = 28") + shaken
+    (tmp_path / "C" / "unit.toml").write_text(text)
+    report = triaxcal.make_test_report(triaxcal.read_unit(tmp_path / "C")).result
+    mean_square = 0.5**2 + 0.8**2 / 2.0
+    for axis, true in zip("xyz", K2, strict=True):
+        assert report.of("own_square", axis).covers(true)
+        assert report.of("vibration_linear", axis).covers(true * mean_square / 3.0)
+        left = report.of("vibration_compensated", axis)
+        c = report.of("vibration_c", axis)
+        assert c.value is not None
+        assert left.covers(c.value)
+        # Without the squares the C would be off by more than ten times what is left.
+        assert abs(c.value) < 0.1 * abs(true) * mean_square / 3.0
+
+
+def test_jumps_several_files_and_dead_outputs(fitted: tuple[Fitted, Path], tmp_path: Path) -> None:
+    spiked = white(600)
+    spiked[300] += 1e5
+    write(tmp_path / "t.csv", EVEN, spiked)
+    report = reported(fitted[0], tmp_path, stated("rest"))
+    words = " ".join(next(c for c in report.chapters if c.key == "noise").notes)
+    assert (
+        "output x jumps by more than 8 standard deviations, 2 in all, first after sample 300"
+        in words
+    )
+    write(tmp_path / "t2.csv", EVEN, white(600))
+    two = reported(fitted[0], tmp_path, stated("rest", file="t*.csv"))
+    assert "2 files; expected one file of a test of kind rest" in two.of("noise_N").why
+    write(tmp_path / "t.csv", EVEN, 0.0 * white(600))
+    dead = reported(fitted[0], tmp_path, stated("power-on", "first_sample_s = 0"))
+    assert "output x has the same value throughout" in dead.of("warm_up_amplitude").why

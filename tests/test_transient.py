@@ -24,6 +24,7 @@ def run(seed: int, parts: list[tuple[float, float]], of: tuple[float, float, flo
     return np.asarray(values)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("of", [(25.0, 0.0, 0.0), (25.0, 6.0, 0.3)], ids=["white", "coloured"])
 def test_intervals_cover_the_truth(of: tuple[float, float, float]) -> None:
     """12 runs: at 95 %, 8 or fewer have a chance of 2e-3 each; the seeds are fixed."""

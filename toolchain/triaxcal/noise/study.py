@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.positions import AXES
 from triaxcal.model.types import FloatArray
 from triaxcal.noise.allan import CLUSTERS_MIN, AllanCurve, allan_curve
 from triaxcal.noise.coefficients import Coefficient, coefficients
 from triaxcal.noise.spectrum import spectrum
+
+_JUMP = 8.0
+"""Of a Gaussian, one step in 10^15 is so large."""
 
 
 @dataclass(frozen=True)
@@ -95,4 +100,22 @@ def study_noise(
         except RefusedError as missing:
             findings = [str(missing)]
         axes.append(AxisNoise(axis, found, curve))
-    return NoiseStudy(source, tuple(axes), step_s, duration, tuple(findings))
+    return NoiseStudy(source, tuple(axes), step_s, duration, (*_jumps(signal), *findings))
+
+
+def _jumps(signal: FloatArray) -> list[str]:
+    """Steps from one sample to the next that no noise makes."""
+    found = []
+    for k, axis in enumerate(AXES):
+        steps = np.abs(np.diff(signal[:, k]))
+        # The median of |step| is 0.6745 of its standard deviation; 0 where most repeat a code.
+        limit = _JUMP * float(np.median(steps)) / 0.6745
+        count = int((steps > limit).sum()) if limit else 0
+        if count:
+            first = int(np.argmax(steps > limit)) + 1
+            found.append(
+                f"output {axis} jumps by more than {_JUMP:g} standard deviations, {count} in all, "
+                f"first after sample {first} of the stretch: no noise does that, and the "
+                "coefficients are not to be trusted"
+            )
+    return found

@@ -23,6 +23,7 @@ from triaxcal.performance.recorded import Recorded
 from triaxcal.unit.recordedtest import StatedTest
 
 _MICRO = 1e6
+_SAMPLES_MIN = 64
 KEY, NAME, UNIT = "hysteresis", "thermal hysteresis", "micro-g"
 DEFINITION = (
     "Largest difference of heating and cooling at one temperature, over the temperatures in which "
@@ -44,17 +45,23 @@ def hysteresis_figures(
     """
     if recorded.temp_degc is None:
         raise RefusedError(f"{test.where} temperature", "missing", expected="its column")
+    if len(recorded.time_s) < _SAMPLES_MIN:
+        raise RefusedError(
+            recorded.source,
+            f"{len(recorded.time_s)} samples",
+            expected=f"{_SAMPLES_MIN} at least",
+            remedy="record longer",
+        )
     temp, rate = smoothed(recorded.samples)
     halves = half_cycles(temp)
     ways = {half.rising for half in halves}
     if len(ways) < 2:
-        found = f"the temperature stays within {np.ptp(temp):.2g} degC"
+        found = f"no half-cycle: the temperature stays within {np.ptp(temp):.2g} degC"
         if ways:
             found = "only heating" if ways == {True} else "only cooling"
-        raise RefusedError(
-            recorded.source, found, expected=f"{TURN_DEGC:g} degC at least each way",
-            remedy="record a whole cycle",
-        )  # fmt: skip
+        expected = f"{TURN_DEGC:g} degC at least from one turn to the next, each way"
+        remedy = "record a whole cycle"
+        raise RefusedError(recorded.source, found, expected=expected, remedy=remedy)
     apart = heating_less_cooling(recorded.output_g, temp, halves)
     sd = _with_slow_noise(apart, recorded, noise)
     factor = NormalDist().inv_cdf(1.0 - 0.05 / (2.0 * len(apart.degc)))

@@ -30,6 +30,7 @@ _LENGTH = 3.0
 """Time constants that a recording has to last: what is left then is 5 % of the amplitude."""
 _SAMPLES_MIN = 64
 _DRAWN = 400
+_STEADY_DEGC = 0.5
 DEFINITION = (
     "The output after switching on is fitted by a steady value and one or two exponentials, in "
     "noise that is white and a random walk. Amplitude: output at the moment of switching on less "
@@ -77,10 +78,7 @@ def power_on(test: StatedTest, runs: tuple[Recorded, ...]) -> PowerOn:
             expected="time from switching on to the first sample",
         )
     for run in runs:
-        if len(run.time_s) < _SAMPLES_MIN:
-            raise RefusedError(
-                run.source, f"{len(run.time_s)} samples", expected=f"{_SAMPLES_MIN} at least"
-            )
+        _refuse_samples(run)
     output = [_fits(run, run.output_g, first) for run in runs]
     _refuse_part(runs, output, first)
     compensated = []
@@ -89,6 +87,30 @@ def power_on(test: StatedTest, runs: tuple[Recorded, ...]) -> PowerOn:
             _fits(r, r.compensated_g, first) for r in runs if r.compensated_g is not None
         ]
     return PowerOn(test, runs, output, compensated)
+
+
+def _refuse_samples(run: Recorded) -> None:
+    if len(run.time_s) < _SAMPLES_MIN:
+        found, expected = f"{len(run.time_s)} samples", f"{_SAMPLES_MIN} at least"
+        raise RefusedError(run.source, found, expected=expected, remedy="record longer")
+    for i, axis in enumerate(AXES):
+        if run.output_g[:, i].min() == run.output_g[:, i].max():
+            raise RefusedError(
+                run.source,
+                f"output {axis} has the same value throughout",
+                expected="readings",
+                remedy="record it with more digits, or check the column",
+            )
+
+
+def temperature_notes(found: PowerOn) -> Iterator[str]:
+    """Where the temperature was not the same throughout: the output follows it."""
+    for run in found.runs:
+        if run.temp_degc is not None and np.ptp(run.temp_degc) > _STEADY_DEGC:
+            yield (
+                f"{run.source}: {run.temp_degc.min():.1f} to {run.temp_degc.max():.1f} degC; what "
+                "the output makes of it is in its transient"
+            )
 
 
 def _fits(run: Recorded, signal: FloatArray, first_s: float) -> list[Transient]:

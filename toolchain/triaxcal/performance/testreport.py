@@ -18,7 +18,7 @@ from triaxcal.performance.hysteresis import hysteresis_chapter, hysteresis_figur
 from triaxcal.performance.known import known
 from triaxcal.performance.noise import noise_chapter, noise_of
 from triaxcal.performance.nonlinear import nonlinear
-from triaxcal.performance.poweron import PowerOn, power_on, warm_up_chapter
+from triaxcal.performance.poweron import PowerOn, power_on, temperature_notes, warm_up_chapter
 from triaxcal.performance.recorded import Recorded, read_test
 from triaxcal.performance.repeatability import repeatability_chapter
 from triaxcal.performance.temperature import temperature_chapter
@@ -133,18 +133,20 @@ def make_report(
         _read(fitted, folder, kind) for kind in (POWER_ON, REST, HYSTERESIS)
     )
     noise: list[tuple[StatedTest, NoiseStudy]] = resting.each(
-        lambda test, recorded: (test, noise_of(test, recorded[0]))
+        lambda test, recorded: (test, noise_of(test, _only(test, recorded)))
     )
     first = noise[0][1] if noise else None
     on: list[PowerOn] = switched.each(power_on)
-    cycles = cycled.each(lambda test, recorded: hysteresis_figures(test, recorded[0], first))
+    cycles = cycled.each(
+        lambda test, recorded: hysteresis_figures(test, _only(test, recorded), first)
+    )
     figures = [f for cycle in cycles for f in cycle[0]]
     notes = [n for cycle in cycles for n in cycle[1]]
     drawings: list[Drawing] = [d for cycle in cycles for d in cycle[2]]
     chapters = (
         equation_chapter(done, terms),
         repeatability_chapter(calibration, on, switched.why, days),
-        warm_up_chapter(on, switched.notes if on else [], switched.why),
+        warm_up_chapter(on, _warm_up_notes(on, switched), switched.why),
         hysteresis_chapter(
             figures, [*(cycled.notes if cycles else []), *notes], drawings, cycled.why
         ),
@@ -160,6 +162,22 @@ def make_report(
         for r in recorded
     }
     return UnitReport(fitted, verdict, standard, chapters, files)
+
+
+def _warm_up_notes(on: list[PowerOn], switched: _Tests) -> list[str]:
+    return [*switched.notes, *(note for one in on for note in temperature_notes(one))] if on else []
+
+
+def _only(test: StatedTest, recorded: tuple[Recorded, ...]) -> Recorded:
+    """The one file of a test."""
+    if len(recorded) > 1:
+        raise RefusedError(
+            f"{test.where} file",
+            f"{len(recorded)} files",
+            expected=f"one file of a test of kind {test.keys.kind}",
+            remedy="make a [test.NAME] of each",
+        )
+    return recorded[0]
 
 
 def _read(fitted: Fitted, folder: Path | None, kind: str) -> _Tests:

@@ -22,6 +22,8 @@ from triaxcal.unit.vibration import Vibration
 
 _MICRO = 1e6
 _ALONG = 1e-9
+_NEVER = 1e-12
+"""Of the samples: as good as none clips."""
 DEFINITION = (
     "Mean output under the stated vibration less that of the static force alone, predicted from "
     "own square, odd square and cube and, where they are known, products of two axes. Linear: by "
@@ -107,7 +109,8 @@ def clipped_share(vibration: Vibration, static_g: FloatArray, sensor: Sensor, ax
     variance, amplitude = vibration.random_g2 * part**2, (vibration.sine_g or 0.0) * abs(part)
     lsb = sensor.adc.volts_per_code
     high, low = sensor.adc.code_max * lsb - offset, sensor.adc.code_min * lsb - offset
-    return beyond(static, variance, amplitude, high) + beyond(-static, variance, amplitude, -low)
+    share = beyond(static, variance, amplitude, high) + beyond(-static, variance, amplitude, -low)
+    return share if share > _NEVER else 0.0
 
 
 def vibration_chapter(
