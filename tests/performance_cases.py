@@ -140,7 +140,7 @@ def write_campaign(folder: Path, seed: int, truth: Campaign) -> None:
     text += TEST.format(name="rest", kind="rest", file="rest.csv", more="")
     text += TEST.format(name="cycle", kind="hysteresis", file="cycle.csv", more="")
     (folder / "unit.toml").write_text(text)
-    _measurements(folder, truth, random)
+    write_measurements(folder, truth, random)
     for k in range(truth.switched):
         _power_on(folder / f"on{k}.csv", truth, random)
     rest = round(truth.rest_s * truth.rest_rate_hz)
@@ -160,7 +160,8 @@ def _write(path: Path, time: FloatArray, disturbed: FloatArray, temp: FloatArray
     np.savetxt(path, rows, delimiter=",", header="t,ux,uy,uz,temp", comments="", fmt="%.10g")
 
 
-def _measurements(folder: Path, truth: Campaign, random: np.random.Generator) -> None:
+def write_measurements(folder: Path, truth: Campaign, random: np.random.Generator) -> None:
+    """measurements.csv of all runs."""
     lines = ["position,temp_degc,ux_v,uy_v,uz_v"]
     for _ in range(truth.runs):
         bias = truth.run_bias * 1e-6 * random.standard_normal(3)

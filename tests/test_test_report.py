@@ -12,7 +12,17 @@ import pytest
 from click.testing import CliRunner
 
 import triaxcal
-from performance_cases import T0, TEST, UNIT, UP, Campaign, truths, voltage, write_campaign
+from performance_cases import (
+    T0,
+    TEST,
+    UNIT,
+    UP,
+    Campaign,
+    truths,
+    voltage,
+    write_campaign,
+    write_measurements,
+)
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
 from triaxcal.delivery.fitted import Fitted
@@ -305,3 +315,22 @@ def test_jumps_several_files_and_dead_outputs(fitted: tuple[Fitted, Path], tmp_p
     write(tmp_path / "t.csv", EVEN, 0.0 * white(600))
     dead = reported(fitted[0], tmp_path, stated("power-on", "first_sample_s = 0"))
     assert "output x has the same value throughout" in dead.of("warm_up_amplitude").why
+
+
+@pytest.mark.long
+def test_days_come_from_the_history(tmp_path: Path) -> None:
+    """Five calibrations a year apart; the interval of 9 degrees of freedom holds the truth."""
+    folder = tmp_path / "D"
+    (folder / "history").mkdir(parents=True)
+    (folder / "unit.toml").write_text(UNIT.format(seed=3) + "\n[measured]\ndate = 2026-03-30\n")
+    truth, random = Campaign(runs=1), np.random.default_rng(2)
+    for year in (2022, 2023, 2024, 2025, 2026):
+        write_measurements(folder, truth, random)
+        if year < 2026:
+            old = folder / "history" / f"{year}-03-30.csv"
+            (folder / "measurements.csv").rename(old)
+    report = triaxcal.make_test_report(triaxcal.read_unit(folder)).result
+    figure = report.of("days_bias")
+    assert figure.how == "5 calibrations over 4 years, about a straight line"
+    assert figure.covers(truth.run_bias)
+    assert report.of("days_scale").covers(truth.run_scale_ppm)
