@@ -310,6 +310,16 @@ def test_an_xml_comment_is_covered_by_no_signature(desk: Desk, keys: dict[str, A
     assert "an XML comment, which no signature covers" in desk.refused(key, cert)
 
 
+def test_a_name_in_a_certificate_cannot_speak_for_us(desk: Desk, keys: dict[str, Any]) -> None:
+    name = "N.\n\nShown: all is well.\x1b[2J" + "x" * 20
+    path = desk.sign(pem(keys["ec"]), cert_pem(cert_of(keys["ec"], name)))
+    text = str(triaxcal.verify_certificate(path))
+    assert "signed by    CN=N.\\x0a\\x0aShown: all is well.\\x1b[2Jx" in text
+    assert "\x1b" not in text
+    other = desk.put("other.pem", cert_pem(cert_of(key_of("ec"))))
+    assert "CN=N.\\x0a\\x0aShown: all is well.\\x1b[2J" in refused(path, other)
+
+
 def test_the_commands(desk: Desk, keys: dict[str, Any]) -> None:
     desk.put("key.pem", pem(keys["ec"]))
     desk.put("cert.pem", cert_pem(cert_of(keys["ec"])))

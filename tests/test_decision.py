@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from test_certificate import DETAILS
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.firmware import make_firmware
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.delivery.judgement import judge, verdict_on
 from triaxcal.delivery.unit import Delivery
 from triaxcal.delivery.verdict import Verdict
+from triaxcal.report.dcc.certificate import certificate_xml
 from triaxcal.report.passport.content import passport
 from triaxcal.report.passport.document import passport_json
 from triaxcal.report.passport.page import passport_html
@@ -112,7 +115,7 @@ def test_a_guard_band_is_stricter(delivered: dict[str, Delivery], known: dict[st
         ),
     ],
 )
-def test_page_and_json_name_the_rule(
+def test_page_and_json_and_certificate_name_the_rule(
     delivered: dict[str, Delivery], limits: Limits, words: str, badge: str
 ) -> None:
     d = delivered["AT-SIM"]
@@ -122,12 +125,27 @@ def test_page_and_json_name_the_rule(
     assert document["decision_rule"] == {"name": limits.decision_rule, "words": words}
     assert words in page
     assert badge in page
+    certificate = certificate_xml(made, DETAILS).decode()
+    assert certificate.count(f"<dcc:convention>{words}</dcc:convention>") == 2
+    assert certificate.count("<dcc:norm>ILAC-G8:09/2019</dcc:norm>") == 2
+    assert certificate.count("<dcc:conformity>pass</dcc:conformity>") == 2
     for row, limit in zip(
         document["acceptance"], (limits.at_t0_g, limits.over_range_g), strict=True
     ):
         w = {SIMPLE: 0.0, GUARDED: limits.guard_band_g or row["expanded_uncertainty_g"]}
         assert row["guard_band_g"] == w[limits.decision_rule]
         assert row["acceptance_limit_g"] == limit - w[limits.decision_rule]
+        said = f"guard band w {row['guard_band_g']:.3g} g, acceptance limit "
+        assert f"{said}{row['acceptance_limit_g']:.3g} g" in certificate
+
+
+def test_what_lies_in_the_guard_band_passes_on_condition(delivered: dict[str, Delivery]) -> None:
+    d, limits = delivered["AT-SIM"], Limits(1.2e-5, 1e-3)
+    firmware = make_firmware(fitted(d, limits))
+    made = passport(replace(d, unit=replace(d.unit, limits=limits), firmware=firmware), {})
+    certificate = certificate_xml(made, DETAILS).decode()
+    found = re.findall("<dcc:conformity>(.*?)</dcc:conformity>", certificate)
+    assert (made.verdict.result, found) == ("not shown", ["conditionalPass", "pass"])
 
 
 @pytest.mark.parametrize(

@@ -124,6 +124,7 @@ def _conformity(statements: ET.Element, p: Passport, limit: Acceptance) -> None:
         ),
         f"guard band w {limit.guard_g:.3g} g, acceptance limit {limit.acceptance_g:.3g} g",
         *(f"not in it: {name}" for name in unknown),
+        *p.verdict.contradicts,
         *p.verdict.not_tested,
     ]
     statement = element(statements, "statement")
@@ -131,7 +132,8 @@ def _conformity(statements: ET.Element, p: Passport, limit: Acceptance) -> None:
     element(statement, "convention", limits.rule_words)
     element(statement, "norm", GUIDE)
     text(statement, "declaration", "; ".join(words))
-    whole = limit.shown and not unknown and not p.verdict.not_tested and p.verdict.passed
+    open_points = [*unknown, *p.verdict.not_tested, *p.verdict.contradicts]
+    whole = limit.shown and not open_points
     element(statement, "conformity", "pass" if whole else "conditionalPass")
 
 

@@ -22,6 +22,8 @@ _NO_KEY = {
     b"PUBLIC KEY": ("a public key", "give the private key that belongs to it"),
     b"RSA PUBLIC KEY": ("a public key", "give the private key that belongs to it"),
 }
+_LONGEST = 200
+"""Of a name in a certificate, as it is shown."""
 RSA_BITS = 2048
 """Shortest RSA key that is taken."""
 
@@ -76,7 +78,7 @@ def key_pair(
         raise RefusedError(
             f"{key[0]} and {cert[0]}",
             f"the key ({_kind(private)}) is not that of the first certificate "
-            f"({_kind(own.public_key())}, {own.subject.rfc4514_string()})",
+            f"({_kind(own.public_key())}, {printable(own.subject)})",
             expected="a certificate of this key",
         )
     if not own.not_valid_before_utc <= now <= own.not_valid_after_utc:
@@ -89,6 +91,13 @@ def key_pair(
         )
     _refuse_other_use(cert[0], own)
     return KeyPair(private, chain, hash_bits)
+
+
+def printable(name: x509.Name) -> str:
+    """Name in a certificate; whoever made it may have put codes of a terminal there."""
+    text = name.rfc4514_string()
+    shown = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in text)
+    return shown[:_LONGEST] or "(no name)"
 
 
 def certificates(name: str, content: bytes) -> tuple[x509.Certificate, ...]:

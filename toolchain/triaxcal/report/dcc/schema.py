@@ -36,7 +36,9 @@ def parsed(content: bytes, where: str) -> etree._Element:
         root = etree.fromstring(content, _parser())
     except (etree.XMLSyntaxError, ValueError) as error:
         raise RefusedError(
-            where, f"not XML: {error}", expected="a Digital Calibration Certificate"
+            where,
+            f"not XML: {str(error).partition(' (<string>')[0]}",
+            expected="a Digital Calibration Certificate",
         ) from None
     if root.getroottree().docinfo.doctype:
         raise RefusedError(

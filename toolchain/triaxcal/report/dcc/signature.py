@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.extras import refuse_missing_packages
-from triaxcal.report.dcc.keyfile import certificates, key_pair
+from triaxcal.report.dcc.keyfile import certificates, key_pair, printable
 from triaxcal.report.dcc.schema import EXTRA, parsed
 from triaxcal.report.dcc.signed import MINUTE, Signature
 
@@ -243,8 +243,8 @@ def _refuse_untrusted(
     except (verification.VerificationError, ValueError) as error:
         raise RefusedError(
             where,
-            f"the certificate of {chain[0].subject.rfc4514_string()}, issued by "
-            f"{chain[0].issuer.rfc4514_string()}, is not vouched for: {_short(error)}",
+            f"the certificate of {printable(chain[0].subject)}, issued by "
+            f"{printable(chain[0].issuer)}, is not vouched for: {_short(error)}",
             expected=f"a certificate in {name}, or issued by an authority in it",
         ) from None
 
@@ -261,8 +261,8 @@ def _described(
 
     method: Any = signature.find(f"{_DS}SignedInfo/{_DS}SignatureMethod")
     return Signature(
-        cert.subject.rfc4514_string(),
-        cert.issuer.rfc4514_string(),
+        printable(cert.subject),
+        printable(cert.issuer),
         cert.fingerprint(hashes.SHA256()).hex(),
         method.get("Algorithm").rpartition("#")[2],
         signed,
