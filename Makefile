@@ -6,6 +6,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 DEVELOPER := $(VENV)/.developer
 WRITER := $(VENV)/.writer
+BENCHES := $(VENV)/.benches
 
 # A file stays on one core, so that its compiled fixtures are made once. The tests start the command
 # a hundred times: with bytecode of the sources as they are, also where Python writes none itself.
@@ -80,14 +81,8 @@ docs: $(WRITER)  ## The documentation as a site: docs/_build/html/index.html
 	@$(BIN)/python -m sphinx -q -W --keep-going -E -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
-bench: $(DEVELOPER)  ## Benchmarks, as ratios within one run
-	@$(BIN)/python bench/calib_header.py
-	@$(BIN)/python bench/series.py
-	@$(BIN)/python bench/long_log.py
-	@$(BIN)/python bench/rig_decode.py
-	@$(BIN)/python bench/rig_receive.py
-	@$(BIN)/python bench/rig_stillness.py
-	@$(BIN)/python bench/rig_kill.py
+bench: $(BENCHES)  ## Benchmarks beside other programs, as ratios of one run, into docs/performance.md (10 minutes)
+	@$(BIN)/python bench/run.py --page
 
 test-can: $(DEVELOPER)  ## The bench on real SocketCAN: this machine's vcan, or QEMU (3 minutes)
 	@rig/test-can.sh
@@ -122,4 +117,9 @@ $(DEVELOPER): $(INSTALLED)
 $(WRITER): $(INSTALLED)
 	@echo "adding the documentation's tools to $(VENV) (once) ..."
 	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[docs,plot,rig]'
+	@touch $@
+
+$(BENCHES): $(DEVELOPER)
+	@echo "adding the peers of the benchmarks to $(VENV) (once) ..."
+	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[bench,export]'
 	@touch $@

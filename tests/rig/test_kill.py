@@ -38,7 +38,7 @@ def test_the_log_of_a_killed_session_is_what_came(tmp_path):
 
 @pytest.mark.slow
 def test_two_hundred_kills(tmp_path):
-    """Every check is in the campaign; what a kill costs in time, bench/rig_kill.py measures."""
+    """Every check is in the campaign; bench/entries/rig_kill.py measures what a kill costs."""
     found = campaign(tmp_path, 0, 200)
     # Kills hit every part of a session, and the frames on their way.
     assert {row["shown"] for row in found} >= set(range(6))

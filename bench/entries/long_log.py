@@ -1,20 +1,14 @@
-"""A log of many rows through `triaxcal poses`: rows, MB of the file, CPU seconds, peak memory.
-
-The log is an exact sensor held in twelve poses in turn, at 1 kHz, as text of 40 bytes a row.
-
-    python bench/long_log.py [--rows N]
-"""
+"""A log of many rows through `triaxcal poses`: processor time and peak memory."""
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
+from measuring import Bench, Figure, pick, spent, triaxcal
 
 UNIT = """format = 1
 serial = "LONG"
@@ -54,6 +48,23 @@ def write_unit(folder: Path, rows: int) -> Path:
     return folder
 
 
+def measure(size: str) -> list[Figure]:
+    rows = pick(size, 100_000, 1_000_000, 10_000_000)
+    peer_rows = min(rows, 1_000_000)
+    with tempfile.TemporaryDirectory(prefix="triaxcal-") as scratch:
+        folder = write_unit(Path(scratch) / "LONG", rows)
+        size_mb = (folder / "log.csv").stat().st_size / 1e6
+        cpu_s, peak_mb = measured(folder)
+        loaded = spent(
+            lambda: np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1, max_rows=peer_rows)
+        )
+    million = 1e6 / rows
+    return [
+        Figure(_CPU, cpu_s * million, "s", _PEER, loaded * 1e6 / peer_rows),
+        Figure(_MEMORY, peak_mb, "MB", "the file itself", size_mb),
+    ]
+
+
 def measured(folder: Path) -> tuple[float, float]:
     """CPU seconds and peak resident MB of `triaxcal poses` on a unit.
 
@@ -62,25 +73,25 @@ def measured(folder: Path) -> tuple[float, float]:
     RuntimeError
         When the command fails.
     """
-    command = [sys.executable, "-m", "triaxcal", "poses", str(folder)]
+    command = triaxcal("poses", folder)
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
-        raise RuntimeError(f"{' '.join(command)}: exit status {process.returncode}")
+        raise RuntimeError(f"triaxcal poses {folder}: exit status {process.returncode}")
     return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--rows", type=int, default=10_000_000)
-    rows = max(parser.parse_args().rows // BLOCK, 1) * BLOCK
-    with tempfile.TemporaryDirectory(prefix="triaxcal-") as scratch:
-        folder = write_unit(Path(scratch) / "LONG", rows)
-        size_mb = (folder / "log.csv").stat().st_size / 1e6
-        cpu_s, peak_mb = measured(folder)
-    print(f"rows {rows}, file {size_mb:.0f} MB, CPU {cpu_s:.1f} s, peak RSS {peak_mb:.0f} MB")
-
-
-if __name__ == "__main__":
-    main()
+_CPU = "`triaxcal poses` on a log, for a million rows"
+_PEER = "numpy.loadtxt on the same file, for a million rows"
+_MEMORY = "its memory"
+ENTRY = Bench(
+    name="long_log",
+    label="A long log",
+    doc="A sensor at 1 kHz held in twelve poses in turn, as text of 40 bytes a row: read, checked, "
+    "and its rests found.",
+    measure=measure,
+    figures=(_CPU, _MEMORY),
+    sizes="1 million rows, 10 million with --full",
+    rank=40,
+)

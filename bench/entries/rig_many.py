@@ -1,9 +1,8 @@
-"""CPU of a session of many units against real time: `python bench/rig_many.py [UNITS] [SECONDS]`.
+"""CPU of a session of many units against real time.
 
-Units at 100 samples a second on two buses, simulated first. What is measured is everything that a
-session does with their frames, cut into the batches of the receiver: log, decoders, decisions,
-journal, group; and what python-can's messages cost on top, which the bench's own receiver of
-SocketCAN saves.
+What is measured is everything that a session does with their frames, cut into the batches of the
+receiver: log, decoders, decisions, journal, group; and what python-can's messages cost on top,
+which the bench's own receiver of SocketCAN saves.
 """
 
 from __future__ import annotations
@@ -15,8 +14,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from measuring import TESTS, Bench, Figure, pick
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "rig"))
+sys.path.insert(0, str(TESTS / "rig"))
 
 from many_cases import bench_of, setup_of
 
@@ -45,12 +45,13 @@ def simulated(bench: SimulatedBench, seconds: int) -> list[list[tuple[str, Frame
     return made
 
 
-def main(units: int, seconds: int) -> None:
+def measure(size: str) -> list[Figure]:
+    units, seconds = pick(size, (2, 3), (32, 20), (32, 120))
     with tempfile.TemporaryDirectory() as name:
         setup = setup_of(Path(name), units)
         made = simulated(bench_of(setup), seconds)
         taken = ManyRecording(setup, Path(name) / "001")
-        start, wall, count = time.process_time(), time.perf_counter(), 0
+        start, count = time.process_time(), 0
         for number, batches in enumerate(made):
             for bus, frames in batches:
                 told = taken.feed(bus, frames)
@@ -58,7 +59,6 @@ def main(units: int, seconds: int) -> None:
                 taken.group.look(float(number), told)
                 count += len(frames)
         session = time.process_time() - start
-        wall = time.perf_counter() - wall
         start = time.process_time()
         for _ in range(4 * 20):
             many_screen(taken.group, "001", "12:00", "")
@@ -68,15 +68,26 @@ def main(units: int, seconds: int) -> None:
         for batch in messages:
             frames_of(batch)
         python_can = time.process_time() - start
-        learned = sum(m.session.reference is not None for m in taken.group.members)
-        dwells = sum(len(m.session.accepted) for m in taken.group.members)
         taken.close()
-    print(f"{units} units, {count / seconds:.0f} frames/s for {seconds} s")
-    print(f"{learned} have learned their noise, {dwells} dwells accepted")
-    print(f"session     {session / seconds:.3f} of one core in real time ({wall:.1f} s of clock)")
-    print(f"screen      {screen:.3f}, four times a second, without the terminal")
-    print(f"python-can  {python_can:.3f}, making arrays of its messages")
+    per_s = 100.0 / seconds
+    return [
+        Figure(_SESSION, session * per_s, "%", "python-can making arrays of the same messages",
+               100.0 * python_can),
+        Figure(_SCREEN, 100.0 * screen, "%"),
+        Figure(_FRAMES, count / seconds, "a second"),
+    ]  # fmt: skip
 
 
-if __name__ == "__main__":
-    main(*(int(a) for a in sys.argv[1:3]) if len(sys.argv) > 2 else (32, 120))
+_SESSION = "a session of 32 units, share of a core in real time"
+_SCREEN = "its screen four times a second, share of a core"
+_FRAMES = "frames of these units"
+ENTRY = Bench(
+    name="rig_many",
+    label="A session of many units",
+    doc="32 units at 100 samples a second on two buses: log, journal and every decision of each.",
+    measure=measure,
+    figures=(_SESSION, _SCREEN, _FRAMES),
+    packages=("can", "cantools"),
+    sizes="20 s of the session, 120 s with --full",
+    rank=52,
+)

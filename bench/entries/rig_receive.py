@@ -1,22 +1,20 @@
 """CPU time a frame of the live path: our receiver and pipeline against python-can and cantools.
 
 A socket pair stands for the device where there is no SocketCAN; the system calls are the same.
-
-    python bench/rig_receive.py [seconds of the rig at 4 kHz, 8011 frames/s]
 """
 
 from __future__ import annotations
 
 import select
 import socket
-import sys
 import tempfile
 import time
 from pathlib import Path
 
-from at_sim_bench import setup_at
 from can.interfaces.socketcan.socketcan import capture_message
+from measuring import Bench, Figure, pick
 
+from entries._at_sim_bench import setup_at
 from triaxcal.rig.description.busfile import read_bus_file
 from triaxcal.rig.description.dbc import default_dbc
 from triaxcal.rig.records.recording import Recording
@@ -25,7 +23,6 @@ from triaxcal.rig.sources.socketcan import SocketSource, packed
 from triaxcal.rig.sources.source import PACE_S
 from triaxcal.simulation.truth import read_truth
 
-SECONDS = int(sys.argv[1]) if len(sys.argv) > 1 else 8
 RATE = 4000
 BUSY = 9000  # frames a second of a full bus at 1 Mbit/s
 BURST = round(BUSY * PACE_S)  # what one read of the receiver finds there
@@ -85,13 +82,13 @@ def python_can_and_cantools(link):
     return take
 
 
-def main() -> None:
+def measure(size: str) -> list[Figure]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         about = setup_at(RATE, folder)
         truth, _ = read_truth(about.folder)
         rig = SimulatedRig(about.unit, truth, about.plan, about.rig, RigSettings())
-        seconds = [rig.advance() for _ in range(SECONDS)]
+        seconds = [rig.advance() for _ in range(pick(size, 1, 3, 8))]
         taken = Recording(about, folder / "001", "bench0")
 
         def whole(frames):
@@ -102,15 +99,26 @@ def main() -> None:
         taken.close()
         receive = spent(seconds, ours(lambda _: None))
         peer = spent(seconds, python_can_and_cantools)
-    print(
-        f"receive, log, CRC, decode, decide   {1e6 * mine:5.1f} us a frame, "
-        f"{100 * mine * BUSY:.0f} % of a core at {BUSY} frames/s"
-    )
-    print(f"receive alone                       {1e6 * receive:5.1f} us a frame")
-    print(
-        f"python-can recv + cantools decode   {1e6 * peer:5.1f} us a frame, no log, CRC or "
-        f"decision in it; ratio {peer / mine:.1f}"
-    )
+    busy = f"{BUSY} frames a second"
+    return [
+        Figure(_LIVE, 1e6 * mine, "µs a frame", _PEER, 1e6 * peer),
+        Figure(_ALONE, 1e6 * receive, "µs a frame", _PEER, 1e6 * peer),
+        Figure(f"share of a core at {busy}, a full bus of 1 Mbit/s", 100 * mine * BUSY, "%",
+               f"python-can and cantools at {busy}", 100 * peer * BUSY),
+    ]  # fmt: skip
 
 
-main()
+_LIVE = "receive, log, CRC, decode, decide"
+_ALONE = "receive alone"
+_PEER = "python-can `recv` and cantools, without log, CRC or decision"
+ENTRY = Bench(
+    name="rig_receive",
+    label="Receiving from a CAN bus",
+    doc="The live path of the bench at 8011 frames a second, in bursts as the loop reads them. A "
+    "socket pair stands for the device; the system calls are the same.",
+    measure=measure,
+    figures=(_LIVE, _ALONE),
+    packages=("can", "cantools"),
+    sizes="3 s of the rig, 8 s with --full",
+    rank=51,
+)

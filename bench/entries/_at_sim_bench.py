@@ -9,7 +9,7 @@ from triaxcal.rig.plan.plan import read_plan
 from triaxcal.rig.session.engine import Setup
 from triaxcal.unit.description import read_unit
 
-REPO = Path(__file__).resolve().parents[1]
+REPO = Path(__file__).resolve().parents[2]
 
 
 def setup_at(rate_hz: int, folder: Path) -> Setup:
