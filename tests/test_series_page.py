@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 import io
+import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -141,6 +142,13 @@ def test_an_imu_that_was_calibrated_beside_the_series_is_linked(tmp_path: Path) 
 )
 def test_addresses_are_relative_and_quoted(name: str, expected: str) -> None:
     assert href(name, "passport.html") == expected
+
+
+def test_a_name_that_is_no_text_stands_on_page_and_in_json() -> None:
+    """A folder may be named by any bytes; such a unit is refused, and listed."""
+    files = series_files(series_of(drawn(1, 4), {"bad\udcff": "found 'bad\udcff'"}))
+    assert json.loads(files["series.json"])["refused"] == {"bad\udcff": "found 'bad\udcff'"}
+    assert any("bad" in row[0] for row in Page(files["series.html"].decode()).rows[1:])
 
 
 def test_the_csv_has_the_list() -> None:

@@ -12,9 +12,12 @@ from typing import Any
 
 
 def json_bytes(document: Mapping[str, Any]) -> bytes:
-    """Document as UTF-8; NaN and infinity are refused by a ValueError."""
+    """Document as UTF-8; NaN and infinity are refused by a ValueError.
+
+    What UTF-8 cannot say, as a byte of a file's name that is none, is an escape of JSON.
+    """
     lines = [f" {_text(key)}: {_value(value)}" for key, value in document.items()]
-    return ("{\n" + ",\n".join(lines) + "\n}\n").encode()
+    return ("{\n" + ",\n".join(lines) + "\n}\n").encode("utf-8", "backslashreplace")
 
 
 def sha256_of_files(files: Mapping[str, bytes]) -> dict[str, str]:
