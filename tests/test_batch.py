@@ -434,6 +434,17 @@ def test_an_imu_is_left_out(tmp_path: Path) -> None:
     assert [order.name for order in work.orders] == ["AT-SIM"]
 
 
+def test_the_series_names_what_it_leaves_to_another_command(tmp_path: Path) -> None:
+    """An IMU is named with the reason; a stray file is none of its units."""
+    folder = units(tmp_path / "units", 1)
+    (folder / "IMU").mkdir()
+    (folder / "IMU" / "unit.toml").write_text('serial = "IMU"\n[dynamic]\n', encoding="utf-8")
+    (folder / "notes.txt").touch()
+    _, series, _ = run(folder, tmp_path / "build")
+    assert series.skipped == {"IMU": "an IMU, which triaxcal dynamic calibrates"}
+    assert list(series.entries) == ["U-1"]
+
+
 def test_a_unit_of_a_recording_brings_its_recording(tmp_path: Path) -> None:
     folder = tmp_path / "units" / "HAND"
     folder.mkdir(parents=True)
