@@ -28,8 +28,9 @@ from triaxcal.unit.description import read_unit
 
 UNITS = Path(__file__).parent.parent / "units"
 DETAILS = CertificateDetails(
-    "C-17", "Laboratory <A & B>", "Kyiv", "UA", "Customer", "N. N.", "Maker",
-    date(2026, 3, 30), date(2026, 3, 31),
+    identifier="C-17", laboratory="Laboratory <A & B>", city="Kyiv", country="UA",
+    customer="Customer", signer="N. N.", manufacturer="Maker", begin=date(2026, 3, 30),
+    end=date(2026, 3, 31),
 )  # fmt: skip
 
 ORDER = {

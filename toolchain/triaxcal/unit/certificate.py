@@ -14,7 +14,7 @@ _LONGEST = 200
 """Of a text, so that it fits a page. Keys of version 0.1.0 keep theirs of any length."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CertificateDetails:
     """[certificate]: who calibrated the unit for whom, for the Digital Calibration Certificate.
 
@@ -22,6 +22,8 @@ class CertificateDetails:
     ----------
     identifier
         The certificate's own number.
+    issued
+        Day on which the certificate is issued.
     laboratory
         Who calibrated.
     laboratory_address
@@ -38,14 +40,6 @@ class CertificateDetails:
         For whom.
     customer_address
         Address of the customer.
-    signer
-        Who is responsible for the certificate.
-    signer_role
-        Role of the signer in the laboratory.
-    second_signer
-        Who signs besides.
-    second_signer_role
-        Role of the second signer.
     manufacturer
         Who made the unit.
     model
@@ -54,31 +48,37 @@ class CertificateDetails:
         First day of the measurements.
     end
         Last day of the measurements.
-    issued
-        Day on which the certificate is issued.
     performed_at
         Where the calibration was performed: laboratory and customer, or a branch of either.
+    signer
+        Who is responsible for the certificate.
+    signer_role
+        Role of the signer in the laboratory.
+    second_signer
+        Who signs besides.
+    second_signer_role
+        Role of the second signer.
     """
 
     identifier: str = setting(line(), example='"CAL-2026-001"')
+    issued: datetime.date | None = setting(DATE, None, example="2026-04-02")
     laboratory: str = setting(line(), example='"Inertial laboratory"')
+    laboratory_address: str | None = setting(line(_LONGEST), None, example='"1 Street"')
     city: str = setting(line(), example='"Kyiv"')
     country: str = setting(pattern("[A-Z]{2}", 'two capitals of ISO 3166-1, as "UA"', '"UA"'))
-    customer: str = setting(line(), example='"Customer"')
-    signer: str = setting(line(), example='"A. Person"')
-    manufacturer: str = setting(line(), example='"Manufacturer"')
-    begin: datetime.date = setting(DATE, example="2026-03-30")
-    end: datetime.date = setting(DATE, example="2026-03-31")
-    issued: datetime.date | None = setting(DATE, None, example="2026-04-02")
-    laboratory_address: str | None = setting(line(_LONGEST), None, example='"1 Street"')
     laboratory_contact: str | None = setting(line(_LONGEST), None, example='"lab@example.org"')
     accreditation: str | None = setting(line(_LONGEST), None, example='"Body, number 1234"')
+    customer: str = setting(line(), example='"Customer"')
     customer_address: str | None = setting(line(_LONGEST), None, example='"2 Street, 10000 City"')
+    manufacturer: str = setting(line(), example='"Manufacturer"')
+    model: str | None = setting(line(_LONGEST), None, example='"Type 1"')
+    begin: datetime.date = setting(DATE, example="2026-03-30")
+    end: datetime.date = setting(DATE, example="2026-03-31")
+    performed_at: str = setting(word(PLACES), "laboratory")
+    signer: str = setting(line(), example='"A. Person"')
     signer_role: str | None = setting(line(_LONGEST), None, example='"head of the laboratory"')
     second_signer: str | None = setting(line(_LONGEST), None, example='"B. Person"')
     second_signer_role: str | None = setting(line(_LONGEST), None, example='"technician"')
-    model: str | None = setting(line(_LONGEST), None, example='"Type 1"')
-    performed_at: str = setting(word(PLACES), "laboratory")
 
 
 CERTIFICATE = TableKeys.of(CertificateDetails, optional=True)
