@@ -27,6 +27,10 @@
 #include "triax_selftest.h"
 #endif
 
+#ifdef CASE_ANGLES
+#include "triax_angles.h"
+#endif
+
 static triax_ref_t ref;
 static triax_calib_t loaded;
 static uint8_t damaged[TRIAX_IMAGE_SIZE];
@@ -218,6 +222,33 @@ static uint32_t digest_reference(void)
     return ~crc;
 }
 
+#ifdef CASE_ANGLES
+/* Accelerations of every size and sign, axis by axis. */
+static uint32_t digest_angles(void)
+{
+    uint32_t crc = 0xFFFFFFFFu;
+    uint32_t i;
+    for (i = 0u; i < CASE_VECTORS; i++) {
+        const uint32_t first = draw(4u * i);
+        triax_angle_t angle[2];
+        int32_t accel[3];
+        uint32_t j;
+        for (j = 0u; j < 3u; j++) {
+            const uint32_t shift = (first & 15u) + ((first >> (8u + (4u * j))) & 15u);
+            const uint32_t size = draw((4u * i) + j + 1u) >> shift;
+            accel[j] = signed_of((((first >> (20u + j)) & 1u) != 0u) ? (0u - size) : size);
+        }
+        {
+            const uint32_t status = triax_angles(accel, angle);
+            crc = crc_word(crc, (uint32_t)angle[0]);
+            crc = crc_word(crc, (uint32_t)angle[1]);
+            crc = crc_word(crc, status);
+        }
+    }
+    return ~crc;
+}
+#endif
+
 static void print_line(const char *name, uint32_t value)
 {
     target_print(name);
@@ -258,5 +289,8 @@ int main(void)
     print_line("image", digest_generated(&loaded));
     print_line("open", triax_ref_open(&ref, CASE_IMAGE, sizeof CASE_IMAGE));
     print_line("reference", digest_reference());
+#ifdef CASE_ANGLES
+    print_line("angles", digest_angles());
+#endif
     return 0;
 }

@@ -101,16 +101,25 @@ static uint32_t is_below(uint64_t value, uint64_t limit)
     return (uint32_t)((value - limit) >> 63);
 }
 
-static uint64_t square(uint32_t word)
+/* In a fixed number of steps also where the core has no 32x32->64 multiplication. */
+static uint64_t product(uint32_t a, uint32_t b)
 {
-    return (uint64_t)word * word;
+#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
+    const uint32_t low = (a & 0xFFFFu) * (b & 0xFFFFu);
+    const uint32_t first = ((a >> 16) * (b & 0xFFFFu)) + (low >> 16);
+    const uint32_t second = ((a & 0xFFFFu) * (b >> 16)) + (first & 0xFFFFu);
+    const uint32_t high = ((a >> 16) * (b >> 16)) + (first >> 16) + (second >> 16);
+    return ((uint64_t)high << 32) | (((second & 0xFFFFu) << 16) | (low & 0xFFFFu));
+#else
+    return (uint64_t)a * b;
+#endif
 }
 
 /* Status of the parts across the axis of the second angle, and along it. */
 static uint32_t status_of(uint32_t wide, uint32_t high, uint32_t along)
 {
-    const uint64_t across = square(wide) + square(high);
-    const uint64_t half = (across + square(along)) >> 1;
+    const uint64_t across = product(wide, wide) + product(high, high);
+    const uint64_t half = (across + product(along, along)) >> 1;
     const uint32_t steep = is_below(across >> 1, UINT64_C(42866737652)); /* sin^2 of 1 deg, half of it */
     const uint32_t slow = is_below(half, UINT64_C(127015583240684));
     const uint32_t fast = is_below(UINT64_C(155163080911749), half);
@@ -130,7 +139,8 @@ uint32_t triax_angles(const int32_t accel[3], triax_angle_t angle[2])
     /* Where c is negative: the opposite vector, and half a turn. */
     const polar_t turned = polar((wide << left) >> 2, with_sign((high << left) >> 2, sign_of(c) ^ sign_of(s)));
     const uint32_t half_turn = ~c & 0x80000000u;
-    const uint32_t length = (uint32_t)(((uint64_t)turned.length * 2608131561u) >> 32) >> (left - common);
+    /* left >= common; & 31u says to all readers and tools that no shift is too far. */
+    const uint32_t length = (uint32_t)(product(turned.length, 2608131561u) >> 32) >> ((left - common) & 31u);
     const uint32_t elevation = polar(length, with_sign((along << common) >> 2, sign_of(a))).angle;
     /* Its size, at most a quarter turn. */
     const uint32_t size = with_sign(elevation, sign_of(elevation));

@@ -158,7 +158,7 @@ def _deliver(unit: Path, build: Path, progress: Progress | None) -> _Delivered:
     files = all_files(delivery, passport(delivery, {}, device))
     if not is_delivered(target, files):
         publish(files, target, SOMETIMES)
-    parts = delivery.files, delivery.plan, delivery.bound
+    parts = delivery.files, delivery.plan, delivery.bound, delivery.firmware.angles
     return _Delivered(
         delivery.unit.name,
         target,

@@ -68,6 +68,12 @@ def bench(build: Path, page: Path | None) -> None:
     """
     from triaxcal.base.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
     from triaxcal.targets.bench import Cost, compiler_versions, run_bench  # noqa: PLC0415
+    from triaxcal.targets.bench_angles import (  # noqa: PLC0415
+        AnglesCost,
+        angles_markdown,
+        angles_rows,
+        run_angles_bench,
+    )
     from triaxcal.targets.bench_table import (  # noqa: PLC0415
         bench_json,
         markdown,
@@ -80,14 +86,20 @@ def bench(build: Path, page: Path | None) -> None:
             f"{cost.failure or 'measured'}: {cost.subject.label}, {cost.core.name}", err=True
         )
 
-    costs = run_bench(shipped_cases(Path("units")), progress)
+    def progress_of_angles(cost: AnglesCost) -> None:
+        click.echo(f"{cost.failure or 'measured'}: {cost.what}, {cost.core.name}", err=True)
+
+    cases = shipped_cases(Path("units"))
+    costs = run_bench(cases, progress)
+    angles = run_angles_bench(cases, progress_of_angles)
     compilers = compiler_versions()
-    table = markdown(costs, compilers)
-    files = {"bench.json": bench_json(costs, compilers), "bench.md": table + "\n"}
+    table = f"{markdown(costs, compilers)}\n\n{angles_markdown(angles)}"
+    document = bench_json(costs, compilers, angles_rows(angles))
+    files = {"bench.json": document, "bench.md": table + "\n"}
     publish({name: text.encode() for name, text in files.items()}, build)
     if page:
         text = page.read_text(encoding="utf-8")
         page.write_text(put_between_markers(text, table, str(page)), encoding="utf-8")
     click.echo(table)
-    if any(c.failure for c in costs):
+    if any(c.failure for c in costs) or any(c.failure for c in angles):
         sys.exit(1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Sequence
+from typing import Any
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
@@ -86,8 +87,10 @@ def _both(cost: Cost) -> float:
     return cost.counts.set.mean + cost.counts.apply.mean
 
 
-def bench_json(costs: Sequence[Cost], compilers: Sequence[str]) -> str:
-    """Every cost."""
+def bench_json(
+    costs: Sequence[Cost], compilers: Sequence[str], angles: Sequence[dict[str, Any]] = ()
+) -> str:
+    """Every cost; `angles` are those of triax_angles."""
     rows = [
         {
             "shape": c.subject.case.name,
@@ -102,6 +105,7 @@ def bench_json(costs: Sequence[Cost], compilers: Sequence[str]) -> str:
     document = {
         "format": FORMAT, "triaxcal": __version__, "compilers": list(compilers),
         "optimisation": OPTIMISATION, "size_optimisation": SIZE_OPTIMISATION, "costs": rows,
+        "angles": list(angles),
     }  # fmt: skip
     return json.dumps(document, indent=1) + "\n"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,6 +61,43 @@ def measure(core: Core, program: Path, plugin: Path) -> Counts:
     TargetError
         When a loop of known length is not counted exactly.
     """
+    names = ("empty_set", "empty_apply", "loop", "set", "set_out", "apply", "apply_out")
+    values, sections = counted_sections(core, program, plugin, names)
+    return Counts(
+        set=_span(sections["set"], sections["empty_set"]),
+        set_out=_span(sections["set_out"], sections["empty_set"]),
+        apply=_span(sections["apply"], sections["empty_apply"]),
+        apply_out=_span(sections["apply_out"], sections["empty_apply"]),
+        state_bytes=values["state_bytes"],
+        calib_bytes=values["calib_bytes"],
+        stack_set=values["stack_set"],
+        stack_apply=values["stack_apply"],
+    )
+
+
+def measure_angles(core: Core, program: Path, plugin: Path) -> tuple[Span, int]:
+    """The same for bench_angles.c: instructions of a call, and bytes of stack.
+
+    Raises
+    ------
+    TargetError
+        When a loop of known length is not counted exactly.
+    """
+    names = ("empty_set", "empty_apply", "loop", "angles")
+    values, sections = counted_sections(core, program, plugin, names)
+    return _span(sections["angles"], sections["empty_apply"]), values["stack_angles"]
+
+
+def counted_sections(
+    core: Core, program: Path, plugin: Path, names: Sequence[str]
+) -> tuple[dict[str, int], dict[str, list[int]]]:
+    """What a program printed, and the counts of each call of its sections, in their order.
+
+    Raises
+    ------
+    TargetError
+        When a loop of known length is not counted exactly.
+    """
     prefix = core.gcc.removesuffix("gcc")
     addresses = {}
     for line in run([f"{prefix}nm", str(program)]).splitlines():
@@ -73,27 +111,20 @@ def measure(core: Core, program: Path, plugin: Path) -> Counts:
     values = {name: int(value) for name, value in printed}
     counts = [int(line) for line in out.read_text().splitlines()]
     sections: dict[str, list[int]] = {}
-    for name in ("empty_set", "empty_apply", "loop", "set", "set_out", "apply", "apply_out"):
+    for name in names:
         sections[name], counts = counts[: values[name]], counts[values[name] :]
-    overhead_set, overhead_apply = sections["empty_set"][0] - 1, sections["empty_apply"][0] - 1
+    overhead = sections["empty_set"][0] - 1
     expected = [2 * rounds + 1 for rounds in LOOP_ROUNDS]
-    if [c - overhead_set for c in sections["loop"]] != expected:
+    if [c - overhead for c in sections["loop"]] != expected:
         raise TargetError(
             f"{core.name}: loops of {expected} instructions were counted as "
-            f"{[c - overhead_set for c in sections['loop']]}"
+            f"{[c - overhead for c in sections['loop']]}"
         )
-    return Counts(
-        set=_span(sections["set"], overhead_set),
-        set_out=_span(sections["set_out"], overhead_set),
-        apply=_span(sections["apply"], overhead_apply),
-        apply_out=_span(sections["apply_out"], overhead_apply),
-        state_bytes=values["state_bytes"],
-        calib_bytes=values["calib_bytes"],
-        stack_set=values["stack_set"],
-        stack_apply=values["stack_apply"],
-    )
+    return values, sections
 
 
-def _span(counts: list[int], overhead: int) -> Span:
+def _span(counts: list[int], empty: list[int]) -> Span:
+    """Of calls, less what the call of an empty routine counts but for its one instruction."""
+    overhead = empty[0] - 1
     mean = sum(counts) / len(counts) - overhead
     return Span(min(counts) - overhead, max(counts) - overhead, round(mean, 1))

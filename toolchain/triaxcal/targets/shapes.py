@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.angles import angles_plan, render_angles
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.names import Names, names_of
@@ -17,11 +18,13 @@ from triaxcal.delivery.firmware import compensation_of
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.calibrate import calibrate
+from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.plan import Plan, make_plan
 from triaxcal.model.methods.imu import EXAMPLE_SENSITIVITY, ImuCompensation
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS, Terms
 from triaxcal.readings.measurements import MEASUREMENTS_FILE, read_measurements
+from triaxcal.unit.angles import PITCH_ROLL, ZENITH_TOOL_FACE, AnglesChoice
 from triaxcal.unit.description import UnitDescription, read_unit
 
 
@@ -36,7 +39,10 @@ class Case:
     note : str
         What is particular about it.
     files : dict
-        triax_comp.h and .c, triax_calib.h and .c, triax_selftest.h and .c.
+        triax_comp.h and .c, triax_calib.h and .c, triax_selftest.h and .c, triax_angles.h and .c
+        where there are angles.
+    angles : AnglesPlan or None
+        Of the device's angles, where it makes them.
     """
 
     name: str
@@ -44,19 +50,25 @@ class Case:
     plan: Plan
     files: dict[str, str]
     image: bytes
+    angles: AnglesPlan | None = None
 
     def in_form(self, arithmetic: str) -> Case:
         """The same with the files of another arithmetic."""
         if arithmetic == self.plan.arithmetic:
             return self
         plan = replace(self.plan, arithmetic=arithmetic)
-        return replace(self, plan=plan, files=self.files | render_routine(plan))
+        files, angles = self.files | render_routine(plan), None
+        if self.angles is not None:
+            angles = angles_plan(self.angles.choice, plan)
+            files |= render_angles(angles, names_of(plan))
+        return replace(self, plan=plan, files=files, angles=angles)
 
     @property
     def sources(self) -> list[str]:
         """Names of the C files that a firmware needs, the routine first."""
         routine = routine_file(self.plan, arithmetic_of(self.plan))
-        return [routine, self.names.file("triax_calib.c")]
+        angles = [self.names.file("triax_angles.c")] if self.angles is not None else []
+        return [routine, self.names.file("triax_calib.c"), *angles]
 
     @property
     def selftest(self) -> str:
@@ -74,6 +86,7 @@ CUBIC = "cubic"
 CUBIC_LEFT = "cubic, left-justified"
 QUADRATIC, RATE, GYRO = "quadratic terms", "dT/dt", "gyro"
 RATE_ALONE = "cubic, dT/dt"
+ANGLES = {pair: f"angles: {pair}" for pair in (ZENITH_TOOL_FACE, PITCH_ROLL)}
 _TERMS = {
     QUADRATIC: EXAMPLE_TERMS,
     RATE: replace(EXAMPLE_TERMS, rate=EXAMPLE_RATE),
@@ -111,6 +124,10 @@ _SHAPES: tuple[tuple[str, str, str, Change], ...] = (
         u.adc, bits=16, code_min=-(2**15), code_max=2**15 - 1))),
     ("fine thermometer", "AT-SIM", "110000 temperature codes", lambda u: replace(
         u, temperature_sensor=replace(u.temperature_sensor, degc_per_code=0.001))),
+    (ANGLES[ZENITH_TOOL_FACE], "AT-SIM", "with zenith and tool face", lambda u: replace(
+        u, angles=AnglesChoice(ZENITH_TOOL_FACE))),
+    (ANGLES[PITCH_ROLL], "AT-CHERNIAK", "with pitch and roll", lambda u: replace(
+        u, angles=AnglesChoice(PITCH_ROLL))),
 )  # fmt: skip
 
 
@@ -169,4 +186,8 @@ def made_case(folder: Path, name: str, note: str, change: Change, terms: Terms) 
     provenance = Provenance(unit.serial, inputs_sha256(folder), (told,))
     files |= render_constants(plan, unit.temperature_sensor, provenance)
     files |= render_selftest(plan, provenance)
-    return Case(name, note, plan, files, image_bytes(plan))
+    angles = None
+    if unit.angles is not None and not plan.shape.gyro:
+        angles = angles_plan(unit.angles, plan)
+        files |= render_angles(angles, names_of(plan))
+    return Case(name, note, plan, files, image_bytes(plan), angles)

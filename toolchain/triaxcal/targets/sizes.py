@@ -59,6 +59,13 @@ def flash_of(
     return Flash(code, tables, helpers, loader)
 
 
+def code_of(
+    toolset: Toolset, objects: Sequence[str], roots: Sequence[str], program: Path
+) -> tuple[int, int]:
+    """Bytes of the first object's code and tables that `roots` keep, and of everything else."""
+    return _text(toolset, objects, roots, program)
+
+
 def _symbols(toolset: Toolset, file: str) -> list[tuple[str, str]]:
     """Kinds and names of an object's symbols."""
     nm = toolset.core.gcc.removesuffix("gcc") + "nm"

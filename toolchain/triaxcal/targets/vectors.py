@@ -14,6 +14,7 @@ from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.codegen.forces import rate_edges
 from triaxcal.codegen.routines import Int32Array, UInt32Array
 from triaxcal.codegen.templates import int32_literal
+from triaxcal.fixedpoint.angles import AnglesPlan, angles
 from triaxcal.fixedpoint.arithmetic import INT32_MAX, INT32_MIN
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.targets.cores.core import VECTORS
@@ -94,6 +95,7 @@ def case_header(case: Case) -> str:
         *_table("CASE_TEMP", temp_boundaries(plan)),
         *_table("CASE_RAW", raw_boundaries(plan)),
         *_terms(plan),
+        *(["#define CASE_ANGLES 1"] if case.angles is not None else []),
         "static const uint8_t CASE_IMAGE[] = {" + ", ".join(map(str, case.image)) + "};",
     ]
     return "\n".join(lines) + "\n"
@@ -130,4 +132,24 @@ def expected_lines(case: Case, count: int = VECTORS) -> dict[str, int]:
     return {
         "selftest": 0, "generated": digest, "refused": tries, "refused_by_reference": tries,
         "load": 0, "image": digest, "open": 0, "reference": digest,
+        **({} if case.angles is None else {"angles": _angles_digest(case.angles, count)}),
     }  # fmt: skip
+
+
+def _angles_digest(plan: AnglesPlan, count: int) -> int:
+    found, status = angles(plan, triads(count).astype(np.int64))
+    answers = np.column_stack([found, status]) % 2**32
+    return zlib.crc32(answers.astype("<u4").tobytes())
+
+
+def triads(count: int = VECTORS) -> Int32Array:
+    """Accelerations (count, 3) of every size and sign, axis by axis, for the angles."""
+    random = draw(np.arange(4 * count, dtype=np.uint32).reshape(-1, 4))
+    first = random[:, 0]
+    sizes = []
+    for j in range(3):
+        shift = (first & np.uint32(15)) + ((first >> np.uint32(8 + 4 * j)) & np.uint32(15))
+        size = random[:, j + 1] >> shift
+        negative = ((first >> np.uint32(20 + j)) & np.uint32(1)) == 1
+        sizes.append(np.where(negative, np.uint32(0) - size, size))
+    return np.ascontiguousarray(np.column_stack(sizes).astype(np.uint32).view(np.int32))

@@ -8,9 +8,11 @@ from pathlib import Path
 
 from triaxcal.base.tools import MissingToolError
 from triaxcal.codegen.crosscheck import CrossCheck
+from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
 from triaxcal.verify import analyzers, cost, cppcheck, eva, gappa
+from triaxcal.verify import angles as angle_checks
 from triaxcal.verify.outcome import FAILED, NOT_DONE, Outcome, judged
 from triaxcal.verify.tools import BrokenToolError
 from triaxcal.verify.workspace import Workspace
@@ -32,17 +34,22 @@ CHECKS: tuple[tuple[str, str, Check], ...] = (
 
 
 def verify_files(
-    folder: Path, files: Mapping[str, bytes], plan: Plan, bound: Bound
+    folder: Path,
+    files: Mapping[str, bytes],
+    plan: Plan,
+    bound: Bound,
+    angles: AnglesPlan | None = None,
 ) -> tuple[Outcome, ...]:
     """Run every check on delivered files; `folder` is for the work and stays behind."""
-    return verify_work(Workspace.create(folder, files, plan, bound))
+    return verify_work(Workspace.create(folder, files, plan, bound, angles))
 
 
 def verify_work(work: Workspace) -> tuple[Outcome, ...]:
     """Run every check on the files of a workspace."""
+    checks = CHECKS if work.angles is None else (*CHECKS, *angle_checks.CHECKS)
     with ThreadPoolExecutor(2) as pool:
         return tuple(
-            pool.map(lambda check: guarded(check[0], check[1], lambda: check[2](work)), CHECKS)
+            pool.map(lambda check: guarded(check[0], check[1], lambda: check[2](work)), checks)
         )
 
 

@@ -17,7 +17,7 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.unit.arithmetic import LIMBS, PORTABLE, THUMB1, THUMB2
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.tools import BrokenToolError, run
-from triaxcal.verify.workspace import CONSTANTS, SELFTEST, Workspace
+from triaxcal.verify.workspace import ANGLES, CONSTANTS, SELFTEST, Workspace
 
 CPPCHECK = TOOLS["cppcheck"]
 DEVIATIONS = Path(__file__).with_name("misra_deviations.toml")
@@ -37,6 +37,13 @@ uint32_t use_{triad}(const uint8_t *image)
     static {triad}_state_t state;
     (void){triad}_set_temperature(&state, &{TRIAD}_CALIB, {triad}_calib_constants.temp_min_code);
     return {triad}_calib_check(image, {TRIAD}_FILE_SIZE) | {triad}_selftest();
+}}
+"""
+_USES_ANGLES = """#include "{triad}_angles.h"
+uint32_t use_{triad}_angles(const int32_t accel[3])
+{{
+    {triad}_angle_t angle[2];
+    return {triad}_angles(accel, angle) + (uint32_t)angle[1];
 }}
 """
 _RULE = re.compile(r"misra-c2012-(\d+\.\d+)")
@@ -113,7 +120,8 @@ def find_all(work: Workspace) -> list[Finding]:
     ------
     MissingToolError, BrokenToolError
     """
-    findings = find_in(work.folder, _sources(work.plan, PORTABLE), [work.plan])
+    angles = [work.named(ANGLES)] if work.angles is not None else []
+    findings = find_in(work.folder, [*_sources(work.plan, PORTABLE), *angles], [work.plan])
     for form in sorted({form_of(work.plan.shape, form) for form in FORMS} - {PORTABLE}):
         plan = replace(work.plan, arithmetic=form)
         folder = work.folder / f"cppcheck_{form}"
@@ -142,7 +150,10 @@ def find_in(
     ------
     MissingToolError, BrokenToolError
     """
-    (folder / USER).write_text("".join(_USES.format(**names_of(plan).context) for plan in plans))
+    uses = [_USES.format(**names_of(plan).context) for plan in plans]
+    if any(source.endswith("_angles.c") for source in sources):
+        uses.append(_USES_ANGLES.format(**names_of(plans[0]).context))
+    (folder / USER).write_text("".join(uses))
     answer = run([CPPCHECK.find(), *OPTIONS, *defines, *sources, USER], folder)
     if answer.code:
         raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")

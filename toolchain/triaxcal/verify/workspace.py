@@ -12,6 +12,7 @@ from triaxcal.codegen.names import names_of
 from triaxcal.codegen.render import render_routine, routine_file
 from triaxcal.codegen.shim import write_shim
 from triaxcal.codegen.templates import environment
+from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
 from triaxcal.unit.arithmetic import LIMBS, PORTABLE
@@ -20,6 +21,7 @@ from triaxcal.verify.image_reader import image_length
 ROUTINE = "triax_comp.c"
 CONSTANTS = "triax_calib.c"
 SELFTEST = "triax_selftest.c"
+ANGLES = "triax_angles.c"
 HEADERS = ("triax_comp.h", "triax_calib.h")
 IMAGE = "triax_calib.bin"
 SHIM = "names"
@@ -41,15 +43,23 @@ class Workspace:
     folder : Path
         Holds the delivered files; a check may add its own beside them, under its own names.
     plan, bound : of the delivery
+    angles : AnglesPlan or None
+        Of the device's angles, where the delivery has them.
     """
 
     folder: Path
     plan: Plan
     bound: Bound
+    angles: AnglesPlan | None = None
 
     @classmethod
     def create(
-        cls, folder: Path, files: Mapping[str, bytes], plan: Plan, bound: Bound
+        cls,
+        folder: Path,
+        files: Mapping[str, bytes],
+        plan: Plan,
+        bound: Bound,
+        angles: AnglesPlan | None = None,
     ) -> Workspace:
         """Write the delivered files into `folder`."""
         folder.mkdir(parents=True, exist_ok=True)
@@ -60,7 +70,7 @@ class Workspace:
             if name not in files:
                 (folder / name).write_text(texts[name])
         write_shim(folder / SHIM, plan.prefix)
-        return cls(folder, plan, bound)
+        return cls(folder, plan, bound, angles)
 
     @property
     def image(self) -> bytes:
