@@ -11,10 +11,11 @@ from targets.test_targets import CASES, need, run_on_host
 from triaxcal.targets.bench_angles import angles_cost, angles_markdown
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import build_plugin
-from triaxcal.targets.matrix import LIMBS, compare
+from triaxcal.targets.matrix import compare
 from triaxcal.targets.shapes import ANGLES
 from triaxcal.targets.vectors import expected_lines, triads
 from triaxcal.unit.angles import PITCH_ROLL, ZENITH_TOOL_FACE
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE
 
 WITH = {pair: next(c for c in CASES if c.name == name) for pair, name in ANGLES.items()}
 
@@ -28,9 +29,9 @@ def test_triads_have_every_size_and_sign_on_each_axis() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("arithmetic", [0, LIMBS])
+@pytest.mark.parametrize("arithmetic", [PORTABLE, LIMBS])
 @pytest.mark.parametrize("pair", WITH)
-def test_host_prints_the_digest_of_python(pair: str, arithmetic: int, tmp_path: Path) -> None:
+def test_host_prints_the_digest_of_python(pair: str, arithmetic: str, tmp_path: Path) -> None:
     case = WITH[pair]
     assert "angles" in expected_lines(case)
     assert compare(run_on_host(case, tmp_path, arithmetic), expected_lines(case)) == ""

@@ -108,18 +108,9 @@ static uint32_t is_below(uint64_t value, uint64_t limit)
     return (uint32_t)((value - limit) >> 63);
 }
 
-/* In a fixed number of steps also where the core has no 32x32->64 multiplication. */
 static uint64_t product(uint32_t a, uint32_t b)
 {
-#if (TRIAX_ARITHMETIC == TRIAX_LIMBS) || (TRIAX_ARITHMETIC == TRIAX_THUMB1)
-    const uint32_t low = (a & 0xFFFFu) * (b & 0xFFFFu);
-    const uint32_t first = ((a >> 16) * (b & 0xFFFFu)) + (low >> 16);
-    const uint32_t second = ((a & 0xFFFFu) * (b >> 16)) + (first & 0xFFFFu);
-    const uint32_t high = ((a >> 16) * (b >> 16)) + (first >> 16) + (second >> 16);
-    return ((uint64_t)high << 32) | (((second & 0xFFFFu) << 16) | (low & 0xFFFFu));
-#else
     return (uint64_t)a * b;
-#endif
 }
 
 /* Status of the parts across the axis of the second angle, and along it. */

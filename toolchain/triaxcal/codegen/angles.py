@@ -27,6 +27,9 @@ from triaxcal.fixedpoint.angles import (
     AnglesPlan,
 )
 from triaxcal.fixedpoint.angles_proof import prove_angles
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.unit.angles import AnglesChoice
+from triaxcal.unit.arithmetic import LIMBS, THUMB1
 from triaxcal.unit.prefix import DEFAULT_PREFIX
 
 ANGLES_FILES = ("triax_angles.h", "triax_angles.c")
@@ -35,8 +38,13 @@ _DIGITS_A_ROUND = 3
 _WORDS_A_LINE = 7
 
 
+def angles_plan(choice: AnglesChoice, plan: Plan) -> AnglesPlan:
+    """The angles of a triad's routine."""
+    return AnglesPlan(choice, plan.shape.output_q, plan.arithmetic in {LIMBS, THUMB1})
+
+
 def angles_id(plan: AnglesPlan) -> str:
-    """Eight hex digits: equal exactly when the generated routine is equal."""
+    """Eight hex digits: equal exactly when the routine gives equal results."""
     words = (plan.zenith, plan.output_q, plan.rest_low, plan.rest_high, plan.across_low)
     return f"{zlib.crc32(repr(words).encode()):08x}"
 
@@ -59,6 +67,7 @@ def _context(plan: AnglesPlan, names: Names) -> dict[str, Any]:
     growth = math.prod(math.sqrt(1.0 + 4.0**-i) for i in range(ROTATIONS))
     return {
         "zenith": plan.zenith,
+        "halves": plan.halves,
         "first": first,
         "second": second,
         "axis_words": "axis z" if plan.zenith else "axis x",

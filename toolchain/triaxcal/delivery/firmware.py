@@ -11,6 +11,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.screentext import table
+from triaxcal.codegen.angles import angles_plan
 from triaxcal.codegen.constants import Provenance
 from triaxcal.codegen.outputs.output import Job
 from triaxcal.codegen.outputs.registry import output_files
@@ -84,7 +85,7 @@ class Firmware:
     def angles(self) -> AnglesPlan | None:
         """The angles that the device makes; None for none."""
         choice = self.fitted.unit.angles
-        return None if choice is None else AnglesPlan(choice, self.plan.shape.output_q)
+        return None if choice is None else angles_plan(choice, self.plan)
 
     @cached_property
     def uncertainty(self) -> Uncertainty:

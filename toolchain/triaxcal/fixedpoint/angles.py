@@ -78,6 +78,9 @@ class AnglesPlan:
     choice : AnglesChoice
     output_q : int
         The LSB of the acceleration is 2^-output_q g.
+    halves : bool
+        Whether the C forms its products of halves of words, for cores without a multiplication of
+        32 bits by 32 to 64.
     rest_low, rest_high : int
         |a|^2 / 2, floored, is within these at rest, LSB^2.
     across_low : int
@@ -86,6 +89,7 @@ class AnglesPlan:
 
     choice: AnglesChoice
     output_q: int
+    halves: bool = False
 
     @property
     def rest_low(self) -> int:  # noqa: D102  stated above

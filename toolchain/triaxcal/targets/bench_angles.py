@@ -23,9 +23,9 @@ from triaxcal.targets.build import TargetError, Toolset, build, compiled, in_par
 from triaxcal.targets.cores.core import Core
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import Span, build_plugin, measure_angles
-from triaxcal.targets.matrix import PORTABLE
 from triaxcal.targets.shapes import Case
 from triaxcal.targets.sizes import code_of
+from triaxcal.unit.arithmetic import PORTABLE
 
 RANDOM = 60
 SEED = 20130526
@@ -80,6 +80,8 @@ def run_angles_bench(
 
 def angles_cost(case: Case | None, core: Core, work: Path, plugin: Path) -> AnglesCost:
     """Build, count and size the angles of a case, or the baseline, on a core."""
+    if case is not None:
+        case = case.in_form(best_form(core))
     plan = None if case is None else case.angles
     what = DOUBLE if plan is None else plan.choice.pair
     missing = missing_tools(core.tools("gcc"))
@@ -90,11 +92,10 @@ def angles_cost(case: Case | None, core: Core, work: Path, plugin: Path) -> Angl
         source, include, defines = _write(case, plan, work)
         target = shipped("firmware_ref") / "target"
         harness = [target / f"bench_{n}" for n in ("angles.c", "stack.c", "known.S")]
-        form = PORTABLE if plan is None else best_form(core)
-        fast = Toolset(core, "gcc", OPTIMISATION, form, defines)
+        fast = Toolset(core, "gcc", OPTIMISATION, PORTABLE, defines)
         build(fast, [source, *harness], include, work / "program.elf")
         count, stack = measure_angles(core, work / "program.elf", plugin)
-        small = Toolset(core, "gcc", SIZE_OPTIMISATION, form, defines)
+        small = Toolset(core, "gcc", SIZE_OPTIMISATION, PORTABLE, defines)
         objects = compiled(small, [source], include, work / "small")
         root = "floating_angles"
         if plan is not None and case is not None:

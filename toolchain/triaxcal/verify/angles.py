@@ -10,30 +10,44 @@ import numpy as np
 
 from triaxcal.base.shipped import shipped
 from triaxcal.base.tools import MissingToolError
+from triaxcal.codegen.angles import render_angles
 from triaxcal.codegen.angles_check import angle_vectors
+from triaxcal.codegen.names import names_of
 from triaxcal.fixedpoint.angles import AnglesPlan, angles
 from triaxcal.targets.bench_angles import angles_cost
 from triaxcal.targets.build import TargetError, in_parallel
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import build_plugin
 from triaxcal.targets.shapes import Case
+from triaxcal.unit.arithmetic import LIMBS, PORTABLE
 from triaxcal.verify import analyzers, eva
 from triaxcal.verify.outcome import Outcome, judged
 from triaxcal.verify.tools import BrokenToolError
-from triaxcal.verify.workspace import ANGLES, IMAGE, LIMBS, PORTABLE, Workspace
+from triaxcal.verify.workspace import ANGLES, IMAGE, Workspace
 
 _DRIVER = "verify_eva_angles.c"
 
 
-def _eva(work: Workspace, key: str, title: str, form: tuple[str, ...]) -> Outcome:
+def _forms(work: Workspace) -> dict[str, str]:
+    """The delivered C file, and the same with the other products, by the name of the form."""
+    plan = _plan(work)
+    forms = {False: PORTABLE, True: LIMBS}
+    other = replace(plan, halves=not plan.halves)
+    path = work.folder / f"verify_angles_{forms[other.halves]}.c"
+    names = names_of(work.plan)
+    path.write_text(render_angles(other, names)[work.named(ANGLES)])
+    return {forms[plan.halves]: work.named(ANGLES), forms[other.halves]: path.name}
+
+
+def _eva(work: Workspace, key: str, title: str, form: str) -> Outcome:
     driver = work.render(f"{key}_{_DRIVER}", "verify/eva_angles.c.j2", {})
     entry = "verify_angles"
-    sources = (work.named(ANGLES), driver.name)
-    return eva.analyse(work.folder, eva.Analysis(key, title, entry, {entry}, sources, form))
+    sources = (_forms(work)[form], driver.name)
+    return eva.analyse(work.folder, eva.Analysis(key, title, entry, {entry}, sources))
 
 
 def _gcc_analyzer(work: Workspace) -> Outcome:
-    found = analyzers.analyse_with_gcc(work.folder, work.named(ANGLES))
+    found = analyzers.analyse_with_gcc(work.folder, _forms(work))
     return replace(found, key="angles_gcc_analyzer", title="angles: gcc -fanalyzer")
 
 
@@ -44,10 +58,11 @@ def _sanitizer(work: Workspace, sanitizer: analyzers.Sanitizer) -> Outcome:
     own = analyzers.Sanitizer(
         f"angles_{sanitizer.key}", f"angles: {sanitizer.title}", sanitizer.tool, sanitizer.flags
     )
+    batch = str(shipped("firmware_ref") / "triax_angles_batch.c")
     subject = analyzers.Subject(
         work.folder,
         work.render(f"verify_{own.key}.c", "verify/driver_angles.c.j2", {}),
-        (work.named(ANGLES), str(shipped("firmware_ref") / "triax_angles_batch.c")),
+        {form: (file, batch) for form, file in _forms(work).items()},
         work.named(IMAGE),
         accel.tobytes(),
         answers.astype(np.uint32).tobytes(),
