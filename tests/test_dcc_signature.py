@@ -164,6 +164,37 @@ def test_a_signature_of_something_else_does_not_count(desk: Desk, keys: dict[str
     assert "has 2 signatures; expected one signature" in refused(path)
 
 
+def signed_by_others(plain: bytes, key: Any, *, references: int) -> bytes:
+    """A signature as other programs make it: fewer references than ours."""
+    from lxml import etree
+    from signxml import DigestAlgorithm, SignatureMethod, XMLSigner
+    from signxml.xades import XAdESSigner
+
+    class Other(XAdESSigner):
+        def _add_reference_to_signed_info(self, sig_root: Any, node: Any, **attrs: str) -> None:
+            if attrs and references == 2:  # that of the signed properties alone has a type
+                super()._add_reference_to_signed_info(sig_root, node, **attrs)
+
+    how = {"signature_algorithm": SignatureMethod.ECDSA_SHA256}
+    signer = Other(**how) if references else XMLSigner(**how)
+    assert signer.digest_alg is DigestAlgorithm.SHA256
+    made = signer.sign(etree.fromstring(plain), key=key, cert=[cert_of(key)])
+    found: bytes = etree.tostring(made)
+    return found
+
+
+def test_signatures_of_other_programs(desk: Desk, keys: dict[str, Any], plain: bytes) -> None:
+    """XAdES refers to the document and the signed properties; without these it is not XAdES."""
+    path = desk.put("theirs.xml", signed_by_others(plain, keys["ec"], references=2))
+    assert triaxcal.verify_certificate(path).subject == "CN=N. N."
+    path.write_bytes(path.read_bytes().replace(b"2026-03-30<", b"2026-03-29<"))
+    assert "was changed after it was signed" in refused(path)
+    path.write_bytes(signed_by_others(plain, keys["ec"], references=1))
+    assert "no valid signature: " in refused(path)
+    path.write_bytes(signed_by_others(plain, keys["ec"], references=0))
+    assert "it does not state when it was made, as XAdES does" in refused(path)
+
+
 def test_unsigned_and_signed_twice(desk: Desk, keys: dict[str, Any]) -> None:
     assert "certificate.dcc.xml: is not signed; expected one signature, of the" in refused(
         desk.path
