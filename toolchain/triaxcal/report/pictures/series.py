@@ -17,6 +17,10 @@ from triaxcal.report.words.numbers import scaled, signed, significant, superscri
 
 WIDTH, HEIGHT = 252.0, 138.0
 LEFT, RIGHT, TOP, BASE = 34.0, 18.0, 14.0, 104.0
+_SMALL_MG = 0.05
+"""The end of an axis below which it is in micro-g."""
+_LONG = 4
+"""Characters of a label beyond which fewer of them have room."""
 RUN_WIDTH, RUN_HEIGHT = 700.0, 190.0
 
 
@@ -58,9 +62,11 @@ def error_histogram(errors_mg: FloatArray, limit_mg: float, name: str) -> dict[s
     top = max(float(errors_mg.max()), limit_mg)
     if limit_mg > 4.0 * errors_mg.max():  # else all of the units would be one bar
         top = float(errors_mg.max()) or limit_mg
-    limit = Limit(limit_mg, f"limit {significant(limit_mg, 3)} mg")
-    picture = _drawn(errors_mg, errors_mg > limit_mg, (0.0, 1.05 * top), "mg", [limit])
     beyond = limit_mg > 1.05 * top
+    unit, scale = ("µg", 1e3) if top < _SMALL_MG else ("mg", 1.0)
+    limit = Limit(limit_mg * scale, f"limit {significant(limit_mg, 3)} mg")
+    errors = errors_mg * scale
+    picture = _drawn(errors, errors_mg > limit_mg, (0.0, 1.05 * top * scale), unit, [limit])
     return {"name": name, "beyond": limit.label if beyond else "", **picture}
 
 
@@ -87,6 +93,8 @@ def _drawn(
     away = np.histogram(values[marked], edges)[0].tolist()
     top = max(1, *(a + b for a, b in zip(near, away, strict=True)))
     marks, exponent = _scale(ticks(low, high, 5))
+    if any(len(label) > _LONG for _, label in marks):
+        marks, exponent = _scale(ticks(low, high, 3))
 
     def x(value: float) -> float:
         return round(float(LEFT + (WIDTH - LEFT - RIGHT) * (value - low) / span), 2)
