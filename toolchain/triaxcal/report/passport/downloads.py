@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import base64
-import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Passport
+from triaxcal.report.texts.csvlink import csv_link
 from triaxcal.uncertainty.coverage import LEVEL
 
 _FORCES = ("x", "y", "z", "length")
@@ -27,20 +25,9 @@ def downloads(p: Passport) -> dict[str, dict[str, str]]:
         "budgets": _budgets(p),
     }
     return {
-        name: {"name": f"{serial}-{name}.csv", "uri": _uri(rows)} for name, rows in tables.items()
+        name: {"name": f"{serial}-{name}.csv", "uri": csv_link(rows)}
+        for name, rows in tables.items()
     }
-
-
-def _uri(rows: Iterable[Sequence[object]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(_safe(row) for row in rows)
-    coded = base64.b64encode(text.getvalue().encode()).decode()
-    return f"data:text/csv;charset=utf-8;base64,{coded}"
-
-
-def _safe(row: Sequence[object]) -> list[object]:
-    """Text that a spreadsheet would take for a formula gets an apostrophe."""
-    return [f"'{v}" if isinstance(v, str) and v[:1] in "=+-@\t\r" and v[1:] else v for v in row]
 
 
 def _constants(p: Passport) -> list[Sequence[object]]:

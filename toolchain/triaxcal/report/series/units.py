@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import base64
-import csv
-import io
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +11,7 @@ from urllib.parse import quote
 
 from triaxcal.batch.run import Series
 from triaxcal.delivery.verdict import PASSED, REFUSED
+from triaxcal.report.texts.csvlink import csv_link
 from triaxcal.report.words.numbers import significant
 
 SKIPPED = "not in the series"
@@ -131,12 +129,4 @@ def units_csv(rows: Iterable[Row]) -> str:
         (r.unit, r.serial, r.kind, r.result, r.why, *r.errors_g, r.model, r.rig, r.date, r.href)
         for r in rows
     ]
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([head, *map(_safe, lines)])
-    coded = base64.b64encode(text.getvalue().encode("utf-8", "backslashreplace")).decode()
-    return f"data:text/csv;charset=utf-8;base64,{coded}"
-
-
-def _safe(row: Sequence[object]) -> list[object]:
-    """Text that a spreadsheet would take for a formula gets an apostrophe."""
-    return [f"'{v}" if isinstance(v, str) and v[:1] in tuple("=+-@\t\r") else v for v in row]
+    return csv_link([head, *lines])
