@@ -10,60 +10,8 @@ import pytest
 from rig_cases import short_setup
 from test_cli_rig import bench_copy
 
-WITHOUT = """
-import os, select, signal, socket, sys, types
-for name in {modules}:
-    sys.modules[name] = None
-for place, names in (
-    (socket, ("AF_CAN", "PF_CAN", "CAN_RAW", "SOL_CAN_RAW", "MSG_DONTWAIT", "SO_RCVBUFFORCE")),
-    (signal, ("SIGHUP",)),
-    (os, ("fdatasync", "sched_getaffinity")),
-):
-    for name in names:
-        if hasattr(place, name):
-            delattr(place, name)
-"""
-WINDOWS = ("termios", "tty", "fcntl", "resource", "pwd", "grp", "pty")
-MORE_OF_WINDOWS = """
-for place, names in (
-    (os, ("pread", "pwrite", "fork", "O_DIRECTORY", "getuid", "geteuid", "fchmod", "killpg")),
-    (select, ("poll", "epoll")),
-    (signal, ("SIGKILL", "SIGUSR1", "SIGALRM", "setitimer")),
-    (socket, ("AF_UNIX", "SOCK_SEQPACKET", "recv_fds")),
-):
-    for name in names:
-        if hasattr(place, name):
-            delattr(place, name)
-"""
-CONSOLE = """
-import importlib.machinery
-import subprocess  # takes the system for Windows by this module
-held = {}
-console = types.ModuleType("msvcrt")
-console.__spec__ = importlib.machinery.ModuleSpec("msvcrt", None)
-console.LK_NBLCK, console.kbhit, console.getwch = 2, lambda: False, lambda: ""
-def is_open(file, place):
-    # Closing gives the lock back; a new file may get the number of one that is gone.
-    try:
-        return os.fstat(file).st_ino == place
-    except OSError:
-        return False
-def locking(file, mode, count):
-    assert (mode, count) == (2, 1)
-    assert os.lseek(file, 0, os.SEEK_CUR) > 4096  # what others read is not locked
-    place = os.fstat(file).st_ino
-    if held.get(place, file) != file and is_open(held[place], place):
-        raise PermissionError(13, "Permission denied")
-    held[place] = file
-console.locking = locking
-sys.modules["msvcrt"] = console
-"""
-"""Stands for Windows' own module."""
-SYSTEMS = {
-    "macOS": WITHOUT.format(modules=()),
-    "no locks": WITHOUT.format(modules=WINDOWS) + MORE_OF_WINDOWS,
-    "Windows": WITHOUT.format(modules=WINDOWS) + MORE_OF_WINDOWS + CONSOLE,
-}
+from systems import RUN, SYSTEMS, python
+
 IMPORTED = """
 import importlib, pkgutil
 import triaxcal.cli.entry, triaxcal.cli.main, triaxcal.cli.rig_live, triaxcal.cli.rig_fil
@@ -73,23 +21,6 @@ import triaxcal.rig as room
 for module in pkgutil.walk_packages(room.__path__, "triaxcal.rig."):
     importlib.import_module(module.name)
 """
-RUN = """
-import shlex
-from triaxcal.cli.entry import entry
-for line in sys.stdin.read().splitlines():
-    sys.argv = ["triaxcal", *shlex.split(line)]
-    try:
-        entry()
-        print("exit 0", flush=True)
-    except SystemExit as end:
-        print("exit", end.code, flush=True)
-"""
-
-
-def python(program, said=""):
-    return subprocess.run(
-        [sys.executable, "-c", program], input=said, capture_output=True, text=True, check=False
-    )
 
 
 @pytest.mark.parametrize("system", SYSTEMS)

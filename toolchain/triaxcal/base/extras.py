@@ -6,6 +6,7 @@ import importlib.util
 import os
 import shlex
 import shutil
+import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -42,7 +43,12 @@ def install_command(extra: str) -> str:
     elif Path(python).is_relative_to(Path.cwd()):
         python = os.path.relpath(python)
         python = python if os.sep in python else f".{os.sep}{python}"
-    return f"{shlex.quote(python)} -m pip install 'triaxcal[{extra}]'"
+    return f"{quoted(python)} -m pip install {quoted(f'triaxcal[{extra}]')}"
+
+
+def quoted(word: str) -> str:
+    """A word as the shell of this system takes it for one."""
+    return subprocess.list2cmdline([word]) if os.name == "nt" else shlex.quote(word)
 
 
 def refuse_missing_packages(place: str, packages: Iterable[str], extra: str) -> None:

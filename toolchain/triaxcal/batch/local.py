@@ -13,7 +13,7 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -138,22 +138,28 @@ def _uninterrupted() -> Iterator[None]:
     came: list[int] = []
     # The mask is what a worker inherits; here, threads of libraries take signals in spite of it.
     handlers = {n: signal.signal(n, lambda n, _: came.append(n)) for n in _OF_THE_TERMINAL}
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _OF_THE_TERMINAL)
+    before = _masked("SIG_BLOCK", _OF_THE_TERMINAL)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        _masked("SIG_SETMASK", before)
         for name, handler in handlers.items():
             signal.signal(name, handler)
         if came:
             raise KeyboardInterrupt
 
 
+def _masked(how: str, signals: Collection[int]) -> Collection[int]:
+    """Change the signals that are held back; Windows holds none back, and gives none on."""
+    mask = getattr(signal, "pthread_sigmask", None)
+    return mask(getattr(signal, how), signals) if mask else ()
+
+
 def _start(scratch: str) -> None:
     """Leave interrupts to the parent, and litter to its folder."""
     for name in _OF_THE_TERMINAL:
         signal.signal(name, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _OF_THE_TERMINAL)
+    _masked("SIG_UNBLOCK", _OF_THE_TERMINAL)
     tempfile.tempdir = scratch
     threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 
 import click
 
 import triaxcal
+from triaxcal.base.extras import quoted
 from triaxcal.cli.options import command
 from triaxcal.cli.options import example as examples_of_use
 
@@ -35,4 +35,4 @@ def example(name: str | None, into: Path) -> None:
     folder = triaxcal.copy_example(name, into)
     click.echo(f"{folder} written. Next:")
     for line in next(one.commands for one in found if one.name == name):
-        click.echo("  " + line.format(shlex.quote(str(folder))))
+        click.echo("  " + line.format(quoted(str(folder))))

@@ -105,6 +105,12 @@ def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
 @contextlib.contextmanager
 def node_on(program: Path, *sensor: str) -> Iterator[socket.socket]:
     """Start the node; gives our end of its bus. `sensor` is the file of its own, and its rate."""
+    if not hasattr(socket, "SOCK_SEQPACKET") or not hasattr(socket, "AF_UNIX"):
+        raise RefusedError(
+            "rig fil",
+            "this system has no sockets of packets between programs",
+            remedy="name a bus with --bus, and connect a node to it",
+        )
     link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     number = theirs.fileno()
     command = [str(program), "socket", str(number), *sensor]

@@ -37,5 +37,5 @@ def write_shim(folder: Path, prefix: str) -> tuple[Path, ...]:
         renamed += [f"#ifdef {own}", f"#define {DEFAULT_PREFIX.upper()}_{macro} {own}", "#endif"]
     for header in _HEADERS:
         text = "\n".join([f'#include "{prefix}_{header}"', *renamed])
-        (folder / f"{DEFAULT_PREFIX}_{header}").write_text(f"{text}\n")
+        (folder / f"{DEFAULT_PREFIX}_{header}").write_text(f"{text}\n", encoding="utf-8")
     return (folder,)

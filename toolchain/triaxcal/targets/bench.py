@@ -159,13 +159,15 @@ def _write_subject(subject: Subject, work: Path) -> tuple[list[Path], list[Path]
     target = shipped("firmware_ref") / "target"
     case = subject.case.in_form(subject.arithmetic)
     work.mkdir(parents=True)
-    (work / "bench_case.h").write_text(case_header(case.plan))
+    (work / "bench_case.h").write_text(case_header(case.plan), encoding="utf-8")
     if subject.real:
-        (work / "floating_tables.c").write_text(floating_tables(case.plan, subject.real))
+        (work / "floating_tables.c").write_text(
+            floating_tables(case.plan, subject.real), encoding="utf-8"
+        )
         defines = floating_macros(case.plan, subject.real)
         return [target / "bench_floating.c", work / "floating_tables.c"], [work], defines
     for name, text in case.files.items():
-        (work / name).write_text(text)
+        (work / name).write_text(text, encoding="utf-8")
     defines = ("-DBENCH_GYRO",) if case.plan.shape.gyro else ()
     include = [work, *write_shim(work / "names", case.plan.prefix)]
     return [work / name for name in case.sources], include, defines

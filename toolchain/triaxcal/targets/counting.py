@@ -109,7 +109,7 @@ def counted_sections(
     options = ["-plugin", f"{plugin},begin={begin:#x},end={end:#x},out={out}"]
     printed = [line.split() for line in emulate(core, program, options).splitlines()]
     values = {name: int(value) for name, value in printed}
-    counts = [int(line) for line in out.read_text().splitlines()]
+    counts = [int(line) for line in out.read_text(encoding="utf-8").splitlines()]
     sections: dict[str, list[int]] = {}
     for name in names:
         sections[name], counts = counts[: values[name]], counts[values[name] :]

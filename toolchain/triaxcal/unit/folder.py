@@ -13,6 +13,8 @@ from triaxcal.base.tomltable import did_you_mean, read_toml, shown
 
 UNIT_FILE, UNIT_FORMAT = "unit.toml", 1
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
+_DEVICE = re.compile(r"(?i:con|prn|aux|nul|com[0-9]|lpt[0-9])")
+"""Windows makes no folder of such a name."""
 _NAME_RULE = "1 to 64 of A-Z a-z 0-9 - _, the first a letter or digit"
 
 SERIAL = Key(
@@ -29,10 +31,15 @@ def check_unit_name(name: str, where: str = "unit name") -> None:
     Raises
     ------
     RefusedError
-        Unless it is 1 to 64 ASCII letters, digits, '-' and '_', the first a letter or digit.
+        Unless it is 1 to 64 ASCII letters, digits, '-' and '_', the first a letter or digit, and
+        not the name of a device of Windows.
     """
     if not _NAME.fullmatch(name):
         raise RefusedError(where, f"found {shown(name)}", expected=_NAME_RULE)
+    if _DEVICE.fullmatch(name):
+        raise RefusedError(
+            where, f"found {shown(name)}, a device of Windows", remedy="choose another name"
+        )
 
 
 def list_units(units_dir: Path) -> list[str]:
@@ -57,6 +64,7 @@ def find_unit(folder: Path) -> Path:
         raise RefusedError(str(folder), "'..' in the name of a unit", expected=_NAME_RULE)
     check_unit_name(folder.absolute().name, f"unit {shown(str(folder))}")
     if _is_unit(folder):
+        _refuse_other_case(folder)
         return folder / UNIT_FILE
     _refuse_made_files(folder)
     hint = ""
@@ -70,6 +78,19 @@ def find_unit(folder: Path) -> Path:
         remedy = f"`triaxcal init {folder}` writes a first unit.toml"
     found = f"no {UNIT_FILE} in it" if folder.is_dir() else f"no such unit{hint}"
     raise RefusedError(str(folder), found, remedy=remedy)
+
+
+def _refuse_other_case(folder: Path) -> None:
+    """Windows and macOS find sn-1 where SN-1 is: results of one unit would get two names."""
+    path = folder.absolute()
+    if not _is_unit(path.with_name(path.name.swapcase())):
+        return
+    names = list_units(path.parent)
+    if path.name not in names:
+        same = [name for name in names if name.lower() == path.name.lower()]
+        raise RefusedError(
+            str(folder), "no such unit by upper and lower case", expected=", ".join(same)
+        )
 
 
 def _refuse_made_files(folder: Path) -> None:

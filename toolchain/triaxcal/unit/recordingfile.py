@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from types import MappingProxyType
 
 from triaxcal.base.errors import RefusedError
@@ -41,7 +41,8 @@ def is_in_folder(name: object) -> bool:
     return (
         isinstance(name, str)
         and bool(name)
-        and not name.startswith("/")
+        and not name.startswith(("/", "\\"))
+        and not PureWindowsPath(name).is_absolute()
         and ".." not in name.replace("\\", "/").split("/")
     )
 

@@ -179,7 +179,7 @@ def _probe(folder: Path, sanitizer: Sanitizer) -> None:
     """Link nothing but the sanitizer's own library."""
     compiler = sanitizer.tool.find()
     probe = folder / f"verify_{sanitizer.key}_probe.c"
-    probe.write_text("int main(void) { return 0; }\n")
+    probe.write_text("int main(void) { return 0; }\n", encoding="utf-8")
     program = str(probe.with_suffix(""))
     if run([compiler, *sanitizer.flags, "-o", program, probe.name], folder).code:
         raise MissingToolError(

@@ -185,7 +185,7 @@ def _certificate(work: Workspace, image: Image, part: str, axis: int, s: int) ->
         **{key: known[key] for key in ("axis", "segment", "rate", "sensitivity", "preload")},
     }
     path = work.render(file, "verify/certificate.v.j2", context)
-    return Certificate(file, axis, s, path.read_text(), low, high)
+    return Certificate(file, axis, s, path.read_text(encoding="utf-8"), low, high)
 
 
 def without_hypotheses(proof: str) -> str:

@@ -105,7 +105,7 @@ def analyse(folder: Path, asked: Analysis) -> Outcome:
     answer = run([*command, "-then", "-report-csv", report.name], folder)
     if answer.code or not report.exists():
         raise BrokenToolError(f"frama-c: {answer.text.strip()[-200:]}")
-    alarms, reached = read_report(report.read_text())
+    alarms, reached = read_report(report.read_text(encoding="utf-8"))
     counted = _ALARMS.findall(answer.text)
     missed = sorted(asked.ends - reached)
     if not counted or int(counted[-1]) != len(alarms):

@@ -63,7 +63,7 @@ class Both:
         """Write a template's text under `name` and return its path."""
         path = self.folder / name
         known = {**names_of(self.build.accel).context, **context}
-        path.write_text(environment().get_template(template).render(known))
+        path.write_text(environment().get_template(template).render(known), encoding="utf-8")
         return path
 
     @property

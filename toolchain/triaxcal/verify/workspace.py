@@ -92,5 +92,5 @@ class Workspace:
         path = self.folder / name
         shape = self.plan.shape
         known = {"shape": shape, **names_of(self.plan).context, **context}
-        path.write_text(environment().get_template(template).render(known))
+        path.write_text(environment().get_template(template).render(known), encoding="utf-8")
         return path

@@ -14,5 +14,7 @@ def can_devices() -> list[str]:
         return []
     types = ((d.name, d / "type") for d in sorted(_NETWORK.iterdir()))
     return [
-        name for name, kind in types if kind.is_file() and kind.read_text().strip() == _CAN_DEVICE
+        name
+        for name, kind in types
+        if kind.is_file() and kind.read_text(encoding="utf-8").strip() == _CAN_DEVICE
     ]
