@@ -20,7 +20,7 @@ NAMED = case "$$UNIT" in \
     */*) echo "make: UNIT=$$UNIT is a path; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; esac
 
 .DEFAULT_GOAL := help
-.PHONY: help series test-long test-verify rig-demo test-can calib-header verify certify fuzz mutation simulate test check lint types nightly bench golden docs clean test-targets bench-target
+.PHONY: help series test-versions test-long test-verify rig-demo test-can calib-header verify certify fuzz mutation simulate test check lint types nightly bench golden docs clean test-targets bench-target
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -57,6 +57,9 @@ test: $(DEVELOPER)  ## Tests (under 3 minutes)
 
 test-long: $(DEVELOPER)  ## The longer ones: whole sessions, series, cores, coverage (8 minutes)
 	@$(PYTEST) -m "long and not slow" --ignore tests/verify
+
+test-versions: $(DEVELOPER)  ## The wheel with lowest and highest versions, and with no compiler but ziglang's
+	@$(BIN)/pytest -q tests/test_versions.py
 
 test-verify: $(DEVELOPER)  ## That every check of `make verify` passes, and can fail (3 minutes)
 	@$(PYTEST) -m "not slow" tests/verify

@@ -181,6 +181,10 @@ def test_a_first_file_of_a_tilter_goes_the_whole_way(tmp_path: Path) -> None:
     assert done.output == (
         f"{folder / 'unit.toml'} written; replace its examples. unit.schema.json is for your "
         "editor.\n"
+        "Next: write a row for each dwell to measurements.csv beside it, below the line\n"
+        "  position,temp_degc,ux_v,uy_v,uz_v\n"
+        "as docs/how-to/add-a-unit.md says. Then:\n"
+        f"  triaxcal calib {folder}\n"
     )
     (folder / "truth.toml").write_bytes((REPO / "units/AT-SIM/truth.toml").read_bytes())
     write_simulated_unit(folder)

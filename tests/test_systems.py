@@ -44,7 +44,7 @@ def test_every_module_is_imported(system: str) -> None:
 
 COMMANDS = (
     "example", "example AT-SIM", "example IMU-SIM", "doctor", "doctor --json", "init units/SN-7",
-    "schema imu", "calib AT-SIM", "batch AT-SIM", "diagnose AT-SIM", "export AT-SIM --to cmake",
+    "schema imu", "calib AT-SIM", "diagnose AT-SIM", "export AT-SIM --to cmake",
     "firmware AT-SIM --prefix left", "image build/AT-SIM/triax_calib.bin", "calib AT-SIM",
     "simulate AT-SIM --series 2 --into series",
     "batch series/AT-SIM-0001 series/AT-SIM-0002 --jobs 2",
@@ -53,7 +53,7 @@ COMMANDS = (
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("system", ["macOS", "Windows"])
 def test_the_commands_work(system: str, tmp_path: Path, delivered: dict[str, Delivery]) -> None:
     here = tmp_path / "with a space"
     here.mkdir()

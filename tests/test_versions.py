@@ -115,8 +115,3 @@ def test_no_compiler_but_that_of_ziglang(
     assert fresh.calibrated(str(nothing)) == ours
     results = (tmp_path / "build" / UNIT / "verification.json").read_text(encoding="utf-8")
     assert re.search(r'"compiler": "ziglang, Clang \d', results)
-
-
-def test_the_classifiers_name_pythons_that_are_allowed() -> None:
-    named = [c.rpartition(":: ")[2] for c in PROJECT["classifiers"] if ":: Python :: 3." in c]
-    assert f">={named[0]}" == PROJECT["requires-python"]

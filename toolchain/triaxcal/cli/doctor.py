@@ -22,4 +22,5 @@ def doctor(as_json: bool) -> None:
     found = triaxcal.installation()
     text = json_bytes(found.document()).decode().rstrip() if as_json else found.summary
     click.echo(text)
-    sys.exit(not found.works)
+    if not found.works:
+        sys.exit(1)

@@ -10,11 +10,26 @@ import click
 
 import triaxcal
 from triaxcal.base.errors import UsageError
+from triaxcal.base.extras import quoted
 from triaxcal.cli.options import command, example
 from triaxcal.keytable.catalogue import FILES
 
 if TYPE_CHECKING:
     from triaxcal.rig.description.busfile import BusFile
+
+_NEXT = {
+    "tilter": "write a row for each dwell to measurements.csv beside it, below the line\n"
+    "  position,temp_degc,ux_v,uy_v,uz_v\n"
+    "as docs/how-to/add-a-unit.md says. Then:\n"
+    "  triaxcal calib {0}",
+    "recording": "put the recording beside it, as docs/how-to/recordings.md says. Then:\n"
+    "  triaxcal poses {0}\n"
+    "  triaxcal calib {0}",
+    "imu": "put the recording beside it, as docs/how-to/imu.md says. Then:\n  triaxcal calib {0}",
+    "truth": "triaxcal simulate {0}",
+    "imu-truth": "triaxcal simulate {0}",
+}
+"""What comes after the first file of a kind."""
 
 
 @command(
@@ -67,6 +82,8 @@ def init(  # noqa: PLR0917
         raise UsageError(f"--{given}", "given without --rig", expected="--rig FILE.dbc")
     path, schema = triaxcal.write_first_file(folder, kind)
     click.echo(f"{path} written; replace its examples. {schema.name} is for your editor.")
+    if kind in _NEXT:
+        click.echo(f"Next: {_NEXT[kind].format(quoted(str(folder)))}")
 
 
 def _rig(folder: Path, bus_file: Path, signals: dict[str, str | None]) -> None:

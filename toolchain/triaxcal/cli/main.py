@@ -56,13 +56,14 @@ class _Commands(click.Group):
 @click.group(
     cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog=example("triaxcal calib AT-SIM", "triaxcal calib --help"),
+    epilog=example("triaxcal example AT-SIM", "triaxcal calib AT-SIM", "triaxcal calib --help"),
 )
 @click.version_option(__version__, prog_name="triaxcal")
 def main() -> None:
     """From readings of a triaxial accelerometer to verified fixed-point C.
 
-    UNIT is the folder of a unit, or its name if the folder lies in units/.
+    UNIT is the folder of a unit, or its name if the folder lies in units/. `triaxcal doctor` names
+    the folder of the documentation.
     """
 
 
