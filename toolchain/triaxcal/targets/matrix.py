@@ -110,8 +110,8 @@ def _write_cases(builds: Sequence[Build], work: Path) -> dict[tuple[str, str], P
         folder = work / f"case-{len(written)}"
         folder.mkdir()
         for file, text in case.in_form(arithmetic).files.items():
-            (folder / file).write_text(text)
-        (folder / "target_case.h").write_text(case_header(case))
+            (folder / file).write_text(text, encoding="utf-8")
+        (folder / "target_case.h").write_text(case_header(case), encoding="utf-8")
         written[name, arithmetic] = folder
     return written
 

@@ -36,7 +36,7 @@ def check(work: Workspace) -> Outcome:
         return Outcome(_KEY, _TITLE, NOT_DONE, finding)
     names = [work.named(name) for name in _FILES]
     files = render_routine(work.plan)
-    files |= {name: (work.folder / name).read_text() for name in names}
+    files |= {name: (work.folder / name).read_text(encoding="utf-8") for name in names}
     case = Case("unit", "as delivered", work.plan, files, work.image)
     folder = work.folder / "cost"
     folder.mkdir(exist_ok=True)

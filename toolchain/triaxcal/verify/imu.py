@@ -55,7 +55,7 @@ class Both:
         for plan in (build.accel, build.gyro):
             texts = render_routine(replace(plan, arithmetic=LIMBS))
             for name in host_forms(plan).values():
-                (folder / name).write_text(texts[name])
+                (folder / name).write_text(texts[name], encoding="utf-8")
         write_shim(folder / SHIM, build.accel.prefix)
         return cls(folder, build)
 

@@ -92,7 +92,7 @@ def _like(pattern: str, text: str) -> bool:
 
 def read_equivalents(names: Names) -> tuple[Equivalent, ...]:
     """The equivalent mutants on file, with the names in the C of a triad."""
-    text = environment().from_string(EQUIVALENTS.read_text()).render(names.context)
+    text = environment().from_string(EQUIVALENTS.read_text(encoding="utf-8")).render(names.context)
     return tuple(
         Equivalent(
             e["function"],
@@ -155,7 +155,7 @@ def _is_clean(folder: Path, routine: str) -> bool:
 
 def c_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
     """Mutants of triax_comp.c, each `every`-th."""
-    source = (bench.work.folder / bench.work.named(ROUTINE)).read_text()
+    source = (bench.work.folder / bench.work.named(ROUTINE)).read_text(encoding="utf-8")
     return judge_all(bench, mutants_of(source)[::every], ROUTINE)
 
 
@@ -163,10 +163,12 @@ def limbs_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
     """Mutants of the functions of triax_comp_limbs.c that triax_comp.c does not have."""
     if LIMBS not in bench.work.forms:
         return []
-    source = (bench.work.folder / bench.work.forms[LIMBS]).read_text()
+    source = (bench.work.folder / bench.work.forms[LIMBS]).read_text(encoding="utf-8")
     known = {
         (m.function, m.before, m.after)
-        for m in mutants_of((bench.work.folder / bench.work.named(ROUTINE)).read_text())
+        for m in mutants_of(
+            (bench.work.folder / bench.work.named(ROUTINE)).read_text(encoding="utf-8")
+        )
     }
     own = [m for m in mutants_of(source) if (m.function, m.before, m.after) not in known]
     return judge_all(bench, own[::every], LIMBS_ROUTINE)
@@ -174,7 +176,7 @@ def limbs_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
 
 def constants_campaign(bench: Bench, every: int = 1) -> list[Verdict]:
     """Each integer of triax_calib.c one up and one down."""
-    source = (bench.work.folder / bench.work.named(CONSTANTS)).read_text()
+    source = (bench.work.folder / bench.work.named(CONSTANTS)).read_text(encoding="utf-8")
     mutants = []
     for match in _INTEGER.finditer(source):
         value = -(2**31) if match.group(1).startswith("(") else int(match.group(1))
@@ -214,7 +216,7 @@ def judge_all(bench: Bench, mutants: Sequence[Mutant], file: str) -> list[Verdic
         number, mutant = item
         folder = bench.work.folder / f"mutant_{file}_{number}"
         _fill(folder, bench.work)
-        (folder / bench.work.named(file)).write_text(mutant.source)
+        (folder / bench.work.named(file)).write_text(mutant.source, encoding="utf-8")
         survives = bench.survives(folder, file=file)
         if survives is None:
             fate = STILLBORN

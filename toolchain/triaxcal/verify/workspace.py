@@ -68,7 +68,7 @@ class Workspace:
         texts = render_routine(replace(plan, arithmetic=LIMBS))
         for name in host_forms(plan).values():
             if name not in files:
-                (folder / name).write_text(texts[name])
+                (folder / name).write_text(texts[name], encoding="utf-8")
         write_shim(folder / SHIM, plan.prefix)
         return cls(folder, plan, bound, angles)
 
