@@ -110,12 +110,14 @@ def _write(
     case: Case | None, plan: AnglesPlan | None, work: Path
 ) -> tuple[Path, list[Path], tuple[str, ...]]:
     work.mkdir(parents=True)
-    (work / "angles_case.h").write_text(_inputs(24 if plan is None else plan.output_q))
+    (work / "angles_case.h").write_text(
+        _inputs(24 if plan is None else plan.output_q), encoding="utf-8"
+    )
     if case is None:
         source = shipped("firmware_ref") / "target" / "bench_angles_floating.c"
         return source, [work], ("-DBENCH_REAL=double",)
     for name, text in case.files.items():
-        (work / name).write_text(text)
+        (work / name).write_text(text, encoding="utf-8")
     shim = write_shim(work / "names", case.plan.prefix)
     return work / case.names.file("triax_angles.c"), [work, *shim], ()
 

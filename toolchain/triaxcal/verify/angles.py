@@ -35,7 +35,7 @@ def _forms(work: Workspace) -> dict[str, str]:
     other = replace(plan, halves=not plan.halves)
     path = work.folder / f"verify_angles_{forms[other.halves]}.c"
     names = names_of(work.plan)
-    path.write_text(render_angles(other, names)[work.named(ANGLES)])
+    path.write_text(render_angles(other, names)[work.named(ANGLES)], encoding="utf-8")
     return {forms[plan.halves]: work.named(ANGLES), forms[other.halves]: path.name}
 
 
@@ -74,7 +74,10 @@ def _sanitizer(work: Workspace, sanitizer: analyzers.Sanitizer) -> Outcome:
 def _cost(work: Workspace) -> Outcome:
     """Count the angles on every core; the number may not depend on the acceleration."""
     plan = _plan(work)
-    texts = {p.name: p.read_text() for p in sorted(work.folder.glob(f"{work.plan.prefix}_*.[ch]"))}
+    texts = {
+        p.name: p.read_text(encoding="utf-8")
+        for p in sorted(work.folder.glob(f"{work.plan.prefix}_*.[ch]"))
+    }
     case = Case("unit", "as delivered", work.plan, texts, work.image, plan)
     folder = work.folder / "angles_cost"
     folder.mkdir(exist_ok=True)

@@ -107,7 +107,7 @@ def judge(findings: Sequence[Finding]) -> Outcome:
 
 def read_deviations() -> tuple[Deviation, ...]:
     """The deviations on file."""
-    entries = tomllib.loads(DEVIATIONS.read_text())["deviation"]
+    entries = tomllib.loads(DEVIATIONS.read_text(encoding="utf-8"))["deviation"]
     return tuple(
         Deviation(e["rule"], tuple(e["places"]), " ".join(e["reason"].split())) for e in entries
     )
@@ -130,7 +130,7 @@ def find_all(work: Workspace) -> list[Finding]:
             (folder / path.name).write_bytes(path.read_bytes())
         # The assembly has a state of its own: its header is another one.
         for name, text in render_routine(plan).items():
-            (folder / name).write_text(text)
+            (folder / name).write_text(text, encoding="utf-8")
         found = find_in(folder, _sources(plan, form), [plan], FORMS[form])
         findings += [f for f in found if f.file == routine_file(plan, form)]
     return findings
@@ -153,7 +153,7 @@ def find_in(
     uses = [_USES.format(**names_of(plan).context) for plan in plans]
     if any(source.endswith("_angles.c") for source in sources):
         uses.append(_USES_ANGLES.format(**names_of(plans[0]).context))
-    (folder / USER).write_text("".join(uses))
+    (folder / USER).write_text("".join(uses), encoding="utf-8")
     answer = run([CPPCHECK.find(), *OPTIONS, *defines, *sources, USER], folder)
     if answer.code:
         raise BrokenToolError(f"cppcheck: {answer.text.strip()[-200:]}")
@@ -165,7 +165,7 @@ def find_in(
         if file == USER:
             continue
         rule = _RULE.fullmatch(identity)
-        source = (folder / file).read_text().splitlines()
+        source = (folder / file).read_text(encoding="utf-8").splitlines()
         place = place_of(source, int(number))
         findings.append(
             Finding(file, int(number), rule.group(1) if rule else "", place, f"{identity}: {text}")
