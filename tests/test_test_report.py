@@ -201,6 +201,24 @@ def test_gaps_and_missing_readings_are_reported(
     assert "1 row without all readings left out" in words
     assert "the longest stretch without one is used" in words
     assert report.of("noise_N", "z").measured
+    on = reported(fitted[0], tmp_path, stated("power-on", "first_sample_s = 0"))
+    words = " ".join(on.chapters[2].notes)
+    assert "1 gap in time, the longest 51 s, the first before" in words
+
+
+def test_a_unit_that_has_not_passed_says_so(tmp_path: Path) -> None:
+    """Constants that do not change with temperature, of a unit whose do."""
+    units = Path(__file__).parent.parent / "units/AT-SIM"
+    text = (units / "unit.toml").read_text(encoding="utf-8")
+    (tmp_path / "R").mkdir()
+    (tmp_path / "R/measurements.csv").write_bytes((units / "measurements.csv").read_bytes())
+    text = text.replace("t0_degc = 20", 't0_degc = 20\nmodel = "polynomial"\norder = 0')
+    (tmp_path / "R/unit.toml").write_text(text + '\n[vibration.a]\ndirection = "z"\ngrms = 1\n')
+    done = triaxcal.make_test_report(triaxcal.read_unit(tmp_path / "R"))
+    assert "verdict   refused" in done.summary
+    assert "has not passed: refused" in done.files["report.html"].decode()
+    assert "the C was not run: " in done.summary
+    assert done.result.of("vibration_linear", "z").measured
 
 
 def test_temperatures_outside_of_the_range_are_not_compensated(

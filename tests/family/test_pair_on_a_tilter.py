@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import triaxcal
 from triaxcal.delivery.unit import Delivery, deliver
 from triaxcal.fitting.pair.cross_coupling import fit_pair, pair_terms, stated_pair, terms_of_pair
 from triaxcal.fitting.tilter.calibrate import calibrate
@@ -155,3 +156,22 @@ def test_the_pairs_interval_holds_the_coupling() -> None:
     visible = said > 1e-3 * said.max()
     assert np.abs(seen[visible] / said[visible] - 1.0).max() < 5.0 * np.sqrt(2.0 / 300)
     assert np.abs(seen[~visible]).max() < 2e-3 * said.max()
+
+
+@pytest.mark.long
+def test_the_pairs_coupling_in_a_test_report(tmp_path: Path) -> None:
+    """Kip of 150 micro-g/g^2, shaken at 45 degrees to x and y: half of it times 0.64 g^2."""
+    kip = 150e-6
+    folder = coupled_unit(tmp_path / "AT-PAIR", kip)
+    write_pair(folder, kip, sd_g=1e-6)
+    shaken = "\n[vibration.a]\ndirection = [1, 1, 0]\ngrms = 0.8\n"
+    (folder / "unit.toml").write_text((folder / "unit.toml").read_text() + shaken)
+    report = triaxcal.make_test_report(triaxcal.read_unit(folder)).result
+    for axis, sign in (("x", 1.0), ("y", -1.0)):
+        assert report.of("cross_coupling", axis).covers(sign * kip * 1e6)
+        assert report.of("vibration_linear", axis).covers(sign * kip * 1e6 * 0.64 / 2.0)
+        found = report.of("vibration_c", axis).value
+        assert found is not None
+        assert report.of("vibration_compensated", axis).covers(found)
+        assert abs(found) < 2.0
+    assert not any(f.axis == "z" for f in report.chapters[-1].figures)

@@ -13,9 +13,9 @@ from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.metrological import force_from_voltage
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.samples import READING, TEMP, Samples, read_samples
-from triaxcal.readings.table import TIME
+from triaxcal.readings.table import GAP, TIME
 from triaxcal.unit.description import UnitDescription
-from triaxcal.unit.recordedtest import StatedTest
+from triaxcal.unit.recordedtest import REST, StatedTest
 from triaxcal.unit.recording import ACCELERATION_UNITS
 from triaxcal.unit.recordingfile import files_in
 
@@ -89,7 +89,7 @@ def _recorded(  # noqa: PLR0917
             expected="about 1 g of a unit at rest",
             remedy=f"check acceleration and acceleration_unit in [{test.table}]",
         )
-    temp, compensated, findings = None, None, list(samples.table.findings)
+    temp, compensated, findings = None, None, [*samples.table.findings, *_gaps(test, samples)]
     if TEMP in samples:
         temp = samples.part(TEMP)
         low, high = calibration.range_degc
@@ -104,6 +104,17 @@ def _recorded(  # noqa: PLR0917
     return Recorded(
         path.name, samples, samples.part(TIME), output, compensated, temp, tuple(findings), digest
     )
+
+
+def _gaps(test: StatedTest, samples: Samples) -> list[str]:
+    """Lost samples, where they are not left out: a test at rest has its own words."""
+    steps = np.diff(samples.part(TIME))
+    lost = steps > GAP * samples.step_s
+    if test.keys.kind == REST or not lost.any():
+        return []
+    count, first = int(lost.sum()), samples.place(int(np.argmax(lost)) + 1)
+    words = f"{count} gap{'s' * (count != 1)} in time, the longest {steps.max():.3g} s, "
+    return [f"{words}the first before {first}"]
 
 
 def _to_reading_unit(unit: UnitDescription, calibration: Calibration, test: StatedTest) -> float:

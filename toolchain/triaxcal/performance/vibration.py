@@ -21,7 +21,6 @@ from triaxcal.uncertainty.coverage import coverage_factor, effective_dof
 from triaxcal.unit.vibration import Vibration
 
 _MICRO = 1e6
-_ALONG = 1e-9
 _NEVER = 1e-12
 """Of the samples: as good as none clips."""
 DEFINITION = (
@@ -153,14 +152,13 @@ def _one(
     static = np.array(vibration.static_g or (0.0, 0.0, done.unit.gravity_g))
     sensor = sensor_of(done, terms)
     ran = shake(vibration, static, sensor) if shake is not None else None
-    along = [
-        i for i in range(3) if abs(vibration.direction[i]) > _ALONG or terms.products is not None
-    ]
     how = f"[vibration.{name}], {math.sqrt(vibration.mean_square_g2):.4g} g rms"
     figures: list[Figure] = []
     notes: list[str] = []
-    for i in along:
+    for i in range(3):
         shift = predicted(vibration, static, terms, i)
+        if shift.linear == (0.0, 0.0):  # not shaken, and no product of it is known
+            continue
         figures += _predicted(shift, vibration, AXES[i], name, how)
         if ran is not None:
             figures.append(_measured(ran, i, name, how))

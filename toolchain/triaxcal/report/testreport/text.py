@@ -18,6 +18,7 @@ def report_text(report: UnitReport) -> str:
     unit = report.fitted.unit
     head = [
         f"unit      {unit.name}  (serial {unit.serial})",
+        f"verdict   {report.verdict.words}",
         f"standard  {report.standard}; {measured} of {len(figures)} figures measured; 95 %",
     ]
     return "\n\n".join(["\n".join(head), *(_chapter(c) for c in report.chapters)])
