@@ -35,6 +35,7 @@ def equation_chapter(done: Known, terms: Nonlinear) -> Chapter:
         f"{EQUATION}, for each output i = x, y, z at {done.unit.t0_degc:g} degC; a in g of 9.80665 "
         "m/s^2 along the axes of the unit, j and k the other axes.",
         (*_linear(done), *_nonlinear(terms)),
+        done.calibration.findings,
     )
 
 

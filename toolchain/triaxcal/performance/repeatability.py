@@ -36,9 +36,9 @@ def repeatability_chapter(
 def _runs(calibration: Calibration) -> Iterator[Figure]:
     runs = calibration.runs
     rows = (
-        ("runs_bias", "bias, from run to run", "micro-g", 3, "bias_g"),
-        ("runs_scale", "scale factor, from run to run", "ppm", 3, "scale_ratio"),
-        ("runs_cross", "cross-axis sensitivity, from run to run", "micro-rad", 6, "cross_ratio"),
+        ("runs_bias", "bias from run to run", "micro-g", 3, "bias_g"),
+        ("runs_scale", "scale factor from run to run", "ppm", 3, "scale_ratio"),
+        ("runs_cross", "cross-axis sensitivity from run to run", "micro-rad", 6, "cross_ratio"),
     )
     for key, name, unit, constants, attribute in rows:
         if runs is None:
@@ -57,9 +57,9 @@ def _runs(calibration: Calibration) -> Iterator[Figure]:
 
 def _days(days: Repeatability | None) -> Iterator[Figure]:
     rows = (
-        ("days_bias", "bias, from calibration to calibration", "micro-g", "bias_mg", 1e3, 3),
-        ("days_scale", "scale factor, from calibration to calibration", "ppm", "scale_ppm", 1.0, 3),
-        ("days_cross", "cross-axis sensitivity, from calibration to calibration", "micro-rad",
+        ("days_bias", "bias from calibration to calibration", "micro-g", "bias_mg", 1e3, 3),
+        ("days_scale", "scale factor from calibration to calibration", "ppm", "scale_ppm", 1.0, 3),
+        ("days_cross", "cross-axis sensitivity from calibration to calibration", "micro-rad",
          "cross_axis_micro_rad", 1.0, 6),
     )  # fmt: skip
     for key, name, unit, attribute, scale, constants in rows:

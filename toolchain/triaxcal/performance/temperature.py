@@ -19,12 +19,13 @@ def temperature_chapter(done: Known) -> Chapter:
     """Mean slope from the lowest to the highest temperature, and the steepest in between."""
     low, high = float(done.temps_degc[0]), float(done.temps_degc[-1])
     definition = (
-        f"Mean sensitivity: value at {high:g} degC less that at {low:g} degC, by the difference of "
-        "temperature. Steepest: largest slope of the curve in between, with its sign. The interval "
-        "is an upper limit: what is common to both temperatures is not taken off."
+        f"Mean sensitivity: value at {high:.4g} degC less that at {low:.4g} degC, by the "
+        "difference of temperature. Steepest: largest slope of the curve in between, with its "
+        "sign. The interval is an upper limit: what is common to both temperatures is not taken "
+        "off."
     )
     if high - low < 1.0 or done.calibration.shape.parameters < 2:
-        why = f"calibrated at {low:g} to {high:g} degC with constants that do not change"
+        why = f"calibrated at {low:.4g} to {high:.4g} degC, with constants that do not change"
         figures = tuple(
             Figure(key, name, "", unit, why=why)
             for key, name, unit in (

@@ -44,7 +44,7 @@ def _identity(report: UnitReport) -> list[tuple[str, str]]:
         ("Unit", unit.name),
         ("Serial number", unit.serial),
         ("Measured", unit.measured.run or "not stated"),
-        ("Working range", on_page(f"{low:g} to {high:g} degC")),
+        ("Working range", on_page(f"{low:.4g} to {high:.4g} degC")),
         ("T0", on_page(f"{unit.t0_degc:g} degC")),
         ("Input range", on_page(f"-{unit.reporting.input_range_g:g} to "
                                 f"{unit.reporting.input_range_g:g} g")),
