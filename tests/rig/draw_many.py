@@ -14,7 +14,8 @@ from many_cases import Run, bench_of, setup_of
 from rich.console import Console
 from rich.screen import Screen
 
-from triaxcal.rig.many.screen import Recent, many_screen
+from triaxcal.rig.many.screen import HELP, Recent, many_screen
+from triaxcal.rig.screen.screen import faults_page, help_page
 
 MOMENTS = {"reference": 31, "average": 90, "slip": 96, "dead": 232, "warming": 460}
 ORDERS = ("AT-2/linkdown@150:1:99999", "AT-3/slip@84:150")
@@ -35,6 +36,11 @@ def draw(count: int, target: Path) -> None:
                         view = many_screen(run.group, "001", "14:32", recent.alarm(now))
                         path = target / f"many-{count}-{moment}-{width}.svg"
                         path.write_text(svg(view, width, height), encoding="utf-8")
+                    shown = {"help": help_page(HELP), "faults": faults_page(recent.faults, 9)}
+                    for page, drawn in {**shown, "second": None}.items():
+                        view = many_screen(run.group, "001", "14:32", "", page=drawn, scrolled=2)
+                        path = target / f"many-{count}-{moment}-{page}.svg"
+                        path.write_text(svg(view, 80, 24), encoding="utf-8")
             if now > max(MOMENTS.values()):
                 break
         run.taken.close()

@@ -15,9 +15,10 @@ from test_cli_rig import triaxcal
 
 from triaxcal.base.errors import RefusedError, UsageError
 from triaxcal.cli.main import main
+from triaxcal.cli.rig_live import Operator
 from triaxcal.rig.bus.frames import ERR_FLAG, Frames, alike, concatenate
 from triaxcal.rig.many.replay import replay_bus
-from triaxcal.rig.many.screen import group_line, many_screen
+from triaxcal.rig.many.screen import HELP, group_line, many_screen
 from triaxcal.rig.many.setup import many_of_plan, one_of_plan
 from triaxcal.rig.records import rawlog
 from triaxcal.rig.records.journal import read_journal
@@ -25,6 +26,8 @@ from triaxcal.rig.records.recording import JOURNAL_FILE
 from triaxcal.rig.records.replay import replay
 from triaxcal.rig.records.store import write_records
 from triaxcal.rig.samples.split import Splitter
+from triaxcal.rig.screen.screen import help_page
+from triaxcal.rig.session.events import Redo
 from triaxcal.rig.session.phases import Turning
 
 J1939_UNIT = """
@@ -358,3 +361,39 @@ def test_a_session_needs_a_unit_and_a_bus(arguments, said):
     done = CliRunner().invoke(main, ["rig", "run", *arguments])
     assert done.exit_code == 2
     assert said in done.output
+
+
+def test_every_unit_can_be_scrolled_to_and_the_keys_are_explained(tmp_path):
+    setup = setup_of(tmp_path, 32)
+    run = Run(setup, bench_of(setup), tmp_path / "001")
+    names = {place.name for place in setup.places}
+
+    def shown(scrolled, page=None):
+        text = drawn(many_screen(run.group, "001", "12:00", "", page=page, scrolled=scrolled))
+        assert len(text.splitlines()) <= 24
+        return text, {word for word in text.split() if word in names}
+
+    pages = [shown(k)[1] for k in range(1, 5)]
+    assert [sorted(page) for page in pages[:2]] == [
+        sorted(f"AT-{k}" for k in range(1 + 11 * n, 12 + 11 * n)) for n in range(2)
+    ]
+    assert set.union(*pages[:3]) == names
+    assert shown(4)[1] == shown(0)[1]  # behind the last page comes the first screen
+    assert shown(-1)[1] == pages[2]
+    assert "and 21 more" in shown(1)[0]
+    text, units = shown(0, help_page(HELP))
+    assert not units
+    for key, _ in HELP:
+        assert key in text
+    run.taken.close()
+    run.sources.close()
+
+
+def test_keys_of_many_units():
+    class Typed:
+        def pressed(self):
+            return "nnb?c3"
+
+    operator = Operator(Typed())
+    assert operator.words() == [Redo("CP3")]
+    assert (operator.scrolled, operator.page) == (1, "help")

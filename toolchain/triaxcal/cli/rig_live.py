@@ -6,7 +6,7 @@ import contextlib
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import click
@@ -25,6 +25,7 @@ from triaxcal.rig.records import recording, replay, store
 from triaxcal.rig.records.rawlog import LogState
 from triaxcal.rig.samples.undetected import undetected
 from triaxcal.rig.screen.screen import (
+    HELP,
     About,
     BusView,
     Faults,
@@ -46,6 +47,7 @@ _REFRESH_S = 0.25
 _ABOVE_PAGE = 15
 """Lines of the screen that a page leaves to the rest."""
 _ALARM_S = 10.0
+_SCROLLS = {"n": 1, "b": -1}
 _PAGES = {"?": "help", "h": "help", "f": "faults"}
 
 
@@ -60,12 +62,15 @@ class Operator:
     ----------
     page : str
         "", "help" or "faults".
+    scrolled : int
+        How often more units were asked for, less how often those before.
     """
 
     def __init__(self, keys: Keys) -> None:
         self._keys = keys
         self._of_checks = False
         self.page = ""
+        self.scrolled = 0
 
     def words(self) -> list[Command]:
         """Commands since last asked."""
@@ -77,6 +82,8 @@ class Operator:
                 raise Stop
             if key == "y":
                 words.append(Agree())
+            elif key in _SCROLLS:
+                self.scrolled += _SCROLLS[key]
             elif key in _PAGES:
                 self.page = "" if self.page == _PAGES[key] else _PAGES[key]
             elif position in TEST_POSITIONS or position in CHECK_POSITIONS:
@@ -209,7 +216,7 @@ def _on_screen(
                     _bus_view(source, tick),
                     tuple(text for _, text in alarms),
                     _about(taken, shown_view.left_s),
-                    _page(operator.page, faults, picture.console),
+                    page_of(operator.page, faults, picture.console),
                 ),
                 refresh=True,
             )
@@ -236,10 +243,13 @@ def clock_of_end(now_s: float, left_s: float | None) -> str:
     return time.strftime("%H:%M" if same_day else "%a %H:%M", end)
 
 
-def _page(name: str, faults: Faults, console: Console) -> RenderableType | None:
+def page_of(
+    name: str, faults: Faults, console: Console, keys: Sequence[tuple[str, str]] = HELP
+) -> RenderableType | None:
+    """Page that the operator asked for; None for none."""
     if name == "faults":
         return faults_page(faults, max(3, console.size.height - _ABOVE_PAGE))
-    return help_page() if name == "help" else None
+    return help_page(keys) if name == "help" else None
 
 
 def simulate_on(

@@ -16,7 +16,7 @@ from rich.live import Live
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.keys import Keys
 from triaxcal.cli.rig_hands import made_safe
-from triaxcal.cli.rig_live import Operator, Stop, clock_of_end, show_written
+from triaxcal.cli.rig_live import Operator, Stop, clock_of_end, page_of, show_written
 from triaxcal.cli.rig_options import BusChoice, refuse_other_kind
 from triaxcal.rig.live.attendant import Attendant, attendant
 from triaxcal.rig.live.simhands import simulated_attendant
@@ -25,7 +25,7 @@ from triaxcal.rig.many.hands import ManyAttendant
 from triaxcal.rig.many.recording import ManyRecording, log_file
 from triaxcal.rig.many.replay import replay_bus
 from triaxcal.rig.many.runner import ManyHands, ManyRobot, ManyTick, live_many
-from triaxcal.rig.many.screen import Recent, group_line, many_screen
+from triaxcal.rig.many.screen import HELP, Recent, group_line, many_screen
 from triaxcal.rig.many.setup import ManySetup
 from triaxcal.rig.many.simbench import SimulatedBench, simulated_bench
 from triaxcal.rig.records import store
@@ -142,7 +142,7 @@ def _guided(taken: ManyRecording, opened: _Opened, hands: ManyHands | None, plai
         if plain:
             _plainly(ticks, group)
         else:
-            _on_screen(ticks, taken, hands)
+            _on_screen(ticks, taken, hands, operator)
     taken.flush(sync=True)
 
 
@@ -172,7 +172,9 @@ def _plainly(ticks: Iterator[ManyTick], group: Group) -> None:
             click.echo(f"{stamp} all: {order}")
 
 
-def _on_screen(ticks: Iterator[ManyTick], taken: ManyRecording, hands: ManyHands | None) -> None:
+def _on_screen(
+    ticks: Iterator[ManyTick], taken: ManyRecording, hands: ManyHands | None, operator: Operator
+) -> None:
     recent, shown = Recent(), 0.0
     with Live(console=Console(), screen=True, auto_refresh=False) as picture:
         for tick in ticks:
@@ -183,7 +185,11 @@ def _on_screen(ticks: Iterator[ManyTick], taken: ManyRecording, hands: ManyHands
             shown = now
             left_s = hands.left_s(taken.group) if hands else None
             ends = clock_of_end(time.time(), left_s)
-            view = many_screen(taken.group, taken.folder.name, ends, recent.alarm(now))
+            page = page_of(operator.page, recent.faults, picture.console, HELP)
+            alarm, name = recent.alarm(now), taken.folder.name
+            view = many_screen(
+                taken.group, name, ends, alarm, page=page, scrolled=operator.scrolled
+            )
             picture.update(view, refresh=True)
 
 

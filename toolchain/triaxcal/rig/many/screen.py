@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 
-from rich.console import Console, ConsoleOptions, RenderResult
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.console import Group as Lines
 from rich.padding import Padding
 from rich.table import Table
@@ -14,7 +15,7 @@ from triaxcal.rig.hands.orientation import described
 from triaxcal.rig.many.group import Group
 from triaxcal.rig.many.member import Member
 from triaxcal.rig.many.runner import ManyTick
-from triaxcal.rig.screen.screen import ALARM, COLOURS, BigText, Fitted
+from triaxcal.rig.screen.screen import ALARM, COLOURS, BigText, Faults, Fitted
 from triaxcal.rig.screen.view import up_letters
 from triaxcal.rig.session.phases import Turning
 
@@ -26,30 +27,56 @@ _AROUND = 12
 """Lines of the screen beside the units, with small letters."""
 _AROUND_TALL = 17
 _TALL = 30
-_KEYS = " 1-6 take TP1-TP6 again    q stop (then: rig resume)"
+_KEYS = " 1-6 TP again  c 1-6 CP again  n, b more units  f faults  ? help  q stop"
+HELP = (
+    ("1 to 6", "measure TP1 to TP6 of this temperature again, of every unit"),
+    ("c, 1 to 6", "the same of the check positions CP1 to CP6"),
+    ("n, b", "more units in the order of the plan, and back; first those with a fault"),
+    ("f", "list what was refused and what went wrong; f again goes back"),
+    ("?", "this page; ? again goes back"),
+    ("q", "stop; `triaxcal rig resume` goes on, accepted dwells are kept"),
+)
+"""Keys of the operator of many units, and what they do."""
 
 
 class Recent:
-    """What went wrong in the last seconds."""
+    """What went wrong.
+
+    Attributes
+    ----------
+    faults : Faults
+        All of it, for the page of faults.
+    """
 
     def __init__(self) -> None:
+        self.faults = Faults()
         self._alarms: deque[tuple[float, str]] = deque(maxlen=32)
 
     def add(self, now_s: float, tick: ManyTick) -> None:
         """Take what a pass of the loop brought."""
         said = [f"{m.name} {e.text}" for m, e in tick.told if e.kind in _SAID]
         said += [f"{m.name} set aside: {m.aside}" for m in tick.asides]
-        self._alarms.extend((now_s, text) for text in (*said, *tick.notes))
+        texts = (*said, *tick.notes)
+        self._alarms.extend((now_s, text) for text in texts)
+        self.faults.add(time.strftime("%H:%M:%S"), texts)
 
     def alarm(self, now_s: float) -> str:
-        """The last one; "" when there is none."""
+        """The last one of the last seconds; "" when there is none."""
         while self._alarms and now_s - self._alarms[0][0] > _ALARM_S:
             self._alarms.popleft()
         more = f" (and {len(self._alarms) - 1} more)" if len(self._alarms) > 1 else ""
         return self._alarms[-1][1] + more if self._alarms else ""
 
 
-def many_screen(group: Group, session: str, ends: str, alarm: str) -> Fitted:
+def many_screen(
+    group: Group,
+    session: str,
+    ends: str,
+    alarm: str,
+    *,
+    page: RenderableType | None = None,
+    scrolled: int = 0,
+) -> Fitted:
     """Everything the operator sees, for 80 columns and 24 lines or more.
 
     Parameters
@@ -58,6 +85,10 @@ def many_screen(group: Group, session: str, ends: str, alarm: str) -> Fitted:
         Name of the session's folder; clock time of its end.
     alarm : str
         What went wrong; "" for nothing.
+    page : renderable, optional
+        `help_page` or `faults_page`, in place of the units.
+    scrolled : int
+        How often the operator asked for more units, less how often for those before.
     """
     style = ALARM if alarm else COLOURS[_STYLES[group.stage]]
     done = sum(len(m.session.accepted) for m in group.members)
@@ -70,7 +101,7 @@ def many_screen(group: Group, session: str, ends: str, alarm: str) -> Fitted:
             (0, Padding(Text(group_line(group), "bold", justify="center"), (0, 2), style=style)),
             (1, Text(f" ALARM: {alarm}" if alarm else " ", "bold")),
             (3, Text(_step(group), "bold")),
-            (2, _Units(group)),
+            (2, _Units(group, scrolled) if page is None else page),
             (8, Text(_KEYS, "dim", no_wrap=True, overflow="ellipsis")),
         )
     )
@@ -142,10 +173,13 @@ def _step(group: Group) -> str:
 
 
 class _Units:
-    """A line for each unit; where there is no room, those that need attention first."""
+    """A line for each unit; where there is no room, those that need attention first.
 
-    def __init__(self, group: Group) -> None:
-        self._group = group
+    Scrolled, they are those of the plan, so many at a time as there is room for.
+    """
+
+    def __init__(self, group: Group, scrolled: int) -> None:
+        self._group, self._scrolled = group, scrolled
 
     def __rich_console__(self, console: Console, _: ConsoleOptions) -> RenderResult:
         """Table of the units."""
@@ -154,8 +188,11 @@ class _Units:
         members = list(group.members)
         hidden: list[Member] = []
         if len(members) > room:
-            ranked = sorted(members, key=_calm)
-            kept = {m.name for m in ranked[: max(room - 1, 1)]}
+            at_once = max(room - 1, 1)
+            page = self._scrolled % (1 - -len(members) // at_once)
+            first = at_once * (page - 1) if page else 0
+            order = members if page else sorted(members, key=_calm)
+            kept = {m.name for m in order[first : first + at_once]}
             hidden = [m for m in members if m.name not in kept]
             members = [m for m in members if m.name in kept]
         table = Table(box=None, padding=(0, 1), expand=True)

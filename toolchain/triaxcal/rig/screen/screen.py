@@ -183,12 +183,12 @@ def screen(
     )
 
 
-def help_page() -> RenderableType:
+def help_page(keys: Iterable[tuple[str, str]] = HELP) -> RenderableType:
     """What the keys do."""
     table = Table(box=None, padding=(0, 1), title=" Keys", title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column()
-    for key, what in HELP:
+    for key, what in keys:
         table.add_row(key, what)
     return table
 
