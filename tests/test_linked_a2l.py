@@ -203,7 +203,7 @@ def test_another_parser_reads_segment_epk_and_xcp(
     from pya2l.aml.ifdata_parser import IfDataParser
 
     linked = Linked("calib", 0x0800048C, 260, not extended, extended, 0x0800046C)
-    ids = (0x18FF0001, 0x18FF0002) if extended else (0x555, 0x666)
+    ids = (0x98FF0001, 0x98FF0002) if extended else (0x555, 0x666)
     path = tmp_path / "fw.a2l"
     path.write_bytes(calib_a2l(made, linked, XcpOnCan(*ids, None if extended else 500_000)))
     session = pya2l.import_a2l(str(path), in_memory=True, loglevel="ERROR")
@@ -221,16 +221,23 @@ def test_another_parser_reads_segment_epk_and_xcp(
     protocol = layers[0]["PROTOCOL_LAYER"]
     assert protocol[8:12] == [8, 8, f"BYTE_ORDER_{order}", "ADDRESS_GRANULARITY_BYTE"]
     bus = layers[1]["XCP_ON_CAN"][0][1]
-    marked = [i + 2**31 if extended else i for i in ids]
-    assert [bus["CAN_ID_MASTER"], bus["CAN_ID_SLAVE"]] == marked
+    assert [bus["CAN_ID_MASTER"], bus["CAN_ID_SLAVE"]] == list(ids)
     assert bus.get("BAUDRATE") == (None if extended else 500_000)
 
 
 @pytest.mark.parametrize(
     ("xcp", "told"),
     [
-        (XcpOnCan(2**29, 1), "CAN identifier: found 536870912; expected 0 to 0x1FFFFFFF"),
-        (XcpOnCan(1, -1), "CAN identifier: found -1"),
+        (
+            XcpOnCan(0x18FF0001, 1),
+            (
+                "CAN identifier: found 0x18ff0001; expected 0 to 0x7ff, or a 29-bit id with bit 31 "
+                "set: 0x98ff0001"
+            ),
+        ),
+        (XcpOnCan(2**29, 1), "CAN identifier: found 0x20000000; expected 0 to 0x7ff, or a 29-bit"),
+        (XcpOnCan(2**31 + 2**29, 1), "CAN identifier: found 0xa0000000"),
+        (XcpOnCan(1, -1), "CAN identifier: found -0x1"),
         (XcpOnCan(0x555, 0x555), "CAN identifiers: 0x555 twice; expected two identifiers"),
         (XcpOnCan(1, 2, 500), "bitrate: found 500 bit/s; expected 1000 to 1000000"),
     ],

@@ -251,7 +251,7 @@ class Firmware:
             The `triax_calib_t` that the program loads from an image. Without it the constants are
             those that triax_calib.c defines; they must be these.
         can_ids : tuple of two int, or None
-            CAN identifiers of the XCP commands and of the answers; above 0x7FF they are extended
+            CAN identifiers of the XCP commands and of the answers; with bit 31 they are extended
             ones. None leaves XCP on CAN to the tool.
         bitrate : int or None
             Of the bus, in bit/s.

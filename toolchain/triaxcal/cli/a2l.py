@@ -41,7 +41,7 @@ from triaxcal.cli.options import DELIVERED, PREFIX, HexNumber, UnitFolder, comma
     "--can-ids",
     type=(HexNumber(), HexNumber()),
     metavar="COMMANDS ANSWERS",
-    help="CAN identifiers of the XCP commands and of the answers.",
+    help="CAN identifiers of the XCP commands and of the answers, 29-bit ones with bit 31 set.",
 )
 @click.option("--bitrate", type=int, help="Bit rate of the bus, bit/s.")
 def a2l(

@@ -20,16 +20,13 @@ from triaxcal.codegen.elf import Linked
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.templates import environment
 from triaxcal.delivery.firmware import Firmware
+from triaxcal.device.ids import expected_for, is_node_id
 from triaxcal.device.layout import CHANGE, SAMPLE
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.report.a2l_node import NODE_COMMANDS, Place, measurements, place_of
 from triaxcal.report.a2l_words import Method, Word, plan_words
 from triaxcal.unit.thermometer import TemperatureSensor
 
-_LAST_STANDARD = 0x7FF
-"""Last CAN identifier of 11 bits."""
-_MARK = 2**31
-"""Set in an identifier of 29 bits."""
 _COMMANDS = {"GET_ID": 250, "SET_MTA": 246, "UPLOAD": 245, "SHORT_UPLOAD": 244, "DOWNLOAD": 240}
 """Commands of XCP that reading and changing the constants takes, by their codes."""
 _ADJUST = "byte order and alignment of the target: adjust to it"
@@ -42,8 +39,7 @@ class XcpOnCan:
     Attributes
     ----------
     master, slave : int
-        CAN identifiers of commands and of answers; above 0x7FF, or with bit 31, they are
-        extended ones.
+        CAN identifiers of commands and of answers; with bit 31 they are extended ones.
     bitrate : int or None
         Of the bus, in bit/s; None is not stated.
     """
@@ -54,7 +50,7 @@ class XcpOnCan:
 
     @property
     def context(self) -> dict[str, int | None]:
-        """The same as ASAP2 has it: bit 31 marks an extended identifier.
+        """The same, checked.
 
         Raises
         ------
@@ -62,8 +58,8 @@ class XcpOnCan:
             For what is no identifier, the same one twice, or no bit rate.
         """
         ids = self.master, self.slave
-        for wrong in (i for i in ids if i & ~_MARK not in range(2**29)):
-            raise RefusedError("CAN identifier", f"found {wrong}", expected="0 to 0x1FFFFFFF")
+        for wrong in (i for i in ids if not is_node_id(i)):
+            raise RefusedError("CAN identifier", f"found {wrong:#x}", expected=expected_for(wrong))
         if self.master == self.slave:
             raise RefusedError(
                 "CAN identifiers", f"0x{self.master:X} twice", expected="two identifiers"
@@ -72,8 +68,7 @@ class XcpOnCan:
             raise RefusedError(
                 "bitrate", f"found {self.bitrate} bit/s", expected="1000 to 1000000, as CAN has"
             )
-        master, slave = (i if i <= _LAST_STANDARD else i | _MARK for i in ids)
-        return {"master": master, "slave": slave, "bitrate": self.bitrate}
+        return {"master": self.master, "slave": self.slave, "bitrate": self.bitrate}
 
 
 @dataclass(frozen=True)
