@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import hashlib
 import html
 import json
 import re
@@ -16,6 +17,7 @@ import pytest
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import TableKeys
 from triaxcal.base.tomltext import toml_value
+from triaxcal.delivery.inputs import inputs_sha256, without_papers
 from triaxcal.delivery.unit import Delivery
 from triaxcal.report.dcc.certificate import certificate_xml
 from triaxcal.report.passport.content import Passport, passport
@@ -215,3 +217,40 @@ def test_what_is_half_filled_is_said(
     made = of(delivered["AT-SIM"], text)
     assert json.loads(passport_json(made))["stated"]["cautions"] == [caution]
     assert f"{caution[0].upper()}{caution[1:]}." in shown(passport_html(made))
+
+
+@pytest.mark.parametrize("form", ["appended", "between", "changed", "indented"])
+def test_what_the_constants_do_not_hang_on_is_not_in_their_hash(tmp_path: Path, form: str) -> None:
+    """The certificate is filled in after the device was flashed and verified."""
+    (tmp_path / "measurements.csv").write_text("x", encoding="utf-8")
+    path = tmp_path / "unit.toml"
+
+    def found(text: str) -> str:
+        path.write_text(text, encoding="utf-8")
+        return inputs_sha256(tmp_path)
+
+    plain = UNIT.rstrip("\n") + "\n"
+    papers = whole("measured").removeprefix(UNIT)
+    first = found(plain)
+    # As the hash was before there was anything to leave out.
+    parts = (hashlib.sha256(part).digest() for part in (plain.encode(), b"x"))
+    assert first == hashlib.sha256(b"".join(parts)).hexdigest()
+    windows = [without_papers(t.replace("\n", "\r\n").encode()) for t in (plain, plain + papers)]
+    assert windows[0] == windows[1]
+    text = {
+        "appended": plain + papers,
+        "between": plain.replace("[site]", f"{papers.strip()}\n\n[site]"),
+        "changed": plain + papers.replace("2026-04-09", "2026-04-10"),
+        "indented": plain + "\n  [ certificate ]\n  identifier = 'a'\n[passport]\nx = 1\n",
+    }[form]
+    assert found(text) == first
+    assert found(text.replace("bits = 24", "bits = 23")) != first
+    assert found(text + "\n[measured]\nrig = 'other'\n") != first
+
+
+def test_what_only_looks_like_a_table_stays_in_the_hash() -> None:
+    hidden = UNIT + '\n[fit]\nnote = """\n[certificate]\n"""\nestimator = "x"\n[passport]\n'
+    assert without_papers(hidden.encode()) == hidden.encode()
+    inline = f'certificate = {{identifier = "a"}}\n{UNIT}'
+    assert without_papers(inline.encode()) == inline.encode()
+    assert without_papers(b"\xff[certificate]") == b"\xff[certificate]"

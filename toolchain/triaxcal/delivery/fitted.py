@@ -17,7 +17,7 @@ from triaxcal.base.tomltable import content_of, text_of
 from triaxcal.delivery.causes import refuse_certain_fault, with_cause
 from triaxcal.delivery.coderange import settled_codes
 from triaxcal.delivery.facewords import by_face, named_by_face
-from triaxcal.delivery.inputs import inputs_sha256
+from triaxcal.delivery.inputs import inputs_sha256, without_papers
 from triaxcal.delivery.posecauses import refuse_certain_fault_of_poses, with_pose_cause
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import PairTerms
@@ -126,7 +126,7 @@ def fit_columns(unit: UnitDescription, readings: Any) -> Fitted:
             expected="the unit's folder with it",
             remedy="read the unit with read_unit(folder) and call fit(unit)",
         )
-    digest = hashlib.sha256(unit.toml.encode())
+    digest = hashlib.sha256(without_papers(unit.toml.encode()))
     if unit.recording is not None:
         from triaxcal.fitting.route import calibrate_recording  # noqa: PLC0415
 
