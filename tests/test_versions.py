@@ -48,7 +48,7 @@ class Fresh:
         self.environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "CC")}
         done = self.run(
             "python", "-m", "pip", "install", "-q", "--disable-pip-version-check",
-            "--only-binary", ":all:", *packages,
+            "--no-compile", "--only-binary", ":all:", *packages,
         )  # fmt: skip
         if done.returncode and "CI" not in os.environ:
             pytest.skip(f"pip cannot install {packages}: {done.stderr[-500:]}")
