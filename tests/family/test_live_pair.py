@@ -37,7 +37,7 @@ def test_the_estimate_stands_after_each_position_and_the_study_at_the_end(tmp_pa
     again = CliRunner().invoke(main, ["crosscoupling", str(saved)])
     assert result.stdout.endswith(again.stdout)
     last = triaxcal.cross_coupling(saved).result
-    assert f"KipA {last.values[4] * 1e6:.3f} +- {last.sd[4] * 1e6:.2g}" in shown[27]
+    assert f"KipA {last.values[4] * 1e6:.3f} (sd {last.sd[4] * 1e6:.2g})" in shown[27]
 
 
 def test_a_target_decides_what_is_enough() -> None:

@@ -134,7 +134,7 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
         for i, state in enumerate(block.states, start=place.start):
             value, sd = result.p[i] / state.per_unit, result.sd[i] / state.per_unit
             found_sd = f"{digits(sd, sd):<10s} {state.unit}"
-            lines.append(f"  {state.name:9s} {digits(value, sd):>14s} +- {found_sd}")
+            lines.append(f"  {state.name:9s} {digits(value, sd):>14s} sd {found_sd}")
     if done.off:
         lines += ["", "effects switched off, chi-square of their states in this recording:"]
         for effect in done.off:

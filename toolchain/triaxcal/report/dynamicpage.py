@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ from triaxcal.unit.passport import ENGLISH
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
 BAND = 10.0
 """Panels show so many final standard deviations on each side."""
+COVERAGE = 1.96
+"""k of 95 % of a normal distribution."""
 PLOT_LEFT, PLOT_WIDTH = 30.0, 670.0
 
 
@@ -54,6 +57,7 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
     done = made.done
     result, seen = done.result, done.seen
     layout, time = result.layout, result.passes[-1].history.time_s
+    labels = {state.name: state.label for state in layout.states}
     context = {
         "unit": done.unit,
         "badge": _badge(made),
@@ -80,9 +84,10 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
         "off": [
             (e.title, f"{e.chi_square:.1f}", e.states, e.name, e.shown, e.hint) for e in done.off
         ],
-        "unseen": seen.unseen,
-        "weak": [weak_words(w) for w in seen.weak],
-        "together": [(a, b, signed(f"{c:+.4f}")) for a, b, c in seen.together],
+        "unseen": [[labels[name] for name in names] for names in seen.unseen],
+        "weak": [weak_words(_for_people(w, labels)) for w in seen.weak],
+        "together": [(labels[a], labels[b], signed(f"{c:+.4f}")) for a, b, c in seen.together],
+        "coverage": COVERAGE,
         "width": PANEL_WIDTH,
         "height": PANEL_HEIGHT,
         "no_c": f"No C: {NO_C.removeprefix('none: ')}",
@@ -98,6 +103,13 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
         ],
     }
     return page("dynamic.html.j2", t=speaker(ENGLISH), **context)
+
+
+def _for_people(weak: Weak, labels: Mapping[str, str]) -> Weak:
+    """The same with the labels of its states, and their signs."""
+    signs = ("minus " if name.startswith("-") else "" for name in weak.names)
+    names = (sign + labels[name.lstrip("-")] for sign, name in zip(signs, weak.names, strict=True))
+    return replace(weak, names=tuple(names))
 
 
 def _badge(made: ImuDelivery) -> tuple[bool, str, str]:
@@ -157,24 +169,24 @@ def _range(place: slice) -> range:
 
 
 def _panel(result: DynamicResult, i: int) -> dict[str, str]:
-    """Estimate and its three standard deviations over time, about the final estimate."""
+    """Estimate and its expanded uncertainty over time, about the final estimate."""
     state, history = result.layout.states[i], result.passes[-1].history
     time = np.array(history.time_s)
     p = np.array([row[i] for row in history.p])
     sd = np.array([row[i] for row in history.sd])
     final, unit_sd = result.p[i] / state.per_unit, result.sd[i] / state.per_unit
-    span = BAND * result.sd[i]
+    expanded, span = COVERAGE * unit_sd, BAND * result.sd[i]
     x = PANEL_WIDTH * (time - time[0]) / max(time[-1] - time[0], 1e-9)
 
     def y(values: Any) -> Any:
         return PANEL_HEIGHT / 2 * (1 - np.clip((values - result.p[i]) / span, -1, 1))
 
-    upper = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p + 3 * sd), strict=True)]
-    lower = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p - 3 * sd), strict=True)]
+    upper = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p + COVERAGE * sd), strict=True)]
+    lower = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p - COVERAGE * sd), strict=True)]
     return {
-        "name": state.name,
+        "name": state.label,
         "unit": state.unit.replace("^2", "²"),
-        "value": signed(f"{digits(final, unit_sd)} ± {digits(unit_sd, unit_sd)}"),
+        "value": signed(f"{digits(final, expanded)} ± {digits(expanded, expanded)}"),
         "scale": digits(BAND * unit_sd, BAND * unit_sd),
         "band": " ".join(upper + lower[::-1]),
         "line": " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p), strict=True)),

@@ -63,7 +63,7 @@ def live_text(estimate: PairEstimate, mounting: str, target: float | None) -> st
         return f"{estimate.count}: at least {left} more for an estimate"
     values, sd = estimate.values[KIP], None if estimate.sd is None else estimate.sd[KIP]
     parts = [
-        f"{name} {values[k] * 1e6:.3f}" + ("" if sd is None else f" +- {sd[k] * 1e6:.2g}")
+        f"{name} {values[k] * 1e6:.3f}" + ("" if sd is None else f" (sd {sd[k] * 1e6:.2g})")
         for k, name in enumerate(names)
     ]
     text = f"{estimate.count}: {', '.join(parts)} e-6 g/g^2"

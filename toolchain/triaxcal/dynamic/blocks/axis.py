@@ -7,12 +7,14 @@ are made in `channels`.
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.base import ARCSEC
-from triaxcal.dynamic.blocks.block import State, StateBlock, extension
+from triaxcal.dynamic.blocks.block import AXIS, State, StateBlock, extension
 
 BLOCK = StateBlock(
     "rotation-axis",
     "angles of the table's axis in the unit",
-    tuple(State(f"kappa{i}", "arcsec", ARCSEC, 2e4) for i in (2, 3)),
+    tuple(
+        State(f"kappa{i}", "arcsec", ARCSEC, 2e4, f"table's axis about {AXIS[i]}") for i in (2, 3)
+    ),
     reset=True,
     needs="table",
 )

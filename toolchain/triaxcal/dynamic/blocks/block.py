@@ -35,12 +35,19 @@ class State:
         SI value of one `unit`.
     prior_sd : float
         In `unit`: standard deviation before the recording, mean zero.
+    label : str
+        For people, as "bias of accelerometer x".
     """
 
     name: str
     unit: str
     per_unit: float
     prior_sd: float
+    label: str
+
+
+AXIS = " xyz"
+"""Letters of the axes 1, 2, 3."""
 
 
 @dataclass(frozen=True)

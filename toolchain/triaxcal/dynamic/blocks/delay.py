@@ -37,7 +37,7 @@ def curve(signals: Signals, p: FloatArray) -> FloatArray:
 BLOCK = StateBlock(
     "delay",
     "delay of the accelerometers behind the gyros",
-    (State("tau", "ms", 1e-3, 20.0),),
+    (State("tau", "ms", 1e-3, 20.0, "delay of the accelerometers"),),
     motion=rows,
     motion_curve=curve,
 )

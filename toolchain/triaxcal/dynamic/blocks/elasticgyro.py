@@ -29,7 +29,11 @@ def _rows(signals: Signals) -> FloatArray:
 BLOCK = StateBlock(
     "elastic-gyro",
     "elastic misalignment of the gyros",
-    tuple(State(f"K{i}{j}", "arcsec/g", ARCSEC, 60.0) for i in (1, 2, 3) for j in (2, 3)),
+    tuple(
+        State(f"K{i}{j}", "arcsec/g", ARCSEC, 60.0, f"turn about own axis {j}, force along {i}")
+        for i in (1, 2, 3)
+        for j in (2, 3)
+    ),
     rate=_rows,
 )
 ENTRY = extension(BLOCK, "A load turns the sensing axes of the gyros.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.base import DEG_PER_H
-from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension, spread
+from triaxcal.dynamic.blocks.block import AXIS, Signals, State, StateBlock, extension, spread
 from triaxcal.model.types import FloatArray
 
 
@@ -14,7 +14,11 @@ def _rows(signals: Signals) -> FloatArray:
 BLOCK = StateBlock(
     "g-drift",
     "g-dependent gyro drift",
-    tuple(State(f"D{i}{j}", "deg/h/g", DEG_PER_H, 3600.0) for i in (1, 2, 3) for j in (1, 2, 3)),
+    tuple(
+        State(f"D{i}{j}", "deg/h/g", DEG_PER_H, 3600.0, f"gyro {AXIS[i]}, force along {AXIS[j]}")
+        for i in (1, 2, 3)
+        for j in (1, 2, 3)
+    ),
     rate=_rows,
     weak=(
         "with the force along gravity it is a rate about the vertical, which only a heading shows; "

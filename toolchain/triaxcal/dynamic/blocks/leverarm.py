@@ -10,7 +10,7 @@ acceleration; the signs in print are damaged.
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.attitude import skew
-from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension
+from triaxcal.dynamic.blocks.block import AXIS, Signals, State, StateBlock, extension
 from triaxcal.model.types import FloatArray
 
 
@@ -26,7 +26,7 @@ def _coriolis(signals: Signals) -> FloatArray:
 BLOCK = StateBlock(
     "lever-arm",
     "lever arm of the table's centre",
-    tuple(State(f"s{i}", "mm", 1e-3, 1000.0) for i in (1, 2, 3)),
+    tuple(State(f"s{i}", "mm", 1e-3, 1000.0, f"table's centre along {AXIS[i]}") for i in (1, 2, 3)),
     motion=_coriolis,
     edges=_velocity,
     motion2=_coriolis,

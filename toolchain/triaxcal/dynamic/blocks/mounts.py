@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from triaxcal.dynamic.blocks import tableangles
 from triaxcal.dynamic.blocks.base import ARCSEC
-from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension, spread
+from triaxcal.dynamic.blocks.block import AXIS, Signals, State, StateBlock, extension, spread
 from triaxcal.model.types import FloatArray
 
 _PLACES = ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
@@ -21,7 +21,16 @@ def _rows(signals: Signals) -> FloatArray:
 BLOCK = StateBlock(
     "mount-elasticity",
     "torsional elasticity of the mounts",
-    tuple(State(f"d{i + 1}{j + 1}", "arcsec/g", ARCSEC, 600.0) for i, j in _PLACES),
+    tuple(
+        State(
+            f"d{i + 1}{j + 1}",
+            "arcsec/g",
+            ARCSEC,
+            600.0,
+            f"turn about {AXIS[i + 1]}, force along {AXIS[j + 1]}",
+        )
+        for i, j in _PLACES
+    ),
     table=_rows,
     needs="table_angle_rad",
 )

@@ -14,5 +14,5 @@ from triaxcal.dynamic.blocks.block import State, StateBlock
 BLOCK = StateBlock(
     "north",
     "horizontal rate of the Earth",
-    tuple(State(f"u{i}", "deg/h", DEG_PER_H, 15.0) for i in (1, 2)),
+    tuple(State(f"u{i}", "deg/h", DEG_PER_H, 15.0, f"level component {i}") for i in (1, 2)),
 )

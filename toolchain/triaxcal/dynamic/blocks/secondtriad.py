@@ -6,8 +6,18 @@ is its own because its electronics are: with it the states of all blocks number 
 
 from __future__ import annotations
 
-from triaxcal.dynamic.blocks.base import ARCSEC, MM_PER_S2, PPM
-from triaxcal.dynamic.blocks.block import Extension, Signals, State, StateBlock, bias_rows, spread
+from dataclasses import replace
+
+from triaxcal.dynamic.blocks.base import MM_PER_S2, element
+from triaxcal.dynamic.blocks.block import (
+    AXIS,
+    Extension,
+    Signals,
+    State,
+    StateBlock,
+    bias_rows,
+    spread,
+)
 from triaxcal.dynamic.blocks.delay import curve, rows
 from triaxcal.model.types import FloatArray
 
@@ -19,7 +29,12 @@ def _matrix(signals: Signals) -> FloatArray:
 BIAS = StateBlock(
     "second-bias",
     "biases of the second accelerometer triad",
-    tuple(State(f"df0_{i}", "mm/s^2", MM_PER_S2, 1000.0) for i in (4, 5, 6)),
+    tuple(
+        State(
+            f"df0_{i}", "mm/s^2", MM_PER_S2, 1000.0, f"bias of second accelerometer {AXIS[i - 3]}"
+        )
+        for i in (4, 5, 6)
+    ),
     force2=bias_rows,
     needs="force2",
 )
@@ -27,7 +42,7 @@ MATRIX = StateBlock(
     "second-matrix",
     "scale factors and misalignments of the second accelerometer triad",
     tuple(
-        State(f"Gamma{i + 3}{j}", *(("ppm", PPM, 1e5) if i == j else ("arcsec", ARCSEC, 2e4)))
+        replace(element("Gamma", i, j, "second accelerometer {}"), name=f"Gamma{i + 3}{j}")
         for i in (1, 2, 3)
         for j in (1, 2, 3)
     ),
@@ -37,7 +52,7 @@ MATRIX = StateBlock(
 DELAY = StateBlock(
     "second-delay",
     "delay of the second accelerometer triad behind the gyros",
-    (State("tau2", "ms", 1e-3, 20.0),),
+    (State("tau2", "ms", 1e-3, 20.0, "delay of the second triad"),),
     motion2=rows,
     motion_curve=curve,
     needs="force2",

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.blocks.attitude import skew
-from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension
+from triaxcal.dynamic.blocks.block import AXIS, Signals, State, StateBlock, extension
 from triaxcal.model.types import FloatArray
 
 _MASSES = (1, 2)
@@ -44,7 +44,11 @@ def _rest(signals: Signals) -> FloatArray:
 BLOCK = StateBlock(
     "accelerometer-positions",
     "positions of accelerometers 2 and 3",
-    tuple(State(f"rho{i}_{j}", "mm", 1e-3, 200.0) for i in (2, 3) for j in (1, 2, 3)),
+    tuple(
+        State(f"rho{i}_{j}", "mm", 1e-3, 200.0, f"accelerometer {AXIS[i]} along {AXIS[j]}")
+        for i in (2, 3)
+        for j in (1, 2, 3)
+    ),
     motion=_rest,
     edges=_ends,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from triaxcal.dynamic.blocks.base import ARCSEC
-from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, extension, same
+from triaxcal.dynamic.blocks.block import AXIS, Signals, State, StateBlock, extension, same
 from triaxcal.model.types import FloatArray
 
 
@@ -14,7 +14,10 @@ def _rows(signals: Signals) -> FloatArray:
 BLOCK = StateBlock(
     "table-angles",
     "mounting angles on the table",
-    tuple(State(f"theta{i}", "arcsec", ARCSEC, 2e4) for i in (1, 2, 3)),
+    tuple(
+        State(f"theta{i}", "arcsec", ARCSEC, 2e4, f"mounting angle about {AXIS[i]}")
+        for i in (1, 2, 3)
+    ),
     table=_rows,
     reset=True,
     needs="table_angle_rad",

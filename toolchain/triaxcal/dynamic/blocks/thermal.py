@@ -9,7 +9,15 @@ from __future__ import annotations
 import numpy as np
 
 from triaxcal.dynamic.blocks.base import MM_PER_S2, PPM
-from triaxcal.dynamic.blocks.block import Signals, State, StateBlock, diagonal, extension, same
+from triaxcal.dynamic.blocks.block import (
+    AXIS,
+    Signals,
+    State,
+    StateBlock,
+    diagonal,
+    extension,
+    same,
+)
 from triaxcal.model.types import FloatArray
 
 
@@ -27,8 +35,16 @@ BLOCK = StateBlock(
     "accelerometer-thermal",
     "temperature coefficients of the accelerometers",
     (
-        *(State(f"kdf{i}", "mm/s^2/degC", MM_PER_S2, 20.0) for i in (1, 2, 3)),
-        *(State(f"KGamma{i}{i}", "ppm/degC", PPM, 2000.0) for i in (1, 2, 3)),
+        *(
+            State(f"kdf{i}", "mm/s^2/degC", MM_PER_S2, 20.0, f"bias of accelerometer {AXIS[i]}")
+            for i in (1, 2, 3)
+        ),
+        *(
+            State(
+                f"KGamma{i}{i}", "ppm/degC", PPM, 2000.0, f"scale factor of accelerometer {AXIS[i]}"
+            )
+            for i in (1, 2, 3)
+        ),
     ),
     force=_force,
     needs="temp_degc",

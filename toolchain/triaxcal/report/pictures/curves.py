@@ -155,6 +155,7 @@ def uncertainty_panel(calibration: Calibration, u: Uncertainty, t: Speaker) -> d
         "x_ticks": x_ticks(frame),
         "y_ticks": y_ticks(frame, 5),
         "calibrated": [frame.x(q.temp_degc) for q in calibration.points],
+        "dash_from": 8 if len(calibration.points) <= _MANY_POINTS else 162,
         "spots": _spots(frame, xs, components.tolist(), worst[:, 3].tolist(), t),
     }
 

@@ -15,6 +15,9 @@ _COUNT = "count"
 """A place of this name is a whole number."""
 _WORDS = re.compile(r"(?<![\w./\\-])(?!arcsec)[a-z]{3,}(?![\w./\\-])")
 """Words of English, and no names of keys and files, nor units."""
+_LETTERS = re.compile(r"[a-z]{2}")
+_MOST_KEPT = 4096
+"""Translations of one language that are kept: the pages of a series say much the same."""
 _JOINTS = ("; ", ". ", ", ")
 """Between parts that may be known each for itself, the widest first."""
 
@@ -84,9 +87,17 @@ class Phrases:
             else:
                 self._exact[text] = other[key]
         self._patterns = sorted(patterns, key=lambda pair: -pair[0].letters)
+        self._kept: dict[str, str | None] = {}
 
     def said(self, text: str) -> str | None:
         """`text` in the other language; None where it is not known, or only in part."""
+        if text not in self._kept:
+            if len(self._kept) >= _MOST_KEPT:
+                self._kept.clear()
+            self._kept[text] = self._found(text)
+        return self._kept[text]
+
+    def _found(self, text: str) -> str | None:
         for variant in (text, _lowered(text), text.removesuffix("."), _lowered(text[:-1])):
             found = self._whole(variant)
             if found is not None:
@@ -115,6 +126,8 @@ class Phrases:
 
 def _at_place(phrases: Phrases, value: str) -> str | None:
     """What stands at a place: a number or a name as it is, words in the other language."""
+    if not _LETTERS.search(value):
+        return value
     known = phrases.said(value)
     return value if known is None and not _WORDS.search(value) else known
 
