@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import html
 import json
+import re
 import shutil
 from dataclasses import dataclass, replace
 from datetime import date
@@ -226,11 +227,11 @@ def test_the_page_warns_of_what_was_left_out(ran: Ran) -> None:
     """An effect that shows, and more noise than stated."""
     made, (first, *others) = ran.made, ran.made.done.off
     page = dynamic_page(made, {}).decode()
-    assert '<div class="badge">CONSISTENT<small>innovations ' in page
+    assert '<div class="badge"><b>CONSISTENT</b><small>innovations ' in page
     assert '<p class="warning">' not in page
     shown = replace(made.done, off=(replace(first, chi_square=900.0, shown=True), *others))
     page = html.unescape(dynamic_page(replace(made, done=shown), {}).decode())
-    assert '<div class="badge warn">AN EFFECT IS MISSING<small>' in page
+    assert '<div class="badge warn"><b>AN EFFECT IS MISSING</b><small>' in page
     assert (
         "The recording shows an effect that is switched off, "
         f'{first.title}: switch on "{first.name}" in [dynamic] blocks.</p>'
@@ -239,8 +240,23 @@ def test_the_page_warns_of_what_was_left_out(ran: Ran) -> None:
     noisy = replace(last, chi_square=4.0 * last.freedom)
     result = replace(made.done.result, passes=(*made.done.result.passes[:-1], noisy))
     page = dynamic_page(replace(made, done=replace(made.done, result=result)), {}).decode()
-    assert "NOT CONSISTENT<small>innovations 2.00 times the stated noise" in page
+    assert "NOT CONSISTENT</b><small>innovations 2.00 times the stated noise" in page
     assert '<p class="warning">The innovations 2.00 times the stated noise' in page
+
+
+def test_the_page_calls_constants_by_names_for_people(ran: Ran) -> None:
+    """And a value's ± is its expanded uncertainty, 1.96 standard deviations."""
+    result = ran.made.done.result
+    page = dynamic_page(ran.made, {}).decode()
+    for state in result.layout.states:
+        assert f'<div class="head">{html.escape(state.label)}<span>' in page
+        assert f">{state.name}<" not in page
+    labels = [state.label for state in result.layout.states]
+    assert "misalignment of accelerometer y about z" in labels
+    assert len(set(labels)) == len(labels)
+    state, sd = result.layout.states[0], result.sd[0]
+    (shown,) = re.findall(rf"<title>{state.label}: \S+ ± (\S+) ", page)
+    assert float(shown) == pytest.approx(1.96 * sd / state.per_unit, rel=0.05)  # two digits
 
 
 def test_page_and_json_say_when_and_where_it_was_measured(ran: Ran) -> None:
