@@ -1,0 +1,1 @@
+"""The compiled routine against the specification, instruction by instruction, for every input."""
