@@ -13,7 +13,8 @@ import z3
 
 from triaxcal.verify.binary.terms import Atoms, Monomial, Poly, poly
 
-TIME_LIMIT_MS = 20_000
+RESOURCES = 4_000_000
+"""What z3 may spend on a question, in its own units: the same on a slow machine and on a fast one."""
 _NEAR = (0, 1, 2, 4)
 """Steps from the question to the facts that are tried, few first. A question about plain unknowns
 (no products), such as that of a branch, is answered from facts about such alone."""
@@ -55,7 +56,7 @@ class Facts:
     def _tried(self, claim: z3.BoolRef, path: tuple[z3.BoolRef, ...], near: int) -> bool:
         self.questions += 1
         solver = z3.Solver()
-        solver.set("timeout", TIME_LIMIT_MS)
+        solver.set("rlimit", RESOURCES)
         solver.add(z3.Not(claim), *path)
         seen: set[Monomial] = set()
         stated: set[int] = set()

@@ -227,28 +227,32 @@ def _apply(
             core, listing, function, start, (constant(STATE), constant(RAW), constant(accel))
         ):
             count += 1
-            used, outside = zip(*(_clamped(shape, end.words, u) for u in routine.codes), strict=True)
-            status = end.registers[core.arguments[0]].number
-            if status != (RAW_RANGE if any(outside) else 0):
+            used = tuple(_clamped(shape, end.words, code) for code in routine.codes)
+            outside = z3.Or([_outside(shape, end.words, code) for code in routine.codes])
+            status = facts.term(end.registers[core.arguments[0]].poly)
+            if not end.words.follows(status == z3.If(outside, RAW_RANGE, 0)):
                 raise UnprovenError(f"{function}: the status is not the specified one")
             for i in range(3):
                 _refuse_result(routine, end, i, used, end.load(constant(accel), 4 * i))
     return Proven(function, count, facts.questions - asked)
 
 
-def _clamped(shape: Shape, words: Words, code: Value) -> tuple[Value, bool]:
-    """A raw code brought into its range, and whether it was outside; known on each way."""
+def _clamped(shape: Shape, words: Words, code: Value) -> Value:
+    """A raw code brought into its range: which of the three it is, is known on each way."""
     least, most = constant(shape.raw_min), constant(shape.raw_max)
-    if words.follows(words.less(code, least, signed=True)):
-        return least, True
-    if words.follows(words.less(most, code, signed=True)):
-        return most, True
-    inside = z3.And(
-        z3.Not(words.less(code, least, signed=True)), z3.Not(words.less(most, code, signed=True))
-    )
-    if not words.follows(inside):
+    if words.follows(z3.Not(words.less(least, code, signed=True))):
+        return least
+    if words.follows(z3.Not(words.less(code, most, signed=True))):
+        return most
+    if not words.follows(z3.Not(_outside(shape, words, code))):
         raise UnprovenError("apply: a way on which a code may be inside and outside of its range")
-    return code, False
+    return code
+
+
+def _outside(shape: Shape, words: Words, code: Value) -> z3.BoolRef:
+    """Condition that a raw code is outside of its range."""
+    least, most = constant(shape.raw_min), constant(shape.raw_max)
+    return z3.Or(words.less(code, least, signed=True), words.less(most, code, signed=True))
 
 
 def _refuse_result(

@@ -20,6 +20,7 @@ _OPPOSITE = {
     "ge": "lt", "lt": "ge", "gt": "le", "le": "gt",
 }  # fmt: skip
 _ADDRESS = re.compile(r"^\[(\w+)(?:, #(-?\d+))?\](!)?$")
+_SUM = re.compile(r"^\[(\w+), (\w+)\]$")
 _SHIFT = re.compile(r"^(asr|lsl|lsr) (#\d+)$")
 _IT = re.compile(r"^it[te]{0,3}$")
 
@@ -134,6 +135,8 @@ def _address(
     state: State, operands: tuple[str, ...]
 ) -> tuple[Value, int, tuple[str, int] | None]:
     """Base, offset, and what is added to which register afterwards."""
+    if two := _SUM.match(operands[-1]):
+        return state.words.add(_get(state, two[1]), _get(state, two[2])), 0, None
     found = _ADDRESS.match(operands[-1] if operands[-1].startswith("[") else operands[-2])
     if found is None:
         raise UnprovenError("a form of address that the proof does not know")
@@ -342,6 +345,7 @@ _COMPUTE: dict[str, Callable[..., Value]] = {
     "lsl": lambda s, a, b: s.words.shift_left(a, _shift(s, a, b)),
     "uxth": lambda s, a: s.words.low_bits(a, 16),
     "uxtb": lambda s, a: s.words.low_bits(a, 8),
+    "and": lambda s, a, b: s.words.masked(a, b),
     "orr": lambda s, a, b: s.words.either(a, b),
 }
 """Instructions that form one word."""

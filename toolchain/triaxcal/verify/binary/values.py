@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import reduce
 
 import z3
 
@@ -130,6 +131,9 @@ class Words:
 
     def floor(self, a: Value, bits: int) -> Value:
         """floor(a / 2^bits), of the number as it stands."""
+        if a.either:
+            first, *others = (self.floor(self.unsigned(part), bits) for part in a.either)
+            return reduce(self.either, others, first)
         return Value(self.atoms.floor(a.poly, bits), a.low >> bits, a.high >> bits)
 
     def low_bits(self, a: Value, bits: int) -> Value:
@@ -165,6 +169,8 @@ class Words:
 
     def equal(self, a: Value, b: Value) -> z3.BoolRef:
         """Condition a = b."""
+        if a.either and b.number == 0:
+            return z3.And([self.equal(part, b) for part in a.either])
         a, b = self.signed(a), self.signed(b)
         return self.facts.term(a.poly) == self.facts.term(b.poly)
 
@@ -174,8 +180,16 @@ class Words:
         one, other = (self.unsigned(part) for part in total.parts)
         return self.floor(self.add(one, other), 32)
 
+    def masked(self, a: Value, b: Value) -> Value:
+        """The bits of both, where one is a known mask of the lowest bits."""
+        if a.number is not None:
+            a, b = b, a
+        if b.number is None or b.number & (b.number + 1):
+            raise UnprovenError("a mask that the proof does not know")
+        return self.low_bits(a, b.number.bit_length())
+
     def either(self, a: Value, b: Value) -> Value:
-        """The bits of both."""
+        """The bits of either."""
         parts = (*(a.either or (a,)), *(b.either or (b,)))
         name = " or ".join(str(hash(part.poly)) for part in parts)
         return Value(self.atoms.unknown(name), 0, WORD - 1, either=parts)
