@@ -14,7 +14,7 @@ import z3
 from triaxcal.verify.binary.terms import Atoms, Monomial, Poly, poly
 
 RESOURCES = 4_000_000
-"""What z3 may spend on a question, in its own units: the same on a slow machine and on a fast one."""
+"""What z3 may spend on a question, in its own units: the same on every machine."""
 _NEAR = (0, 1, 2, 4)
 """Steps from the question to the facts that are tried, few first. A question about plain unknowns
 (no products), such as that of a branch, is answered from facts about such alone."""
@@ -45,7 +45,7 @@ class Facts:
             self._about.setdefault(monomial, []).append(fact)
 
     def follows(self, claim: z3.BoolRef, path: Iterable[z3.BoolRef] = ()) -> bool:
-        """Whether the claim follows from the facts and from those of a path; no when z3 gives up."""
+        """Whether the claim follows from the facts and the path's; no when z3 gives up."""
         path = tuple(path)
         key = (claim.get_id(), *(fact.get_id() for fact in path))
         if key not in self._answers:
@@ -76,9 +76,7 @@ class Facts:
 
     def _is_plain(self, monomial: Monomial) -> bool:
         inside, _ = self.atoms.floors.get(monomial[0], (None, 0)) if monomial else (None, 0)
-        return len(monomial) <= 1 and (
-            inside is None or all(self._is_plain(m) for m, _ in inside)
-        )
+        return len(monomial) <= 1 and (inside is None or all(self._is_plain(m) for m, _ in inside))
 
     def _all_plain(self, fact: z3.BoolRef) -> bool:
         return all(self._is_plain(m) for m in self._monomials(fact))

@@ -50,7 +50,7 @@ class Listing:
 
     def _take(self, address: int, code: str, name: str, rest: str) -> None:
         if name == ".word":
-            self.words[address] = int(rest.split()[0], 16)
+            self.words[address] = int(rest.split(maxsplit=1)[0], 16)
             return
         size = len(code.replace(" ", "")) // 2
         operands = _operands(_COMMENT.sub("", _COMMENT.sub("", rest)))

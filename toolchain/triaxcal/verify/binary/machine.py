@@ -1,8 +1,8 @@
-"""Registers, memory and the ways through a function; what an instruction does is the core's matter."""
+"""Registers, memory and the ways through a function; what an instruction does, the core says."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -118,12 +118,7 @@ def decided(state: State, condition: z3.BoolRef) -> bool:
 
 
 def ways(
-    core: Core,
-    listing: Listing,
-    function: str,
-    start: State,
-    arguments: tuple[Value, ...],
-    result: Callable[[Value], Value] = lambda value: value,
+    core: Core, listing: Listing, function: str, start: State, arguments: tuple[Value, ...]
 ) -> Iterator[State]:
     """Ends of all ways through a function.
 
@@ -139,6 +134,7 @@ def ways(
     state.registers.update(zip(core.arguments, arguments, strict=False))
     state.registers[core.stack] = constant(STACK)
     state.registers[core.link] = constant(RETURN)
+    state.memory |= {at: constant(word) for at, word in listing.words.items()}
     state.pc = listing.functions[function]
     left = [state]
     while left:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import z3
 
-from triaxcal.verify.binary.listing import Instruction, Listing
+from triaxcal.verify.binary.listing import Instruction
 from triaxcal.verify.binary.machine import State, decided
 from triaxcal.verify.binary.values import UnprovenError, Value, Words, constant
 
@@ -17,14 +17,11 @@ _ADDRESS = re.compile(r"^(-?\d+)\((\w+)\)$")
 class RiscV:
     """The core: what each instruction does to registers and memory."""
 
-    saved = tuple(f"s{i}" for i in range(12))
-    scratch = (*(f"a{i}" for i in range(8)), *(f"t{i}" for i in range(7)))
-    arguments = ("a0", "a1", "a2", "a3")
+    saved: tuple[str, ...] = tuple(f"s{i}" for i in range(12))
+    scratch: tuple[str, ...] = (*(f"a{i}" for i in range(8)), *(f"t{i}" for i in range(7)))
+    arguments: tuple[str, ...] = ("a0", "a1", "a2", "a3")
     stack = "sp"
     link = "ra"
-
-    def __init__(self, listing: Listing) -> None:
-        self._listing = listing
 
     def step(self, state: State, instruction: Instruction) -> None:
         """Do one instruction."""

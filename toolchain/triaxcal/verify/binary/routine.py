@@ -81,7 +81,9 @@ class Routine:
         )
         coefficients = [
             [
-                self._word(at + 12 + 4 * (f * (self.shape.order + 1) + k), f"c{s}{_VALUE_NAMES[f]}{k}")
+                self._word(
+                    at + 12 + 4 * (f * (self.shape.order + 1) + k), f"c{s}{_VALUE_NAMES[f]}{k}"
+                )
                 for k in range(self.shape.order + 1)
             ]
             for f in range(12)
@@ -102,7 +104,7 @@ class Routine:
     # ---- what is expected ----
 
     def name_values(self) -> None:
-        """Name what Horner's rule gives at each step, for each code that can be used and segment."""
+        """Name what Horner's rule gives at each step, for each code in use and each segment."""
         limits = {"t": self.temp, "low": self.least, "high": self.most}
         for s, segment in enumerate(self.segments):
             for code in limits.values():
@@ -138,7 +140,7 @@ class Routine:
 
 @dataclass(frozen=True)
 class Segment:
-    """Unknowns of one segment of the image; `coefficients` of the twelve functions, constant first."""
+    """Unknowns of one segment of the image; coefficients of twelve functions, constant first."""
 
     first: Value
     origin: Value
@@ -146,9 +148,7 @@ class Segment:
     coefficients: list[list[Value]]
 
 
-_VALUE_NAMES = tuple(
-    f"{n}{axis}" for axis in "xyz" for n in ("Nx", "Ny", "Nz", "b")
-)
+_VALUE_NAMES = tuple(f"{n}{axis}" for axis in "xyz" for n in ("Nx", "Ny", "Nz", "b"))
 """N_ij and b_i in the order of the image."""
 
 
@@ -267,6 +267,3 @@ def _refuse_result(
         routine.facts.term(found.poly) == routine.facts.term(wanted)
     ):
         raise UnprovenError(f"apply: accel[{i}] is not the specified floor")
-
-
-

@@ -111,7 +111,7 @@ class Words:
 
     def signed(self, a: Value) -> Value:
         """The word as a number of -2^31 to 2^31 - 1."""
-        if INT32_MIN <= a.low and a.high <= INT32_MAX:
+        if a.low >= INT32_MIN and a.high <= INT32_MAX:
             return a
         if a.number is not None:
             return constant(a.number - WORD if a.number > INT32_MAX else a.number)

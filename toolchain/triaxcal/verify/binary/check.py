@@ -1,0 +1,139 @@
+"""The routine as a compiler made it, for every input, on each core whose instructions are known.
+
+Whatever the compiler did and whatever the assembly says: the instructions of the linked program
+are followed with unknown inputs, and the results are shown to be the specified integers.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import TYPE_CHECKING
+
+from triaxcal.base.extras import install_command
+from triaxcal.base.tools import MissingToolError, install_advice, missing_tools
+from triaxcal.codegen.forms import assembly
+from triaxcal.codegen.names import names_of
+from triaxcal.fixedpoint.shape import Shape
+from triaxcal.targets.bench import best_form
+from triaxcal.targets.build import TargetError, Toolset, compiled, run
+from triaxcal.targets.cores.core import Core
+from triaxcal.targets.cores.registry import CORES
+from triaxcal.targets.matrix import THUMB1, THUMB2
+from triaxcal.verify.binary.listing import Listing
+from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
+from triaxcal.verify.tools import BrokenToolError
+from triaxcal.verify.workspace import ROUTINE, Workspace
+
+if TYPE_CHECKING:
+    from triaxcal.verify.binary.riscv import RiscV
+    from triaxcal.verify.binary.thumb import Thumb
+
+_KEY, _TITLE = "binary", "compiled code, every input"
+OPTIMISATION = "-O2"
+
+
+def check(work: Workspace) -> Outcome:
+    """Compile for each core, follow the instructions, and compare with the specification.
+
+    Raises
+    ------
+    MissingToolError, BrokenToolError
+    """
+    shape = work.plan.shape
+    if reason := not_covered(shape):
+        return Outcome(_KEY, _TITLE, NOT_DONE, f"not done for {reason}")
+    if importlib.util.find_spec("z3") is None:
+        raise MissingToolError(f"z3 for Python not found; {install_command('proof')}")
+    cores = [core for core in CORES if core.counted]
+    missing = missing_tools(core.gcc for core in cores)
+    if missing:
+        raise MissingToolError(f"{', '.join(missing)} not found; {install_advice(missing)}")
+    from triaxcal.verify.binary.values import UnprovenError  # noqa: PLC0415  imports z3
+
+    figures, failed = {}, []
+    for core in cores:
+        try:
+            figures[core.name] = proven(work, core)
+        except UnprovenError as error:
+            failed.append(f"{core.name}: {error}")
+    finding = f"{len(figures)} of {len(cores)} cores: every image, temperature and raw code"
+    if failed:
+        finding = f"not proven: {failed[0]}"
+    return judged(
+        _KEY, _TITLE, good=not failed, finding=finding, figures={"cores": figures}, details=failed
+    )
+
+
+def not_covered(shape: Shape) -> str:
+    """Which part of a shape the proof does not know; "" where it knows all."""
+    parts = {
+        "the inverse form": shape.inverse is not None,
+        "saturating results": shape.saturates,
+        "terms added to the sums": shape.adds_to_sums,
+        "a term in dT/dt": shape.rate,
+    }
+    return next((name for name, has in parts.items() if has), "")
+
+
+def proven(work: Workspace, core: Core) -> dict[str, int]:
+    """Ways through both functions, and questions that z3 answered, for one core.
+
+    Raises
+    ------
+    UnprovenError
+        Names the instruction or the result.
+    BrokenToolError
+        When the compiler or the linker refuses.
+    """
+    from triaxcal.verify.binary.routine import prove_routine  # noqa: PLC0415  imports z3
+
+    listing = Listing(disassembled(work, core))
+    linked = names_of(work.plan).linked
+    functions = f"{linked}_set_temperature", f"{linked}_apply"
+    words = row_words(work.plan.shape, best_form(core))
+    found = prove_routine(work.plan.shape, words, instructions(core), listing, functions)
+    return {
+        "set_temperature_ways": found[0].ways,
+        "apply_ways": found[1].ways,
+        "questions": sum(f.questions for f in found),
+    }
+
+
+def row_words(shape: Shape, form: int) -> int:
+    """Words of a row of the state; templates/c/triax_comp.h.j2."""
+    given = assembly(shape)
+    if form == THUMB1:
+        return {0: 4, 2: 7, 3: 10}[given["thumb1"]]
+    return 5 if form == THUMB2 and given["thumb2"] else 4
+
+
+def instructions(core: Core) -> Thumb | RiscV:
+    """What knows the instructions of a core."""
+    from triaxcal.verify.binary.riscv import RiscV  # noqa: PLC0415  imports z3
+    from triaxcal.verify.binary.thumb import Thumb  # noqa: PLC0415
+
+    return RiscV() if "riscv" in core.gcc else Thumb()
+
+
+def objdump(core: Core) -> str:
+    """The disassembler of a core's toolchain."""
+    return f"{core.gcc.removesuffix('gcc')}objdump"
+
+
+def disassembled(work: Workspace, core: Core) -> str:
+    """The routine, compiled and linked for a core, as objdump lists it."""
+    folder = work.folder / "binary" / core.name
+    toolset = Toolset(core, "gcc", OPTIMISATION, best_form(core))
+    source = work.folder / work.named(ROUTINE)
+    program = folder / "routine.elf"
+    try:
+        objects = compiled(toolset, [source], [work.folder], folder)
+        link = [core.gcc, *core.flags, "-nostdlib", "-Wl,-Ttext=0x8000", "-Wl,-e,0x8000"]
+        run([*link, *objects, "-lgcc", "-o", str(program)])
+        return run([objdump(core), "-d", *_PLAIN.get(core.gcc, ()), str(program)])
+    except TargetError as error:
+        raise BrokenToolError(f"{core.name}: {error}") from error
+
+
+_PLAIN = {"riscv64-unknown-elf-gcc": ("-M", "no-aliases")}
+"""So that an instruction has one name."""
