@@ -114,7 +114,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 $(DEVELOPER): $(INSTALLED)
 	@echo "adding the developers' tools to $(VENV) (once) ..."
-	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[dev,rig,instruments,device,series,plot]'
+	@$(BIN)/pip install -qq --disable-pip-version-check -c constraints.txt -e '.[dev,rig,instruments,device,series,plot,proof]'
 	@touch $@
 
 $(WRITER): $(INSTALLED)

@@ -29,6 +29,7 @@ EXTRAS = {
     "series": "batch: many units on a Dask cluster",
     "production": "image: Intel HEX and SREC; a2l: addresses of a program",
     "sign": "certificate: against the schema, signed, verified",
+    "proof": "verify: the compiled code, for every input",
     "noise": "noise, report: the Allan deviation",
     "plot": "Calibration.plot in Python",
 }

@@ -11,9 +11,8 @@ from triaxcal.codegen.crosscheck import CrossCheck
 from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
-from triaxcal.verify import analyzers, cost, cppcheck, eva, gappa
+from triaxcal.verify import analyzers, compiled, cost, cppcheck, eva, gappa
 from triaxcal.verify import angles as angle_checks
-from triaxcal.verify.binary import check as binary
 from triaxcal.verify.outcome import FAILED, NOT_DONE, Outcome, judged
 from triaxcal.verify.tools import BrokenToolError
 from triaxcal.verify.workspace import Workspace
@@ -29,7 +28,7 @@ CHECKS: tuple[tuple[str, str, Check], ...] = (
     ("gcc_analyzer", "gcc -fanalyzer", analyzers.check_gcc_analyzer),
     ("gcc_sanitizers", "gcc address, undefined", analyzers.check_gcc_sanitizers),
     ("clang_sanitizers", "clang undefined, integer", analyzers.check_clang_sanitizers),
-    ("binary", "compiled code, every input", binary.check),
+    ("compiled", "compiled code, every input", compiled.check),
     ("cost", "instructions a call", cost.check),
 )
 """Key, title and function of each check with a tool, in the order of the table."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from math import prod
-from pathlib import Path
 from random import Random
 
 import numpy as np
 import pytest
 
 from conftest import needs
+from triaxcal.codegen.names import names_of
+from triaxcal.codegen.forms import row_words
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.verify.campaign import CHECKS
 from triaxcal.verify.outcome import NOT_DONE, PASSED
@@ -19,8 +20,9 @@ from triaxcal.verify.workspace import Workspace
 
 pytest.importorskip("z3", reason="the package z3-solver is not installed")
 
+from triaxcal.targets.bench import best_form
 from triaxcal.targets.cores.registry import CORES
-from triaxcal.verify.binary import check
+from triaxcal.verify import compiled
 from triaxcal.verify.binary.facts import Facts
 from triaxcal.verify.binary.listing import Instruction, Listing
 from triaxcal.verify.binary.machine import State, ways
@@ -90,11 +92,11 @@ def work(subjects, tmp_path_factory) -> Workspace:
 
 @pytest.fixture(scope="module")
 def listings(work: Workspace) -> dict[str, str]:
-    return {c.name: check.disassembled(work, c) for c in CORES if c.name in NAMES}
+    return {c.name: compiled.disassembled(work, c) for c in CORES if c.name in NAMES}
 
 
 def functions(work: Workspace) -> tuple[str, str]:
-    linked = check.names_of(work.plan).linked
+    linked = names_of(work.plan).linked
     return f"{linked}_set_temperature", f"{linked}_apply"
 
 
@@ -104,13 +106,15 @@ def core_of(name: str):
 
 def proven(work: Workspace, name: str, listing: Listing):
     core = core_of(name)
-    words = check.row_words(work.plan.shape, check.best_form(core))
-    return prove_routine(work.plan.shape, words, check.instructions(core), listing, functions(work))
+    words = row_words(work.plan.shape, best_form(core))
+    return prove_routine(
+        work.plan.shape, words, compiled.instructions(core), listing, functions(work)
+    )
 
 
 def run(work: Workspace, name: str, listing: Listing, temp: int, raw: list[int]) -> list[int]:
     """Answers of the machine for known inputs: status, accel x, y, z, status."""
-    plan, core = work.plan, check.instructions(core_of(name))
+    plan, core = work.plan, compiled.instructions(core_of(name))
     atoms = Atoms()
     words = Words(atoms, Facts(atoms))
     memory = {CALIB: constant(plan.temp_min_code), CALIB + 4: constant(plan.temp_max_code)}
@@ -240,7 +244,7 @@ def test_a_register_that_is_not_saved_is_found(work, listings, name: str) -> Non
 
 
 def test_what_is_not_covered_is_said(subjects) -> None:
-    found = {name: check.not_covered(made.plan.shape) for name, made in subjects.items()}
+    found = {name: compiled.not_covered(made.plan.shape) for name, made in subjects.items()}
     assert found[SHAPE] == ""
     assert "the inverse form" in found.values()
     assert "saturating results" in found.values()
@@ -248,7 +252,7 @@ def test_what_is_not_covered_is_said(subjects) -> None:
 
 @COMPILERS
 def test_the_outcome(work: Workspace) -> None:
-    outcome = check.check(work)
+    outcome = compiled.check(work)
     assert outcome.result == PASSED, outcome
     assert set(outcome.figures["cores"]) == {core.name for core in CORES if core.counted}
 
@@ -257,11 +261,10 @@ def test_without_the_package_it_is_not_done(work, monkeypatch: pytest.MonkeyPatc
     from triaxcal.verify.campaign import guarded
 
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    outcome = guarded("binary", "", lambda: check.check(work))
+    outcome = guarded("compiled", "", lambda: compiled.check(work))
     assert outcome.result == NOT_DONE
     assert "triaxcal[proof]" in outcome.finding
 
 
 def test_it_is_one_of_the_checks() -> None:
-    assert "binary" in [key for key, _, _ in CHECKS]
-    assert Path(check.__file__).name == "check.py"
+    assert "compiled" in [key for key, _, _ in CHECKS]

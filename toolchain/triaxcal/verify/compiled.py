@@ -7,28 +7,29 @@ are followed with unknown inputs, and the results are shown to be the specified 
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from triaxcal.base.extras import install_command
 from triaxcal.base.tools import MissingToolError, install_advice, missing_tools
-from triaxcal.codegen.forms import assembly
+from triaxcal.codegen.forms import row_words
 from triaxcal.codegen.names import names_of
+from triaxcal.codegen.render import arithmetic_of, render_routine, routine_file
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.targets.bench import best_form
 from triaxcal.targets.build import TargetError, Toolset, compiled, run
 from triaxcal.targets.cores.core import Core
 from triaxcal.targets.cores.registry import CORES
-from triaxcal.targets.matrix import THUMB1, THUMB2
 from triaxcal.verify.binary.listing import Listing
 from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
 from triaxcal.verify.tools import BrokenToolError
-from triaxcal.verify.workspace import ROUTINE, Workspace
+from triaxcal.verify.workspace import Workspace
 
 if TYPE_CHECKING:
     from triaxcal.verify.binary.riscv import RiscV
     from triaxcal.verify.binary.thumb import Thumb
 
-_KEY, _TITLE = "binary", "compiled code, every input"
+_KEY, _TITLE = "compiled", "compiled code, every input"
 OPTIMISATION = "-O2"
 
 
@@ -87,24 +88,17 @@ def proven(work: Workspace, core: Core) -> dict[str, int]:
     """
     from triaxcal.verify.binary.routine import prove_routine  # noqa: PLC0415  imports z3
 
+    plan = replace(work.plan, arithmetic=best_form(core))
     listing = Listing(disassembled(work, core))
-    linked = names_of(work.plan).linked
+    linked = names_of(plan).linked
     functions = f"{linked}_set_temperature", f"{linked}_apply"
-    words = row_words(work.plan.shape, best_form(core))
-    found = prove_routine(work.plan.shape, words, instructions(core), listing, functions)
+    words = row_words(plan.shape, arithmetic_of(plan))
+    found = prove_routine(plan.shape, words, instructions(core), listing, functions)
     return {
         "set_temperature_ways": found[0].ways,
         "apply_ways": found[1].ways,
         "questions": sum(f.questions for f in found),
     }
-
-
-def row_words(shape: Shape, form: int) -> int:
-    """Words of a row of the state; templates/c/triax_comp.h.j2."""
-    given = assembly(shape)
-    if form == THUMB1:
-        return {0: 4, 2: 7, 3: 10}[given["thumb1"]]
-    return 5 if form == THUMB2 and given["thumb2"] else 4
 
 
 def instructions(core: Core) -> Thumb | RiscV:
@@ -121,13 +115,17 @@ def objdump(core: Core) -> str:
 
 
 def disassembled(work: Workspace, core: Core) -> str:
-    """The routine, compiled and linked for a core, as objdump lists it."""
-    folder = work.folder / "binary" / core.name
-    toolset = Toolset(core, "gcc", OPTIMISATION, best_form(core))
-    source = work.folder / work.named(ROUTINE)
+    """The routine in a core's fastest form, compiled and linked, as objdump lists it."""
+    folder = work.folder / "compiled" / core.name
+    folder.mkdir(parents=True, exist_ok=True)
+    plan = replace(work.plan, arithmetic=best_form(core))
+    for name, text in render_routine(plan).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    toolset = Toolset(core, "gcc", OPTIMISATION, plan.arithmetic)
+    source = folder / routine_file(plan, arithmetic_of(plan))
     program = folder / "routine.elf"
     try:
-        objects = compiled(toolset, [source], [work.folder], folder)
+        objects = compiled(toolset, [source], [folder], folder)
         link = [core.gcc, *core.flags, "-nostdlib", "-Wl,-Ttext=0x8000", "-Wl,-e,0x8000"]
         run([*link, *objects, "-lgcc", "-o", str(program)])
         return run([objdump(core), "-d", *_PLAIN.get(core.gcc, ()), str(program)])
