@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from conftest import needs
-from triaxcal.codegen.names import names_of
 from triaxcal.codegen.forms import row_words
+from triaxcal.codegen.names import names_of
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.verify.campaign import CHECKS
 from triaxcal.verify.outcome import NOT_DONE, PASSED
