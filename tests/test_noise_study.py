@@ -80,7 +80,7 @@ def test_density_and_allan_variance_belong_together(kind: NoiseKind) -> None:
 
 
 def test_the_allan_deviation_is_that_of_its_definition() -> None:
-    pytest.importorskip("allantools", reason="the package allantools is missing")
+    pytest.importorskip("allantools")
     values = signal(1, 3000, 30.0, 8.0, 0.5)
     rest = np.stack([values, values[::-1], values], axis=1)
     curve = study_noise("rest.csv", rest, STEP_S).axes[0].allan
