@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from any_rig_cases import any_rig, any_setup
 from click.testing import CliRunner
@@ -77,6 +80,22 @@ def test_a_wrong_bus_description_is_seen_by_its_g(tmp_path):
     assert done.exit_code == 0, done.output
     assert "|a| = 0.4098 g at rest" in done.output
     assert "not g, is this the right bus description?" in done.output
+
+
+def test_frames_of_another_length_are_said(tmp_path):
+    """Those of one message lack a byte; those of the others are as described."""
+    frames = turned(any_setup(tmp_path, "automotive-imu"), ("TP1",), seconds=1)
+    layouts = {layout.name: layout for layout in read_bus_file(IMU).layouts()}
+    mine = layouts["IMU_AX"].mine(frames.can_id)
+    shorter = replace(frames, length=np.where(mine, 7, frames.length).astype(np.uint8))
+    found = survey(layouts.values(), [shorter])
+    assert "IMU_AX" not in found.frames
+    assert found.misfits == (
+        (
+            f"IMU_AX: {int(mine.sum())} frames have another length or kind than the 8 bytes of "
+            "classic CAN described"
+        ),
+    )
 
 
 def test_frames_of_another_bus_are_refused(tmp_path):

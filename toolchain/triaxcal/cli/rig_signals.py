@@ -35,9 +35,10 @@ def signals(log: Path, bus_file: Path, most: int) -> None:
     for warning in file.warnings:
         click.echo(f"note: {warning}", err=True)
     if not found.frames:
+        why = "; ".join(found.misfits[:3])
         raise RefusedError(
             str(log),
-            f"no frame of a message of {bus_file}",
+            f"no frame of a message of {bus_file}" + (f": {why}" if why else ""),
             expected="frames of its IDs, lengths and kinds",
             remedy="is this the bus description of the sensor?",
         )
@@ -51,7 +52,7 @@ def _show(found: Survey, most: int) -> None:
         click.echo(f"{place}. {', '.join(triad.labels)}: {_said(triad)}")
     if not found.triads:
         click.echo("no three signals of acceleration, of codes, or without a unit")
-    for sentence in (*found.counters, *found.statuses, *found.crcs):
+    for sentence in (*found.misfits, *found.counters, *found.statuses, *found.crcs):
         click.echo(sentence)
 
 

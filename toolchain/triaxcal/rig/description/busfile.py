@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import re
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from cantools.database import Database
 from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.rig.description.layout import FrameLayout, layout_of
 
+_DECLARED = re.compile(r"\s+encoding=[\"'][^\"']*[\"']")
 SUFFIXES = (".dbc", ".kcd", ".sym", ".arxml")
 _BIT_TIMING = re.compile(r"^(\s*BS_\s*:)[^\S\n]*[^\s][^\n]*$", re.MULTILINE)
 """Obsolete: "BS_: 1000000 : 0,0"."""
@@ -82,6 +84,9 @@ def _line(error: Exception) -> str:
 
 def _text(content: bytes) -> str:
     """Text of a file; DBCs are in Windows' code page where they are not in UTF-8."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        # Text is parsed, which has no encoding: what an XML declaration says would be wrong.
+        return _DECLARED.sub("", content.decode("utf-16", errors="replace"), count=1)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -69,6 +69,8 @@ class FrameLayout:
         29-bit ID.
     j1939 : bool
         The ID is a priority, a PGN and a source address.
+    fd_stated : bool
+        The description says itself that it is CAN FD; of others the length does.
     multiplexed : mapping
         By name of a signal, what must hold for it to be in the payload; absent where it always is.
     """
@@ -80,6 +82,7 @@ class FrameLayout:
     signals: Mapping[str, Signal]
     extended: bool = False
     j1939: bool = False
+    fd_stated: bool = False
     multiplexed: Mapping[str, tuple[Condition, ...]] = field(
         default_factory=lambda: MappingProxyType({})
     )
@@ -154,6 +157,7 @@ def layout_of(message: Message) -> FrameLayout:
         signals=MappingProxyType(signals),
         extended=message.is_extended_frame,
         j1939=message.protocol == "j1939",
+        fd_stated=bool(message.is_fd),
         multiplexed=MappingProxyType(
             {
                 s.name: _conditions(message, s.name, signals)

@@ -12,6 +12,9 @@ from triaxcal.rig.description.protection import PROTECTIONS, Guard, Protection
 from triaxcal.rig.description.rigkeys import MessageKeys
 from triaxcal.rig.description.signals import Signal
 
+_CLASSIC = 8
+"""Bytes of a classic frame."""
+
 
 def use_of(names: Names, name: str, keys: MessageKeys, channel: str | None) -> MessageUse:
     """One message as the bench uses it.
@@ -115,6 +118,13 @@ def _with_source(names: Names, layout: FrameLayout, keys: MessageKeys) -> FrameL
             f"{place} j1939",
             f"ID 0x{layout.frame_id:X} of 11 bits",
             expected="an ID of 29 bits, as J1939 has them",
+        )
+    if j1939 and layout.size > _CLASSIC and not layout.fd_stated:
+        raise RefusedError(
+            place,
+            f"{layout.size} bytes, which J1939 sends in several frames",
+            expected=f"a message of at most {_CLASSIC} bytes: transport protocol is not read",
+            remedy="name signals of another message, or let the unit send them in one frame",
         )
     if keys.source_address is None:
         return replace(layout, j1939=j1939)

@@ -6,7 +6,7 @@ one: g where their unit is known, and the same in every direction that the log h
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -104,12 +104,13 @@ class Survey:
         Frames by name of message.
     triads : tuple of Triad
         The likeliest first.
-    counters, statuses, crcs : tuples of str
+    misfits, counters, statuses, crcs : tuples of str
         A sentence each.
     """
 
     frames: Mapping[str, int]
     triads: tuple[Triad, ...]
+    misfits: tuple[str, ...]
     counters: tuple[str, ...]
     statuses: tuple[str, ...]
     crcs: tuple[str, ...]
@@ -118,11 +119,17 @@ class Survey:
 def survey(layouts: Iterable[FrameLayout], parts: Iterable[Frames]) -> Survey:
     """Look at all signals of a bus description in the frames of a log."""
     uses = [MessageUse(layout) for layout in layouts]
-    collected = _collected(uses, parts)
+    collected, misfits = _collected(uses, parts)
     columns = [c for use in uses for c in _columns(use.layout, *collected[use.name])]
     return Survey(
         frames={name: len(t_ns) for name, (t_ns, _) in collected.items() if len(t_ns)},
         triads=tuple(sorted(_triads(columns), key=lambda t: (not t.tells, t.off))),
+        misfits=tuple(
+            f"{name}: {count} frames have another length or kind than the {_kind(use)} described"
+            for name, count in misfits.items()
+            for use in uses
+            if use.name == name
+        ),
         counters=tuple(_counters(columns)),
         statuses=tuple(_statuses(columns)),
         crcs=tuple(_crcs(uses, collected)),
@@ -133,14 +140,24 @@ Collected = dict[str, tuple[IntArray, np.ndarray]]
 """Times and payloads of each message."""
 
 
-def _collected(uses: Sequence[MessageUse], parts: Iterable[Frames]) -> Collected:
+def _kind(use: MessageUse) -> str:
+    return f"{use.layout.sent_bytes} bytes of {'CAN FD' if use.layout.fd else 'classic CAN'}"
+
+
+def _collected(
+    uses: Sequence[MessageUse], parts: Iterable[Frames]
+) -> tuple[Collected, Counter[str]]:
+    """Frames of each message, and how many have another length or kind than it."""
+    misfits: Counter[str] = Counter()
     found: dict[str, list[tuple[IntArray, np.ndarray]]] = defaultdict(list)
     for frames in parts:
         for use in uses:
-            good, _ = rows_of(use, frames, 0)
+            good, bad = rows_of(use, frames, 0)
+            if len(bad):
+                misfits[use.name] += len(bad)
             if len(good):
                 found[use.name].append((good.t_ns, good.data[:, : use.layout.size]))
-    return {
+    collected = {
         use.name: (
             np.concatenate([t for t, _ in found[use.name]] or [np.zeros(0, np.int64)]),
             np.concatenate(
@@ -149,6 +166,7 @@ def _collected(uses: Sequence[MessageUse], parts: Iterable[Frames]) -> Collected
         )
         for use in uses
     }
+    return collected, misfits
 
 
 def _columns(layout: FrameLayout, t_ns: IntArray, data: np.ndarray) -> Iterator[Column]:
