@@ -21,6 +21,8 @@ import numpy as np
 from triaxcal.model.types import FloatArray
 
 AIRCRAFT, INCLINOMETER = "aircraft", "inclinometer"
+_HORIZON_MIN = 1e-6
+"""Of the second angle's circle, g: below it (8) has no second angle."""
 
 
 def direction_cosines(kind: str, angles_rad: FloatArray) -> FloatArray:
@@ -78,6 +80,27 @@ def angle_slopes(kind: str, angles_rad: FloatArray) -> FloatArray:
     else:
         rows = ((-c1 * c2, s1 * s2), (-c1 * s2, -s1 * c2), (-s1, zero))
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def angle_slopes_of_force(kind: str, force: FloatArray) -> FloatArray:
+    """D of (8): derivatives of the two angles by the force (n, 3), shape (n, 2, 3), rad/g."""
+    x, y, z = force[:, 0], force[:, 1], force[:, 2]
+    total = (force**2).sum(axis=1)
+    result = np.full((len(force), 2, 3), np.nan)
+    if kind == AIRCRAFT:
+        circle = np.hypot(y, z)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first = (-circle / total, x * y / (circle * total), x * z / (circle * total))
+            second = (np.zeros_like(x), z / circle**2, -y / circle**2)
+    else:
+        circle = np.hypot(x, y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first = (x * z / (circle * total), y * z / (circle * total), -circle / total)
+            second = (-y / circle**2, x / circle**2, np.zeros_like(x))
+    seen = circle > _HORIZON_MIN
+    result[seen, 0] = np.stack(first, axis=1)[seen]
+    result[seen, 1] = np.stack(second, axis=1)[seen]
+    return result
 
 
 def _matrix(rows: tuple[tuple[FloatArray, ...], ...]) -> FloatArray:

@@ -8,6 +8,7 @@ from triaxcal.base.screentext import table
 from triaxcal.delivery.unit import Delivery
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import RecordingFit
+from triaxcal.fixedpoint.angles import ARCSEC_PER_UNIT
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.report.passport.content import Passport
@@ -194,6 +195,22 @@ def _uncertainty(made: Passport) -> str:
     return _entry("uncertainty", text)
 
 
+def _angles(delivery: Delivery) -> list[str]:
+    """Of triax_angles, where the device has it."""
+    plan, check = delivery.firmware.angles, delivery.angles_check
+    if plan is None or check is None:
+        return []
+    proven = [f"{float(u) * ARCSEC_PER_UNIT:.4f}" for u in check.bound.units]
+    vectors = thousands(check.total, " ")
+    return [
+        _entry(
+            "angles",
+            f"{' and '.join(plan.choice.names)} within {' and '.join(proven)} arcsec of the exact "
+            f"ones: proven; {vectors} vectors bit for bit",
+        )
+    ]
+
+
 def _small_g(value_g: float) -> str:
     return f"{value_g * 1e3:.3g} mg" if value_g >= 1e-3 else f"{value_g * 1e6:.3g} micro-g"
 
@@ -214,6 +231,7 @@ def _verdict(made: Passport) -> str:
             f"({delivery.firmware.error_g * 1e6:.3f} micro-g) of K(T)^-1 (U - U0(T))",
         ),
         _entry("cross-check", f"{vectors} vectors bit for bit: Python = reference = generated C"),
+        *_angles(delivery),
         "",
         _entry("verdict", verdict.words),
         *(f"  {line}" for line in table(verdict.heads, verdict.rows)),

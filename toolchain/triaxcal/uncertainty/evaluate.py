@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -97,6 +97,22 @@ class Uncertainty:
         variance = [force_variance(s.force, directions) for s in sources if s.force is not None]
         each = np.sqrt(np.maximum(np.stack(variance), 0.0))
         return _expanded(each, sources)
+
+    def force_sums_u(self, weights_of: Callable[[int], FloatArray]) -> FloatArray:
+        """Expanded uncertainty of linear functions of D, shape (n, m).
+
+        Parameters
+        ----------
+        weights_of : callable
+            Their weights, shape (m, 3 columns), for a D of so many columns; `weights` has D.
+        """
+        sources, each = [s for s in self.sources if s.force is not None], []
+        for s in sources:
+            assert s.force is not None
+            W = weights_of(s.force.shape[-1] // 3)
+            variance = np.einsum("mi,tij,mj->tm", W, s.force, W, optimize=True)
+            each.append(np.sqrt(np.maximum(variance, 0.0)))
+        return _expanded(np.stack(each), sources)
 
     @property
     def worst_over_temperature(self) -> FloatArray:

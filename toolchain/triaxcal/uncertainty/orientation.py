@@ -21,12 +21,18 @@ def weights(directions: FloatArray, columns: int = 4) -> FloatArray:
     length: its projection on n.
     """
     count = len(directions)
-    affine = np.column_stack([directions, np.ones(count), products(directions)])[:, :columns]
+    affine = affine_of(directions, columns)
     W = np.zeros((count, 4, 3, columns))
     for i in range(3):
         W[:, i, i] = affine
     W[:, 3] = directions[:, :, None] * affine[:, None, :]
     return W.reshape(count, 4, 3 * columns)
+
+
+def affine_of(directions: FloatArray, columns: int) -> FloatArray:
+    """Rows [n, 1, products of n], shape (directions, columns): D times such a row is an error."""
+    parts = [directions, np.ones(len(directions)), products(directions)]
+    return np.column_stack(parts)[:, :columns]
 
 
 def force_variance(covariance: FloatArray, directions: FloatArray) -> FloatArray:

@@ -19,11 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.model.orientation import angle_slopes, angles_from_force, gravity_direction
+from triaxcal.model.orientation import (
+    angle_slopes,
+    angle_slopes_of_force,
+    angles_from_force,
+    gravity_direction,
+)
 from triaxcal.model.types import FloatArray
-
-_HORIZON_MIN = 1e-6
-"""Of the second angle's circle, g: below it (8) has no second angle."""
 
 
 @dataclass(frozen=True)
@@ -51,27 +53,6 @@ class AngleErrors:
     per_offset: FloatArray
     per_scale: FloatArray
     per_misalignment: FloatArray
-
-
-def angle_slopes_of_force(kind: str, force: FloatArray) -> FloatArray:
-    """D of (8): derivatives of the two angles by the force (n, 3), shape (n, 2, 3), rad/g."""
-    x, y, z = force[:, 0], force[:, 1], force[:, 2]
-    total = (force**2).sum(axis=1)
-    result = np.full((len(force), 2, 3), np.nan)
-    if kind == "aircraft":
-        circle = np.hypot(y, z)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            first = (-circle / total, x * y / (circle * total), x * z / (circle * total))
-            second = (np.zeros_like(x), z / circle**2, -y / circle**2)
-    else:
-        circle = np.hypot(x, y)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            first = (x * z / (circle * total), y * z / (circle * total), -circle / total)
-            second = (-y / circle**2, x / circle**2, np.zeros_like(x))
-    seen = circle > _HORIZON_MIN
-    result[seen, 0] = np.stack(first, axis=1)[seen]
-    result[seen, 1] = np.stack(second, axis=1)[seen]
-    return result
 
 
 def angle_errors(

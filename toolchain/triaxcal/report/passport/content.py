@@ -18,6 +18,7 @@ from triaxcal.delivery.unit import Delivery
 from triaxcal.delivery.verdict import DECISIVE, Verdict, worst
 from triaxcal.device.record import DeviceRecord
 from triaxcal.report.stated.statements import Caution, cautions
+from triaxcal.uncertainty.angles import AngleUncertainty, angle_uncertainty
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.evaluate import LENGTH, Uncertainty
 from triaxcal.uncertainty.orientation import DIRECTIONS, in_words
@@ -119,6 +120,14 @@ class Passport:
         """Budgets of the twelve constants at T0."""
         u = self.uncertainty
         return tuple(u.constant_budget(c, u.t0_index) for c in range(12))
+
+    @cached_property
+    def angles(self) -> AngleUncertainty | None:
+        """Uncertainty of the angles of the device, where it makes any and it is known."""
+        choice = self.delivery.unit.angles
+        if choice is None or not self.verdict.checked:
+            return None
+        return angle_uncertainty(self.uncertainty, choice)
 
     @cached_property
     def component_budget(self) -> Budget:

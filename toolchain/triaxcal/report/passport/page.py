@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from triaxcal.codegen.tryout import MethodResult
+from triaxcal.report.passport.angles import angles_section
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.passport.downloads import downloads
 from triaxcal.report.passport.head import badge, identity, signature, tested, verification, warnings
@@ -71,6 +72,7 @@ def passport_html(p: Passport, language: str | None = None) -> bytes:
         after=_largest(p.delivery.chosen),
         over_temperature=uncertainty_panel(calibration, p.uncertainty, t),
         budgets=budgets(p, t),
+        angles=angles_section(p, t),
         shares=shares(calibration, t),
         candidates=candidates(calibration, t),
         fit_head=t("choice.bias_by") if calibration.recording is None else t("choice.fit"),
