@@ -152,3 +152,26 @@ def test_a_command_to_copy_is_quoted_for_its_shell(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("triaxcal.base.extras.os.name", "nt")
     assert quoted("triaxcal[cc]") == "triaxcal[cc]"  # cmd.exe has no other meaning for brackets
     assert quoted("a b") == '"a b"'
+
+
+BARE = """
+import sys
+for name in ("asammdf", "bincopy", "can", "cantools", "cryptography", "distributed", "elftools",
+             "h5py", "lxml", "matplotlib", "openpyxl", "pyarrow", "pymavlink", "pymodbus", "pyulog",
+             "pyvisa", "pyxcp", "rosbags", "serial", "signxml", "ziglang"):
+    sys.modules[name] = None
+from triaxcal.batch.toolchain import toolchain
+from triaxcal.exports.registry import TARGETS
+from triaxcal.readings.format import FORMATS
+from triaxcal.targets.cores.registry import CORES
+print(toolchain(), *(len(list(r)) for r in (FORMATS, TARGETS, CORES)))
+import triaxcal
+print(triaxcal.installation().works)
+"""
+
+
+@pytest.mark.long
+def test_every_registry_is_read_without_any_optional_package() -> None:
+    done = python(BARE)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[1] == "True"

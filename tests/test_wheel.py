@@ -111,10 +111,14 @@ def test_the_pages_that_messages_name_are_in_it(installed: Path, tmp_path: Path)
     texts = [p.read_text(encoding="utf-8") for p in package.rglob("*.py")]
     pages = {name for text in texts for name in re.findall(r"docs/([a-z/-]+\.md)", text)}
     assert len(pages) > 10
+    pages |= {p.relative_to(ROOT / "docs").as_posix() for p in (ROOT / "docs").rglob("*.md")}
+    pages = {page for page in pages if not page.startswith("_build/")}
     assert [page for page in sorted(pages) if not (folder / page).is_file()] == []
 
 
 def test_examples(tmp_path: Path) -> None:
+    with pytest.raises(api.RefusedError, match="`triaxcal example AT-SIM` copies the example"):
+        api.read_unit(tmp_path / "AT-SIM")
     assert [e.name for e in api.examples()] == ["AT-CHERNIAK", "AT-SIM", "AT-SIM-BENCH", "IMU-SIM"]
     with pytest.raises(api.UsageError, match=r'found \'at-sim\' \(did you mean "AT-SIM"\?\)'):
         api.copy_example("at-sim", tmp_path)

@@ -9,6 +9,7 @@ from pathlib import Path
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import DESCRIPTION, FORMAT, Key, TableKeys
 from triaxcal.base.kinds import pattern
+from triaxcal.base.shipped import shipped
 from triaxcal.base.tomltable import did_you_mean, read_toml, shown
 
 UNIT_FILE, UNIT_FORMAT = "unit.toml", 1
@@ -76,6 +77,8 @@ def find_unit(folder: Path) -> Path:
             break
     else:
         remedy = f"`triaxcal init {folder}` writes a first unit.toml"
+        if _is_unit(shipped("units") / folder.name) and not folder.exists():
+            remedy = f"`triaxcal example {folder.name}` copies the example"
     found = f"no {UNIT_FILE} in it" if folder.is_dir() else f"no such unit{hint}"
     raise RefusedError(str(folder), found, remedy=remedy)
 

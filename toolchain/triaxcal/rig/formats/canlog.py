@@ -179,7 +179,7 @@ def _open(path: Path, layout: FileLayout) -> Source:
         raise RefusedError(
             f"{path}, [{layout.table}]", "dbc and rig", expected="one of them: rig names a dbc"
         )
-    from triaxcal.rig.formats.rigged import RiggedLog  # noqa: PLC0415  the bench takes its time
+    from triaxcal.rig.check.rigged import RiggedLog  # noqa: PLC0415  the bench takes its time
 
     return RiggedLog(path, layout.rig)
 
