@@ -146,7 +146,7 @@ def test_the_page_of_the_index_renders_alone(wheel: Path) -> None:
 
 def test_every_extra_says_what_it_is_for() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    developers = {"dev", "docs", "fuzz", "a2l", "readers", "recordings"}
+    developers = {"dev", "docs", "fuzz", "a2l", "bench", "readers", "recordings"}
     assert set(EXTRAS) == set(project["optional-dependencies"]) - developers
 
 
