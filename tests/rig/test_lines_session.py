@@ -226,6 +226,12 @@ def test_a_bus_is_refused_for_a_rig_that_speaks_lines(tmp_path, bus):
     assert "lines:port,option=value, visa:resource" in str(done.exception)
 
 
+def test_a_rig_that_speaks_lines_is_not_simulated_on_a_bus(tmp_path):
+    lines_setup(tmp_path, CODES)
+    done = invoke(tmp_path, "simulate", "--bus", "virtual:x", "--seconds", "1")
+    assert "gives frames; expected what" in str(done.exception)
+
+
 def test_lines_are_refused_for_a_rig_on_can(tmp_path):
     short_setup(tmp_path)
     (tmp_path / "short.toml").rename(tmp_path / "plan.toml")

@@ -20,12 +20,14 @@ from triaxcal.cli.rig_options import (
     bus_options,
     open_source,
     refuse_missing_bench,
+    refuse_other_kind,
     run_options,
     session_options,
     simulated,
 )
 from triaxcal.cli.rig_sessions import last_session, mended, status
 from triaxcal.cli.rig_signals import signals
+from triaxcal.rig.sources.source import kind_of
 
 if TYPE_CHECKING:
     from triaxcal.rig.many.setup import ManySetup
@@ -208,6 +210,7 @@ def simulate(setup: Setup, bus: BusChoice, seconds: float | None, hold: int) -> 
     from triaxcal.rig.bus.openbus import open_bus  # noqa: PLC0415
 
     name = bus.name if ":" in bus.name else f"socketcan:{bus.name}"
+    refuse_other_kind(setup, kind_of(name))
     sender = open_bus(name, setup.rig.fd)
     simulate_on(sender, simulated(setup, bus), setup.plan, seconds, hold)
 

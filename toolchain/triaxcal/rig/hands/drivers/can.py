@@ -140,13 +140,10 @@ class _CanInstrument:
 
 def _messages(settings: _Settings) -> dict[str, Any]:
     """Messages that the keys name, by name."""
-    import cantools  # noqa: PLC0415
+    from triaxcal.rig.description.busfile import read_bus_file  # noqa: PLC0415
 
     path = Path(settings.can_dbc)
-    try:
-        database: Any = cantools.database.load_file(path, strict=False)
-    except Exception as error:
-        raise RefusedError(str(path), f"cannot be read: {str(error).splitlines()[0]}") from error
+    database: Any = read_bus_file(path).database
     return dict(_named(database, path, [*settings.can_set, *settings.can_read]))
 
 
