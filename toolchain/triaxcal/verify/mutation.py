@@ -79,7 +79,7 @@ class Equivalent:
     def covers(self, mutant: Mutant, shape: str) -> bool:
         """Whether the mutant of a shape is this one."""
         return (
-            mutant.function == self.function
+            _like(self.function, mutant.function)
             and (not self.shapes or shape in self.shapes)
             and _like(self.before, mutant.before)
             and any(_like(text, mutant.after) for text in self.after)
