@@ -50,7 +50,7 @@ class Fresh:
             "python", "-m", "pip", "install", "-q", "--disable-pip-version-check",
             "--no-compile", "--only-binary", ":all:", *packages,
         )  # fmt: skip
-        if done.returncode and "CI" not in os.environ:
+        if "from versions: none" in done.stderr and "CI" not in os.environ:
             pytest.skip(f"pip cannot install {packages}: {done.stderr[-500:]}")
         assert done.returncode == 0, done.stderr
 
