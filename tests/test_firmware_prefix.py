@@ -86,3 +86,27 @@ def test_a_folder_with_other_files_is_not_replaced(folder: Path) -> None:
     with pytest.raises(RefusedError, match=r"calibration\.json', which no delivery has"):
         triaxcal.delivered_firmware(folder, prefix="left").write(folder)
     assert (folder / "calibration.json").is_file()
+
+
+def test_another_arithmetic_is_a_file_beside_the_same_c(folder: Path, tmp_path: Path) -> None:
+    """An export has it in place of triax_comp.c: with both a linker would find names twice."""
+    said = ran(folder, "--arithmetic", "thumb2", "--into", tmp_path / "out")
+    assert "triax_comp_thumb2.c" in said
+    for name in ("triax_comp.c", "triax_calib.c", "triax_calib.bin", "triax_selftest.c"):
+        assert (tmp_path / "out" / name).read_bytes() == (folder / name).read_bytes(), name
+    assert "#define TRIAX_ROW_WORDS 5" in (tmp_path / "out" / "triax_comp.h").read_text()
+    made = triaxcal.export(folder, "cmake", tmp_path / "cmake", arithmetic="thumb2")
+    assert "src/triax_comp_thumb2.c" in made.files
+    assert "src/triax_comp.c" not in made.files
+    lists = (tmp_path / "cmake" / "CMakeLists.txt").read_text()
+    assert "src/triax_comp_thumb2.c" in lists
+
+
+def test_what_is_no_arithmetic_is_refused(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(RefusedError) as refusal:
+        triaxcal.delivered_firmware(folder, arithmetic="neon")
+    assert str(refusal.value) == (
+        'arithmetic: found \'neon\'; expected one of "portable", "limbs", "thumb2", "thumb1"'
+    )
+    with pytest.raises(RefusedError, match='arithmetic: found "thumb2"; expected none: PX4 gets'):
+        triaxcal.export(folder, "px4", tmp_path / "px4", arithmetic="thumb2")
