@@ -122,6 +122,16 @@ def test_the_page_is_one_file_and_nothing_on_it_is_run_or_loaded() -> None:
     assert not re.search(r"https?://|url\(|@import", text)
 
 
+def test_every_value_is_escaped_whatever_the_template_says_of_it() -> None:
+    """Days, quantities and results come from the journal, which anybody can edit."""
+    records = mixed()
+    for record in records[4:12]:
+        record |= {"rig": "R", "date": HOSTILE, "result": HOSTILE, "verdict": HOSTILE}
+    page = page_of(records, {})
+    assert not [tag for tag, _ in page.tags if tag == "img"]
+    assert [row[9] for row in page.rows].count(HOSTILE) == 8
+
+
 def test_an_imu_that_was_calibrated_beside_the_series_is_linked(tmp_path: Path) -> None:
     series = series_of([], {})
     series.skipped.update(A="an IMU", B="an IMU")

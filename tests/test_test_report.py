@@ -28,6 +28,7 @@ from triaxcal.cli.main import main
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.delivery.judgement import judge
 from triaxcal.model.types import FloatArray
+from triaxcal.performance.figures import Chapter, Figure
 from triaxcal.performance.testreport import UnitReport, make_report
 from triaxcal.report.testreport.page import report_html
 from triaxcal.report.testreport.text import report_text
@@ -285,6 +286,17 @@ def test_hostile_names_are_escaped(fitted: tuple[Fitted, Path], tmp_path: Path) 
     assert "<b>&" not in page
     assert "<script" not in page
     assert "&lt;script&gt;x&lt;/script&gt;" in page
+
+
+def test_every_text_of_a_chapter_is_escaped(fitted: tuple[Fitted, Path]) -> None:
+    """By the environment of the pages, whatever a template forgets."""
+    evil = "<script>x</script>"
+    figure = Figure(evil, evil, evil, evil, 1.0, 0.0, 2.0, evil)
+    chapter = Chapter(evil, evil, evil, (figure,), (evil,))
+    report = replace(reported(fitted[0], None, ""), chapters=(chapter,), files={evil: evil})
+    page = report_html(report).decode()
+    assert "<script" not in page
+    assert page.count("&lt;script&gt;x&lt;/script&gt;") == 10
 
 
 @pytest.mark.long

@@ -25,7 +25,6 @@ from triaxcal.batch.statistics import (
     quantities,
     runs,
 )
-from triaxcal.codegen.templates import environment
 from triaxcal.delivery.verdict import PASSED
 from triaxcal.report.pictures.series import (
     BASE,
@@ -39,6 +38,7 @@ from triaxcal.report.pictures.series import (
 )
 from triaxcal.report.series.results import results
 from triaxcal.report.series.units import rows_of, units_csv
+from triaxcal.report.texts.html import page
 from triaxcal.report.words.numbers import scaled, significant
 
 PAGE_FILE, JSON_FILE = "series.html", "series.json"
@@ -107,9 +107,8 @@ def series_files(series: Series, build: Path | None = None) -> dict[str, bytes]:
         "skipped": len(series.skipped),
         "csv": units_csv(rows),
     }
-    page = environment().get_template("pages/series.html.j2").render(context)
     return {
-        PAGE_FILE: page.encode("utf-8", "backslashreplace"),
+        PAGE_FILE: page("series.html.j2", **context),
         JSON_FILE: _json(series, groups, far, by_run),
     }
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import html
 import re
 from itertools import groupby
 from typing import Any
 
+from markupsafe import Markup, escape
+
 from triaxcal import __version__
-from triaxcal.codegen.templates import environment
 from triaxcal.performance.figures import Chapter, Drawing, Figure
 from triaxcal.performance.testreport import UnitReport
 from triaxcal.report.pictures.line_plot import COLOURS, Line, Panel, line_plot
 from triaxcal.report.testreport.words import NOT_MEASURED, on_page, value_words
+from triaxcal.report.texts.html import page
 
 STANDARD_WORDS = {
     "ieee-1293": "Figures and symbols as accelerometer houses report by IEEE Std 1293"
@@ -34,7 +35,7 @@ def report_html(report: UnitReport) -> bytes:
         "files": sorted(report.files.items()),
         "version": __version__,
     }
-    return environment().get_template("pages/testreport.html.j2").render(context).encode()
+    return page("testreport.html.j2", **context)
 
 
 def _identity(report: UnitReport) -> list[tuple[str, str]]:
@@ -64,15 +65,16 @@ def _chapter(chapter: Chapter) -> dict[str, Any]:
         "groups": _groups(chapter.figures),
         "notes": [on_page(note) for note in chapter.notes],
         "drawings": [
-            {"title": on_page(d.title), "svg": drawing_svg(d).decode()} for d in chapter.drawings
+            {"title": on_page(d.title), "svg": Markup(drawing_svg(d).decode())}
+            for d in chapter.drawings
         ],
     }
 
 
-def _with_indices(text: str) -> str:
+def _with_indices(text: str) -> Markup:
     """HTML of a text in which K1_i and K_jk have lower indices."""
-    shown = html.escape(text).replace("sum_", "\u03a3_")
-    return re.sub(r"\b(\w+?)_([a-z]{1,2})(?![A-Za-z0-9])", r"\1<sub>\2</sub>", shown)
+    shown = str(escape(text)).replace("sum_", "\u03a3_")
+    return Markup(re.sub(r"\b(\w+?)_([a-z]{1,2})(?![A-Za-z0-9])", r"\1<sub>\2</sub>", shown))
 
 
 def _groups(figures: tuple[Figure, ...]) -> list[dict[str, Any]]:

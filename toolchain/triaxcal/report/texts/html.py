@@ -25,8 +25,12 @@ def _pages() -> jinja2.Environment:
 
 
 def page(template: str, **context: Any) -> bytes:
-    """A page of templates/pages; what is no `Markup` is escaped."""
-    return _pages().get_template(f"pages/{template}").render(context).encode()
+    """A page of templates/pages; what is no `Markup` is escaped.
+
+    Names of folders may be no text: their bytes stand as numbers on the page.
+    """
+    made = _pages().get_template(f"pages/{template}").render(context)
+    return made.encode("utf-8", "backslashreplace")
 
 
 def css_text(text: str) -> str:
