@@ -264,6 +264,21 @@ def test_an_encrypted_key(desk: Desk, keys: dict[str, Any]) -> None:
     assert triaxcal.verify_certificate(desk.signed).subject == "CN=N. N."
 
 
+def test_a_passphrase_need_not_be_text(desk: Desk, keys: dict[str, Any]) -> None:
+    desk.put("key.pem", pem(keys["ec"], b"w\xffrd"))
+    desk.put("cert.pem", cert_pem(cert_of(keys["ec"])))
+    secret = desk.put("secret", b"w\xffrd\r\nmore")
+    result = sign_by_command(desk, "--passphrase-file", str(secret))
+    assert result.exit_code == 0, result.exception
+    assert desk.signed.exists()
+
+
+def test_a_folder_is_no_certificate(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(desk.folder)
+    with pytest.raises(RefusedError, match=r"^\.: cannot be read"):
+        triaxcal.sign_certificate(".", "key.pem", "cert.pem")
+
+
 def sign_by_command(desk: Desk, *more: str, typed: str = "") -> Result:
     files = ["--key", str(desk.folder / "key.pem"), "--cert", str(desk.folder / "cert.pem")]
     command = ["certificate", "sign", str(desk.path), *files, *more]

@@ -109,6 +109,18 @@ SHAKES = {
 }
 
 
+def test_a_band_narrower_than_the_steps_of_frequency_is_generated() -> None:
+    """A rotor's sine far above the random part: no frequency of the block is within the band."""
+    vibration = Vibration(
+        direction=(1.0, 0.0, 0.0), grms=1.0, band_hz=(5.0, 10.0), sine_g=1e-6, sine_hz=50e3
+    )
+    random = np.random.default_rng(1)
+    each = np.array([np.mean(block(vibration, random) ** 2) for _ in range(400)])
+    # One complex Gaussian coefficient a block: its square is exponential, of the standard
+    # deviation 1. Five standard errors.
+    assert abs(each.mean() - 1.0) < 5.0 / np.sqrt(400.0)
+
+
 @pytest.mark.long
 def test_the_compiled_c_shifts_as_predicted() -> None:
     calibration = triaxcal.fit(triaxcal.read_unit(UNITS / "AT-SIM"))

@@ -30,6 +30,7 @@ from triaxcal.delivery.judgement import judge
 from triaxcal.model.types import FloatArray
 from triaxcal.performance.figures import Chapter, Figure
 from triaxcal.performance.testreport import UnitReport, make_report
+from triaxcal.report.testreport.document import report_json
 from triaxcal.report.testreport.page import report_html
 from triaxcal.report.testreport.text import report_text
 from triaxcal.unit.description import unit_of_text
@@ -286,6 +287,18 @@ def test_hostile_names_are_escaped(fitted: tuple[Fitted, Path], tmp_path: Path) 
     assert "<b>&" not in page
     assert "<script" not in page
     assert "&lt;script&gt;x&lt;/script&gt;" in page
+
+
+def test_a_transient_within_the_band_settles_at_once(
+    fitted: tuple[Fitted, Path], tmp_path: Path
+) -> None:
+    power_on(tmp_path / "t.csv")
+    more = "first_sample_s = 0\nsettled_within_micro_g = 1e5"
+    report = reported(fitted[0], tmp_path, stated("power-on", more, temperature=False))
+    settling = report.of("warm_up_settling", "x")
+    assert (settling.value, settling.low, settling.high) == (0.0, None, None)
+    assert settling.how.endswith(": the transient stays within the band")
+    assert json.loads(report_json(report))["unit"] == "C"
 
 
 def test_every_text_of_a_chapter_is_escaped(fitted: tuple[Fitted, Path]) -> None:

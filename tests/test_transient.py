@@ -72,6 +72,13 @@ def test_the_time_to_settle_is_the_last_crossing() -> None:
     assert t.settled_s(60.0)[1] == pytest.approx(1e-3 * slope, rel=1e-3)
 
 
+def test_runs_that_are_within_the_band_from_the_start_have_a_mean() -> None:
+    """Such a run settles at 0 s, with an uncertainty of 0: no weight can be made of it."""
+    assert mean_of_runs(np.zeros(2), np.zeros(2)) == (0.0, 0.0)
+    mean, expanded = mean_of_runs(np.array([0.0, 12.0]), np.array([0.0, 1.0]))
+    assert (mean, expanded) == (6.0, pytest.approx(1.96 / 2.0))
+
+
 def test_means_of_runs_and_standard_deviations() -> None:
     values = np.array([1.0, 2.0, 4.0, 5.0])
     mean, expanded = mean_of_runs(values, np.ones(4))

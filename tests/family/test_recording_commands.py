@@ -72,6 +72,16 @@ def test_drift_without_a_temperature_is_refused(tmp_path: Path) -> None:
         run("drift", str(folder))
 
 
+@pytest.mark.parametrize("count", [1, 2, 63])
+def test_drift_of_too_few_samples_is_refused(tmp_path: Path, count: int) -> None:
+    rows = np.column_stack([np.arange(count), np.zeros((count, 2)), np.full(count, 9.8)])
+    rows = np.column_stack([rows, np.linspace(20.0, 60.0, count)])
+    recording = COLUMNS + '\ntemperature = "T"'
+    folder = write_unit(tmp_path / "U", rows, recording, header="t,ax,ay,az,T")
+    with pytest.raises(RefusedError, match=rf": {count} samples?; expected 64 at least"):
+        run("drift", str(folder))
+
+
 def test_crosscoupling_prints_the_coefficients(tmp_path: Path) -> None:
     theta = np.radians(5.0 + 13.0 * np.arange(28))
     a = -np.cos(theta) - 5e-5 * np.sin(theta) * np.cos(theta)

@@ -72,15 +72,15 @@ def sign_certificate(
         When the file is no certificate or is signed, key or certificate do not serve, the file to
         write exists, or a package is missing.
     """
-    source = Path(path)
+    source, content = Path(path), _content(path)
     target = _signed_name(source) if to is None else Path(to)
     if target.exists():
         raise RefusedError(
             str(target), "exists already", remedy="move it away, or name another file"
         )
-    secret = None if passphrase is None else passphrase.encode()
+    secret = None if passphrase is None else passphrase.encode("utf-8", "surrogateescape")
     files = [(str(name), _content(name)) for name in (key, cert)]
-    signed = sign(_content(source), str(source), files[0], files[1], secret)
+    signed = sign(content, str(source), files[0], files[1], secret)
     if not target.parent.is_dir():
         raise RefusedError(str(target.parent), "no such folder")
     renew({target.name: signed}, target.parent)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO
 
 import click
 
@@ -70,7 +70,7 @@ def check(file: Path, schemas: Path) -> None:
 )
 @click.option(
     "--passphrase-file",
-    type=click.File("r"),
+    type=click.File("rb"),
     help="Its first line opens an encrypted key; - is standard input.",
 )
 @click.option(
@@ -79,7 +79,7 @@ def check(file: Path, schemas: Path) -> None:
     help="Write this file; default: a name with .signed, beside a delivered folder.",
 )
 def sign(
-    file: Path, *, key: Path, cert: Path, passphrase_file: TextIO | None, to: Path | None
+    file: Path, *, key: Path, cert: Path, passphrase_file: BinaryIO | None, to: Path | None
 ) -> None:
     """Sign a certificate with your key.
 
@@ -88,7 +88,10 @@ def sign(
     """
     import triaxcal  # noqa: PLC0415
 
-    secret = None if passphrase_file is None else passphrase_file.readline().rstrip("\r\n")
+    secret = None
+    if passphrase_file is not None:
+        line = passphrase_file.readline().rstrip(b"\r\n")
+        secret = line.decode("utf-8", "surrogateescape")  # it need not be text
     path = triaxcal.sign_certificate(file, key, cert, passphrase=secret, to=to)
     say(f"{path} written")
 

@@ -129,13 +129,15 @@ def mean_of_runs(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
     """Mean of runs (n,) and its expanded uncertainty.
 
     With four runs and more by their own scatter, Student with n - 1 degrees of freedom; with fewer
-    by the standard deviations `sds` of each.
+    by the standard deviations `sds` of each; runs are weighted by them unless one is 0.
     """
     n = len(values)
     if n >= 4:
         sd = float(np.std(values, ddof=1)) / math.sqrt(n)
         return float(values.mean()), coverage_factor(n - 1.0) * sd
-    weight = 1.0 / np.maximum(sds, 1e-300) ** 2
+    if not sds.all():
+        return float(values.mean()), 1.96 * math.sqrt(float(sds @ sds)) / n
+    weight = 1.0 / sds**2
     mean = float(weight @ values / weight.sum())
     return mean, 1.96 / math.sqrt(float(weight.sum()))
 

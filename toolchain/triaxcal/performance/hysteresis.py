@@ -23,7 +23,6 @@ from triaxcal.performance.recorded import Recorded
 from triaxcal.unit.recordedtest import StatedTest
 
 _MICRO = 1e6
-_SAMPLES_MIN = 64
 KEY, NAME, UNIT = "hysteresis", "thermal hysteresis", "micro-g"
 DEFINITION = (
     "Largest difference of heating and cooling at one temperature, over the temperatures in which "
@@ -45,13 +44,6 @@ def hysteresis_figures(
     """
     if recorded.temp_degc is None:
         raise RefusedError(f"{test.where} temperature", "missing", expected="its column")
-    if len(recorded.time_s) < _SAMPLES_MIN:
-        raise RefusedError(
-            recorded.source,
-            f"{len(recorded.time_s)} samples",
-            expected=f"{_SAMPLES_MIN} at least",
-            remedy="record longer",
-        )
     temp, rate = smoothed(recorded.samples)
     halves = half_cycles(temp)
     ways = {half.rising for half in halves}

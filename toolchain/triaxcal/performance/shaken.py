@@ -132,6 +132,8 @@ def block(vibration: Vibration, random: np.random.Generator) -> FloatArray:
         density = np.zeros(len(f))
         inside = (f > 0.0) & (f >= vibration.points[0][0]) & (f <= vibration.points[-1][0])
         density[inside] = np.exp(np.interp(np.log(f[inside]), points[:, 0], points[:, 1]))
+        if not inside.any():  # a band between two frequencies of the block: the nearest has it all
+            density[1 + int(np.argmin(np.abs(f[1:] - np.exp(points[:, 0].mean()))))] = 1.0
         variance = density / density.sum() * vibration.random_g2
         parts = random.standard_normal((2, len(f))) * np.sqrt(variance) * SAMPLES / 2.0
         result = np.fft.irfft(parts[0] - 1j * parts[1], SAMPLES)

@@ -87,7 +87,7 @@ def study(samples: Samples) -> Drift:
     Raises
     ------
     RefusedError
-        When there is no temperature, or it does not move.
+        When there is no temperature, it does not move, or there are too few samples.
     """
     if TEMP not in samples:
         raise RefusedError(

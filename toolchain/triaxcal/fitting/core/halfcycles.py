@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.samples import TEMP, Samples
 from triaxcal.readings.table import TIME
@@ -15,6 +16,7 @@ SMOOTH_S = 60.0
 """Window of the temperature's slope: units warm over minutes, thermometers jitter by tenths."""
 TURN_DEGC = 5.0
 """A half-cycle goes at least so far."""
+_SAMPLES_MIN = 64
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,20 @@ class HalfCycle:
 
 
 def smoothed(samples: Samples) -> tuple[FloatArray, FloatArray]:
-    """Temperature and its slope, each (n,), by a straight line in a centred window."""
+    """Temperature and its slope, each (n,), by a straight line in a centred window.
+
+    Raises
+    ------
+    RefusedError
+        When there are too few samples for a slope.
+    """
+    if len(samples) < _SAMPLES_MIN:
+        raise RefusedError(
+            samples.source,
+            f"{len(samples)} sample{'s' * (len(samples) != 1)}",
+            expected=f"{_SAMPLES_MIN} at least",
+            remedy="record longer",
+        )
     t, temp = samples.part(TIME), samples.part(TEMP)
     half = max(2, round(SMOOTH_S / samples.step_s / 2.0))
     n = len(t)
