@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,8 @@ from test_diagnosis import described
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import fit_folder, refuse_beyond_limits
 from triaxcal.diagnosis import Diagnosis, diagnose
+from triaxcal.diagnosis.causes.block_temperature import _read
+from triaxcal.diagnosis.core.readings import readings_of
 from triaxcal.readings.measurements import Dwell, MeasurementSet
 from triaxcal.unit.description import UnitDescription, read_unit
 
@@ -209,3 +212,11 @@ def test_a_turned_sensor_is_said_and_not_taken_for_a_coarse_one(
     refuse_beyond_limits(done)
     (note,) = done.calibration.notes
     assert f"turned by {degrees}" in note or f"turned by {degrees - 1}" in note
+
+
+def test_of_many_temperatures_the_first_and_the_last_are_named() -> None:
+    """A line of 64 temperatures, twice, hid what was wrong."""
+    readings = readings_of(*made(1, temps=tuple(np.arange(-40.0, 81.0, 5.0)), checks=False))
+    mended, old = _read(readings, np.array(readings.blocks), lambda t: -t).split(" for ")
+    assert re.fullmatch(r"(\+[\d.]+, ){6}\.\.\., -[\d.]+", mended)
+    assert old == mended.translate(str.maketrans("+-", "-+"))

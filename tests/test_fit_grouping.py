@@ -134,6 +134,7 @@ def test_a_drifting_temperature_is_refused():
     dwells = tuple(replace(d, temp_degc=t) for d, t in zip(base.dwells, temps, strict=True))
     message = refusal(replace(base, dwells=dwells))
     assert "4 degC between dwells that belong to one temperature (20 to 24 degC)" in message
+    assert "leave out temperatures that are too near to each other" in message
 
 
 @pytest.mark.parametrize(("count", "pooled"), [(3, True), (9, True), (10, False)])

@@ -248,3 +248,11 @@ def test_the_schema_is_printed() -> None:
     done = CliRunner().invoke(main, ["schema", "recording"])
     assert done.exit_code == 0
     assert json.loads(done.output) == validator("recording").schema
+
+
+def test_the_examples_of_other_tests_are_plausible(tmp_path: Path) -> None:
+    """Not the ends of the range, which nobody would have measured."""
+    text = write_starter(tmp_path / "U-7", "tilter")[0].read_text(encoding="utf-8")
+    for term in ("own_square", "odd_square", "cube"):
+        assert not re.search(rf"# {term}(_sd)? = .*(e\+|\[0, )", text)
+        assert re.search(rf"# {term}_sd = ", text)

@@ -220,3 +220,18 @@ def test_a_limit_that_is_not_met_says_by_what_factor_and_why(
     error, factor, limit = map(float, found.groups())
     # Four and three digits.
     assert factor == pytest.approx(error / limit, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["AT-CHERNIAK", "AT-SIM"])
+def test_limits_are_drawn_over_the_marks(passports: dict[str, Passport], name: str) -> None:
+    """Under the stems of 64 temperatures a limit would not be seen."""
+    page = passport_html(passports[name]).decode()
+    pictures = [svg for svg in re.findall(r"<svg.*?</svg>", page, re.DOTALL) if "bound" in svg]
+    assert pictures
+    for svg in pictures:
+        assert svg.rindex('class="after"') < svg.index('class="bound"')
+
+
+def test_what_was_held_out_is_counted_in_dwells(passports: dict[str, Passport]) -> None:
+    """As the certificate counts it: five temperatures of six positions and 36 check dwells."""
+    assert "held-out errors at 66 dwells" in read(passport_html(passports["AT-SIM"])).text

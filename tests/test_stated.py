@@ -254,3 +254,13 @@ def test_what_only_looks_like_a_table_stays_in_the_hash() -> None:
     inline = f'certificate = {{identifier = "a"}}\n{UNIT}'
     assert without_papers(inline.encode()) == inline.encode()
     assert without_papers(b"\xff[certificate]") == b"\xff[certificate]"
+
+
+def test_a_number_of_the_certificate_fits_the_code_to_scan(
+    delivered: dict[str, Delivery],
+) -> None:
+    """Four bytes a character is the most of UTF-8; one character more is refused by name."""
+    text = whole().replace("certificate, identifier <&> 0", "\U0001f600" * 200)
+    assert "\U0001f600" * 200 in shown(passport_html(of(delivered["AT-SIM"], text)))
+    with pytest.raises(RefusedError, match=r"\[certificate\] identifier.*1 to 200 characters"):
+        read(text.replace("\U0001f600", "xx", 1))

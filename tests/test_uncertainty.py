@@ -29,7 +29,7 @@ from triaxcal.uncertainty.coverage import (
 from triaxcal.uncertainty.device_sources import Device
 from triaxcal.uncertainty.evaluate import Uncertainty, uncertainty
 from triaxcal.uncertainty.heldout import held_out, thermal_error
-from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance, weights
+from triaxcal.uncertainty.orientation import DIRECTIONS, force_variance, in_words, weights
 from triaxcal.uncertainty.propagation import ROWS, propagation, rows_of
 from triaxcal.uncertainty.scatter import scatter
 from triaxcal.uncertainty.source import NORMAL, Source
@@ -423,3 +423,8 @@ def test_a_budget_adds_a_known_offset_as_it_is() -> None:
     assert found.expanded == pytest.approx(10.0 + stats.norm.ppf(0.95), abs=1e-4)
     alone = budget("q", "g", [(shift, 10.0)])
     assert alone.expanded == pytest.approx(10.0)
+
+
+def test_a_direction_has_no_negative_zero() -> None:
+    words = in_words(np.array([-0.34, -0.001, -0.94]))
+    assert words == "force along (-0.34, +0.00, -0.94)"

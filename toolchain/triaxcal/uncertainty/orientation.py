@@ -90,4 +90,5 @@ def in_words(direction: FloatArray) -> str:
     if np.allclose(whole, np.rint(whole), atol=1e-9):
         parts = [f"{'+' if v > 0 else '-'}{a}" for a, v in zip(AXES, whole, strict=True) if v]
         return f"{parts[0]} up" if len(parts) == 1 else f"{' and '.join(parts)} equally up"
-    return "force along (" + ", ".join(f"{v:+.2f}" for v in direction) + ")"
+    # Adding zero turns a rounded -0.0 into 0.0.
+    return "force along (" + ", ".join(f"{v:+.2f}" for v in np.round(direction, 2) + 0.0) + ")"

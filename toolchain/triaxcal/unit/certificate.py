@@ -11,7 +11,9 @@ from triaxcal.base.kinds import DATE, line, pattern, word
 PLACES = ("laboratory", "customer", "laboratoryBranch", "customerBranch", "other")
 """Where a calibration may be performed, in the words of the Digital Calibration Certificate."""
 _LONGEST = 200
-"""Of a text, so that it fits a page. Keys of version 0.1.0 keep theirs of any length."""
+"""Of a text, so that it fits a page, and the certificate's number its code to scan.
+
+The other keys of version 0.1.0 keep theirs of any length."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +62,7 @@ class CertificateDetails:
         Role of the second signer.
     """
 
-    identifier: str = setting(line(), example='"CAL-2026-001"')
+    identifier: str = setting(line(_LONGEST), example='"CAL-2026-001"')
     issued: datetime.date | None = setting(DATE, None, example="2026-04-02")
     laboratory: str = setting(line(), example='"Inertial laboratory"')
     laboratory_address: str | None = setting(line(_LONGEST), None, example='"1 Street"')

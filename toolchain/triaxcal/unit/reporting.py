@@ -52,12 +52,24 @@ class Nonlinearity:
     """
 
     how: str = setting(line(200), example='"centrifuge, 2026-03-30"')
-    own_square: tuple[float, float, float] | None = setting(_THREE, None, "micro-g/g^2")
-    own_square_sd: tuple[float, float, float] | None = setting(_THREE_SD, None, "micro-g/g^2")
-    odd_square: tuple[float, float, float] | None = setting(_THREE, None, "micro-g/g^2")
-    odd_square_sd: tuple[float, float, float] | None = setting(_THREE_SD, None, "micro-g/g^2")
-    cube: tuple[float, float, float] | None = setting(_THREE, None, "micro-g/g^3")
-    cube_sd: tuple[float, float, float] | None = setting(_THREE_SD, None, "micro-g/g^3")
+    own_square: tuple[float, float, float] | None = setting(
+        _THREE, None, "micro-g/g^2", example="[12, -5, 8]"
+    )
+    own_square_sd: tuple[float, float, float] | None = setting(
+        _THREE_SD, None, "micro-g/g^2", example="[2, 2, 2]"
+    )
+    odd_square: tuple[float, float, float] | None = setting(
+        _THREE, None, "micro-g/g^2", example="[3, 1, -2]"
+    )
+    odd_square_sd: tuple[float, float, float] | None = setting(
+        _THREE_SD, None, "micro-g/g^2", example="[2, 2, 2]"
+    )
+    cube: tuple[float, float, float] | None = setting(
+        _THREE, None, "micro-g/g^3", example="[3, 2, 4]"
+    )
+    cube_sd: tuple[float, float, float] | None = setting(
+        _THREE_SD, None, "micro-g/g^3", example="[0.5, 0.5, 0.5]"
+    )
 
 
 REPORT = TableKeys.of(Reporting)

@@ -19,6 +19,8 @@ from triaxcal.model.types import BoolArray, FloatArray
 _SIGN = "the sign lost"
 _FORMS: dict[str, ToDegc] = {_SIGN: lambda t: -t, **MISTAKES}
 _LEAST_DEGC = 3.0
+_LISTED = 8
+"""Temperatures that are named one by one; of more, the first and the last."""
 _ONE_MORE = -1.0
 """Log probability of each further block that a mistake strikes."""
 _MOST, _MOST_SETS, _PROPOSED = 6, 500, 3
@@ -63,8 +65,10 @@ def _hypotheses(known: Known) -> Iterator[Hypothesis]:
 def _read(readings: Readings, some: np.ndarray, mend: ToDegc) -> str:
     """Temperatures of blocks, the right ones and those of the file: "-40, -20 for 40, 20"."""
     old = np.array([readings.block_degc(b) for b in some])
-    words = [", ".join(f"{t:+.4g}" for t in temps) for temps in (mend(old), old)]
-    return " for ".join(words)
+    words = [[f"{t:+.4g}" for t in temps] for temps in (mend(old), old)]
+    if len(old) > _LISTED:
+        words = [[*w[: _LISTED - 2], "...", w[-1]] for w in words]
+    return " for ".join(", ".join(w) for w in words)
 
 
 def _several(readings: Readings, mend: ToDegc) -> list[np.ndarray]:

@@ -132,8 +132,10 @@ def _refuse_drift(source: str, cluster: list[Dwell]) -> None:
             f"{source}, rows {first.row} and {last.row}",
             f"{spread:.3g} degC between dwells that belong to one temperature "
             f"({first.temp_degc:.4g} to {last.temp_degc:.4g} degC)",
-            expected=f"at most {GROUP_GAP_DEGC:g} degC over the six positions",
-            remedy="wait for the chamber to settle, and measure that temperature again",
+            expected=f"at most {GROUP_GAP_DEGC:g} degC over the six positions, and more than that "
+            "to the next temperature",
+            remedy="wait for the chamber to settle, and measure that temperature again; or leave "
+            "out temperatures that are too near to each other",
         )
 
 

@@ -96,10 +96,10 @@ def tested(p: Passport, t: Speaker) -> list[tuple[str, list[str]]]:
         what: sum(check.dwells for check in verdict.tested if check.what == what)
         for what in (RESIDUAL, HELD_OUT)
     }
-    residual = "residual" if done.calibration.recording is None else "residual_poses"
-    yes: list[str] = [t(f"tested.{residual}", count=counts[RESIDUAL])]
+    poses = "" if done.calibration.recording is None else "_poses"
+    yes: list[str] = [t(f"tested.residual{poses}", count=counts[RESIDUAL])]
     if counts[HELD_OUT]:
-        yes.append(t("tested.held_out", count=counts[HELD_OUT]))
+        yes.append(t(f"tested.held_out{poses}", count=counts[HELD_OUT]))
     yes.append(t("tested.arithmetic", count=thousands(done.check.total)))
     no: list[str] = [t.say(words) for words in verdict.not_tested]
     device = p.device
