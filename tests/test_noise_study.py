@@ -152,3 +152,11 @@ def test_gaps_and_uneven_clocks(tmp_path: Path) -> None:
         study_file(*write(tmp_path, uneven, values))
     with pytest.raises(RefusedError, match="samples without a gap; expected 256 at least"):
         study_file(*write(tmp_path, time[:200], values[:200]))
+
+
+def test_a_unit_on_a_tilter_has_no_layout(tmp_path: Path) -> None:
+    """Its recordings of tests are read by the report."""
+    path = tmp_path / "unit.toml"
+    path.write_text('[test.night]\nkind = "rest"\n', encoding="utf-8")
+    with pytest.raises(RefusedError, match=r"no table \[recording\].*are for triaxcal report"):
+        study_file(tmp_path / "rest.csv", path)

@@ -289,6 +289,24 @@ def test_hostile_names_are_escaped(fitted: tuple[Fitted, Path], tmp_path: Path) 
     assert "&lt;script&gt;x&lt;/script&gt;" in page
 
 
+@pytest.mark.parametrize(
+    ("terms", "lacking"),
+    [
+        (("own_square", "cube"), "; not in it, because not measured: odd square; grows beyond 1 g"),
+        (("own_square", "odd_square"), "; not in it, because not measured: cube; grows beyond 1 g"),
+        (("own_square", "odd_square", "cube"), ""),
+    ],
+)
+def test_composite_error_names_the_terms_that_it_lacks(
+    fitted: tuple[Fitted, Path], terms: tuple[str, ...], lacking: str
+) -> None:
+    """And none that the same report states."""
+    tests = '[report]\ninput_range_g = 5\n[nonlinearity]\nhow = "centrifuge"\n'
+    tests += "".join(f"{term} = [3, 2, 1]\n{term}_sd = [1, 1, 1]\n" for term in terms)
+    figure = reported(fitted[0], None, tests).of("composite_compensated", "x")
+    assert figure.how.partition(" g; ")[2] == f"up to 5 g{lacking}"
+
+
 def test_a_transient_within_the_band_settles_at_once(
     fitted: tuple[Fitted, Path], tmp_path: Path
 ) -> None:

@@ -102,8 +102,11 @@ def _output(done: Known, terms: Nonlinear) -> Iterator[Figure]:
 def _compensated(done: Known, terms: Nonlinear) -> Iterator[Figure]:
     key, name = "composite_compensated", "composite error of the compensated output"
     limit = done.unit.reporting.input_range_g
-    every = (terms.own_square, terms.odd_square, terms.cube)
-    if all(t is None for t in every):
+    every = {
+        "own square": terms.own_square, "odd square": terms.odd_square, "cube": terms.cube
+    }  # fmt: skip
+    lacking = [name for name, term in every.items() if term is None]
+    if len(lacking) == len(every):
         why = "no term beyond the straight line is known"
         yield Figure(key, name, "", "micro-g", why=why)
         return
@@ -116,8 +119,8 @@ def _compensated(done: Known, terms: Nonlinear) -> Iterator[Figure]:
         own = _expanded(_bend_sources(terms, i, float(force[n])))
         expanded = math.hypot(float(component[i, i]), own)
         how = f"model, at {force[n]:+.2g} g; up to {limit:g} g"
-        if limit > 1.0 and (terms.odd_square is None or terms.cube is None):
-            how += "; odd square or cube not measured, and they grow beyond 1 g"
+        if limit > 1.0 and lacking:
+            how += f"; not in it, because not measured: {', '.join(lacking)}; grows beyond 1 g"
         figure = Figure(key, name, axis, "micro-g", how=how)
         yield with_expanded(figure, float(bent[n]) * _MICRO, expanded * _MICRO)
 

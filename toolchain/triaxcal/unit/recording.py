@@ -238,7 +238,12 @@ def read_layout(path: Path) -> RecordingLayout:
     """
     table = read_toml(path).get("recording")
     if table is None:
-        raise RefusedError(f"{path}", "no table [recording]", expected="the layout of a recording")
+        raise RefusedError(
+            f"{path}",
+            "no table [recording]",
+            expected="the layout of a recording",
+            remedy="state the columns there; the recordings of [test.NAME] are for triaxcal report",
+        )
     keys = RECORDING.but(file={"default": "recording.csv"})
     file = FileKeys(path.name, "The layout of a recording", (keys,))
     layout = recording_layout(file.check(str(path), {"recording": table})["recording"])
