@@ -20,8 +20,10 @@ from triaxcal.delivery.unit import Delivery
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Passport, passport
 from triaxcal.report.passport.page import passport_html
-from triaxcal.report.passport.qrcode import qr_text
+from triaxcal.report.passport.qrcode import qr_code, qr_text
+from triaxcal.report.passport.tables import acceptance
 from triaxcal.report.texts.html import css_text
+from triaxcal.report.texts.speaker import speaker
 from triaxcal.unit.certificate import CertificateDetails
 from triaxcal.unit.equipment import Equipment
 from triaxcal.unit.measured import Measured
@@ -223,6 +225,23 @@ def tables(page: str) -> dict[str, list[dict[str, str]]]:
         text = base64.b64decode(content, validate=True).decode()
         found[name] = list(csv.DictReader(io.StringIO(text)))
     return found
+
+
+def test_a_number_of_any_length_has_a_code(sim: Passport) -> None:
+    """The number of a certificate has no limit of length; the largest code has one."""
+    day = date(2026, 3, 30)
+    words = dict.fromkeys(("laboratory", "city", "customer", "signer", "manufacturer"), "x")
+    details = CertificateDetails(identifier="ü" * 3000, country="UA", begin=day, end=day, **words)
+    made = passport(replace(sim.delivery, unit=replace(sim.delivery.unit, certificate=details)), {})
+    assert f"certificate {'ü' * 200}\nimage sha256 " in qr_text(made)
+    assert qr_code(made, speaker("en"))["path"]
+
+
+def test_unknown_sources_are_escaped_once(sim: Passport) -> None:
+    """Names that have no translation are marked as English, and the mark is no text."""
+    known = replace(sim.acceptance[0], unknown=("the board's <b>", "the noise of a board"))
+    text = acceptance(known, sim, speaker("de"))["text"]
+    assert '<span lang="en">the board&#39;s &lt;b&gt;</span>, <span lang="en">the noise' in text
 
 
 def test_the_numbers_behind_the_pictures_can_be_had(sim: Passport) -> None:

@@ -11,7 +11,7 @@ from importlib import metadata
 
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
-from triaxcal.base.extras import EXTRAS, install_command
+from triaxcal.base.extras import EXTRAS, install_command, pip_command
 from triaxcal.base.shipped import shipped
 from triaxcal.base.tools import TOOLS, MissingToolError, Tool
 from triaxcal.codegen.compiler import library_folder, start_reference
@@ -68,9 +68,8 @@ def _version(package: str) -> str:
 
 
 def _base() -> list[InstalledPart]:
-    command = f"{sys.executable} -m pip install"
     return [
-        InstalledPart(BASE, name, _version(name), "", f"{command} {name}", needed=True)
+        InstalledPart(BASE, name, _version(name), "", pip_command(name), needed=True)
         for name in _requirements().get("", [])
     ]
 

@@ -38,13 +38,18 @@ EXTRAS = {
 
 def install_command(extra: str) -> str:
     """Command that a shell in the current folder runs to install an extra of triaxcal."""
+    return pip_command(f"triaxcal[{extra}]")
+
+
+def pip_command(requirement: str) -> str:
+    """Command that a shell in the current folder runs to install a package."""
     python = sys.executable
     if shutil.which("python") == python:
         python = "python"
     elif Path(python).is_relative_to(Path.cwd()):
         python = os.path.relpath(python)
         python = python if os.sep in python else f".{os.sep}{python}"
-    return f"{quoted(python)} -m pip install {quoted(f'triaxcal[{extra}]')}"
+    return f"{quoted(python)} -m pip install {quoted(requirement)}"
 
 
 def quoted(word: str) -> str:

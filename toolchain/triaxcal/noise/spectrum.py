@@ -49,11 +49,6 @@ class Spectrum:
     density: FloatArray
     samples: int
 
-    @property
-    def frequency_hz(self) -> FloatArray:
-        """Mean frequency of each bin."""
-        return self.mean(self.ordinate) / (self.samples * self.step_s)
-
     def mean(self, values: FloatArray) -> FloatArray:
         """Means (bins,) of values at the ordinates."""
         result: FloatArray = np.add.reduceat(values, self.start.astype(np.intp)) / self.count

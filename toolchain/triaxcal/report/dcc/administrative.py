@@ -5,7 +5,6 @@ from __future__ import annotations
 from xml.etree import ElementTree as ET
 
 from triaxcal import __version__
-from triaxcal.codegen.names import names_of
 from triaxcal.device.record import sha256_of
 from triaxcal.report.dcc.elements import contact, element, identification, text
 from triaxcal.report.passport.content import Acceptance, Passport
@@ -60,9 +59,8 @@ def _item(data: ET.Element, p: Passport, details: CertificateDetails) -> None:
         element(item, "model", details.model)
     known = element(item, "identifications")
     identification(known, "manufacturer", p.delivery.unit.serial, "serial number")
-    image = p.delivery.files[names_of(p.delivery.plan).file("triax_calib.bin")]
     name = "SHA-256 of the calibration image for the unit's flash"
-    identification(known, "calibrationLaboratory", sha256_of(image), name)
+    identification(known, "calibrationLaboratory", sha256_of(p.image), name)
 
 
 def _laboratory(data: ET.Element, details: CertificateDetails) -> None:

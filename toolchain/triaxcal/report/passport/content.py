@@ -110,10 +110,14 @@ class Passport:
         return self.delivery.unit.languages
 
     @property
+    def image(self) -> bytes:
+        """The constants as they lie in the unit's flash."""
+        return self.delivery.files[names_of(self.delivery.plan).file("triax_calib.bin")]
+
+    @property
     def verified_device(self) -> DeviceRecord | None:
         """The device that was verified with this very delivery."""
-        image = self.delivery.files[names_of(self.delivery.plan).file("triax_calib.bin")]
-        return self.device if self.device is not None and self.device.is_of(image) else None
+        return self.device if self.device is not None and self.device.is_of(self.image) else None
 
     @cached_property
     def constant_budgets(self) -> tuple[Budget, ...]:

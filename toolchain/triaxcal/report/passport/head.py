@@ -124,7 +124,10 @@ def verification(p: Passport, t: Speaker) -> Rows:
     """What was proven and compared of the C, and what a device has shown."""
     d = p.delivery
     lsb_g = 2.0**-d.plan.shape.output_q
-    sets = "; ".join(f"{thousands(count)} {t.say(name)}" for name, count in d.check.vectors.items())
+    sets = Markup("; ").join(
+        Markup("{} {}").format(thousands(count), t.say(name))
+        for name, count in d.check.vectors.items()
+    )
     return [
         (
             t("verification.proven"),
@@ -143,7 +146,7 @@ def verification(p: Passport, t: Speaker) -> Rows:
         (t("verification.both"), t("verification.both_value", size=g_in_words(d.firmware.error_g))),
         (
             t("verification.check"),
-            t("verification.check_value", count=thousands(d.check.total), sets=Markup(sets)),
+            t("verification.check_value", count=thousands(d.check.total), sets=sets),
         ),
         (t("verification.device"), _device(p, t)),
     ]

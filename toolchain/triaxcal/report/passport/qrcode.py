@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 
 import segno
 
-from triaxcal.codegen.names import names_of
+from triaxcal.device.record import sha256_of
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.texts.speaker import Speaker
 
 _QUIET = 4
 """Modules of white around it, ISO/IEC 18004."""
-
-
-def image_sha256(p: Passport) -> str:
-    """Hash of the constants as they lie in flash."""
-    file = names_of(p.delivery.plan).file("triax_calib.bin")
-    return hashlib.sha256(p.delivery.files[file]).hexdigest()
+_LONGEST = 200
+"""Characters of the certificate's number: the largest code holds no text of any length."""
 
 
 def qr_text(p: Passport) -> str:
@@ -26,8 +21,8 @@ def qr_text(p: Passport) -> str:
     unit = p.delivery.unit
     lines = [f"unit {unit.name}", f"serial {unit.serial}"]
     if unit.certificate is not None:
-        lines.append(f"certificate {unit.certificate.identifier}")
-    return "\n".join([*lines, f"image sha256 {image_sha256(p)}"])
+        lines.append(f"certificate {unit.certificate.identifier[:_LONGEST]}")
+    return "\n".join([*lines, f"image sha256 {sha256_of(p.image)}"])
 
 
 def qr_code(p: Passport, t: Speaker) -> dict[str, object]:
@@ -44,9 +39,8 @@ def qr_code(p: Passport, t: Speaker) -> dict[str, object]:
             if dark:
                 path.append(f"M{x + _QUIET} {y + _QUIET}h{length}v1h-{length}z")
             x += length
-    image = image_sha256(p)
     return {
         "size": len(code.matrix) + 2 * _QUIET,
         "path": "".join(path),
-        "alt": t("page.qr", serial=p.delivery.unit.serial, image=image),
+        "alt": t("page.qr", serial=p.delivery.unit.serial, image=sha256_of(p.image)),
     }

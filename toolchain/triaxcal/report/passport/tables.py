@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from markupsafe import Markup
+
 from triaxcal.delivery.verdict import (
     COMPONENTS,
     GUARDED,
@@ -85,7 +87,7 @@ def acceptance(a: Acceptance, p: Passport, t: Speaker) -> dict[str, Any]:
     elif a.shown:
         text = t(f"acceptance.shown{rule}")
     elif a.within:
-        text = t("acceptance.known", unknown=", ".join(t.say(name) for name in a.unknown))
+        text = t("acceptance.known", unknown=Markup(", ").join(t.say(name) for name in a.unknown))
     else:
         text = t(
             f"acceptance.not_shown{rule.removesuffix('_simple')}",
