@@ -118,7 +118,7 @@ def test_the_pages_that_messages_name_are_in_it(installed: Path, tmp_path: Path)
 
 def test_examples(tmp_path: Path) -> None:
     with pytest.raises(api.RefusedError, match="`triaxcal example AT-SIM` copies the example"):
-        api.read_unit(tmp_path / "AT-SIM")
+        api.read_unit(tmp_path / "no units" / "AT-SIM")
     assert [e.name for e in api.examples()] == ["AT-CHERNIAK", "AT-SIM", "AT-SIM-BENCH", "IMU-SIM"]
     with pytest.raises(api.UsageError, match=r'found \'at-sim\' \(did you mean "AT-SIM"\?\)'):
         api.copy_example("at-sim", tmp_path)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @status_options
 @SESSIONS
 def status(setup: Setup | ManySetup, sessions: Path | None) -> None:
-    """List the sessions of a unit, or of the units that a plan lists, and what they hold."""
+    """List the sessions of a unit or plan, and what they hold."""
     from triaxcal.rig.records.journal import read_journal  # noqa: PLC0415
     from triaxcal.rig.records.recording import JOURNAL_FILE, session_folders  # noqa: PLC0415
 
