@@ -313,10 +313,9 @@ def test_without_held_out_data_or_rival_it_is_unknown() -> None:
     measurements = fit_cases.readings(fit_cases.cubic_truth(), (20.0, 70.0), sd_v=1e-6, count=100)
     _, result = evaluated(unit, measurements)
     b = result.constant_budget(0, result.t0_index)
-    (line,) = b.unknown
-    assert line.contribution is None
-    assert line.source.sd is None
-    assert b.lines[0] is line
+    assert {line.source.key for line in b.unknown} == {"thermal_model", "exchanged_temperatures"}
+    assert all(line.contribution is None and line.source.sd is None for line in b.unknown)
+    assert b.lines[0] is b.unknown[0]
     assert "Not in it: the thermal model, which is unknown" in b.verdict
 
 

@@ -204,7 +204,7 @@ OTHER = {
 
 
 @COMPILERS
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_fault_that_changes_an_answer_is_not_proven(work, listings, name: str) -> None:
     """Twenty faults each: what is proven all the same gives the same answers."""
