@@ -55,7 +55,7 @@ simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated un
 test: $(DEVELOPER)  ## Tests (under 3 minutes)
 	@$(PYTEST) -m "not slow and not long" --ignore tests/verify
 
-test-long: $(DEVELOPER)  ## The longer ones: whole sessions, series, cores, coverage (8 minutes)
+test-long: $(DEVELOPER)  ## The longer ones: whole sessions, series, cores, coverage (14 minutes)
 	@$(PYTEST) -m "long and not slow" --ignore tests/verify
 
 test-versions: $(DEVELOPER)  ## The wheel with lowest and highest versions, and with no compiler but ziglang's
