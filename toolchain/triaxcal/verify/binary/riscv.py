@@ -9,7 +9,7 @@ import z3
 
 from triaxcal.verify.binary.listing import Instruction
 from triaxcal.verify.binary.machine import State, decided
-from triaxcal.verify.binary.values import UnprovenError, Value, Words, constant
+from triaxcal.verify.binary.values import UnprovenError, Value, Words, constant, shift_of
 
 _ADDRESS = re.compile(r"^(-?\d+)\((\w+)\)$")
 
@@ -79,12 +79,6 @@ def _address(state: State, operand: str) -> tuple[Value, int]:
     return _get(state, found[2]), int(found[1])
 
 
-def _shift(value: Value) -> int:
-    if value.number is None or not 0 <= value.number < 32:
-        raise UnprovenError("a shift that depends on the inputs")
-    return value.number
-
-
 def _high(words: Words, a: Value, b: Value) -> Value:
     return words.floor(words.multiply(words.signed(a), words.signed(b)), 32)
 
@@ -114,8 +108,8 @@ _COMPUTE: dict[str, Callable[..., Value]] = {
     "and": lambda w, a, b: w.masked(a, b),
     "andi": lambda w, a, b: w.masked(a, b),
     "or": lambda w, a, b: w.either(a, b),
-    "slli": lambda w, a, b: w.shift_left(a, _shift(b)),
-    "srli": lambda w, a, b: w.floor(w.unsigned(a), _shift(b)),
-    "srai": lambda w, a, b: w.floor(w.signed(a), _shift(b)),
+    "slli": lambda w, a, b: w.shift_left(a, shift_of(b)),
+    "srli": lambda w, a, b: w.floor(w.unsigned(a), shift_of(b)),
+    "srai": lambda w, a, b: w.floor(w.signed(a), shift_of(b)),
     "sltu": _below,
 }

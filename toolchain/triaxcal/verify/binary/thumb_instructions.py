@@ -15,7 +15,7 @@ from triaxcal.verify.binary.thumb_operands import (
     source,
     target,
 )
-from triaxcal.verify.binary.values import UnprovenError, Value, constant
+from triaxcal.verify.binary.values import UnprovenError, Value, constant, shift_of
 
 
 def _load(state: State, operands: tuple[str, ...]) -> None:
@@ -162,12 +162,6 @@ DO: dict[str, Callable[[State, tuple[str, ...]], None]] = {
 """Instructions that do more than to form one word."""
 
 
-def _shift(by: Value) -> int:
-    if by.number is None or not 0 <= by.number < 32:
-        raise UnprovenError("a shift that depends on the inputs")
-    return by.number
-
-
 COMPUTE: dict[str, Callable[..., Value]] = {
     "mov": lambda _, a: a,
     "movw": lambda _, a: a,
@@ -177,9 +171,9 @@ COMPUTE: dict[str, Callable[..., Value]] = {
     "neg": lambda s, a: s.words.subtract(constant(0), a),
     "mvn": lambda s, a: s.words.subtract(constant(-1), a),
     "mul": lambda s, a, b: s.words.multiply(a, b),
-    "asr": lambda s, a, b: s.words.floor(s.words.signed(a), _shift(b)),
-    "lsr": lambda s, a, b: s.words.floor(s.words.unsigned(a), _shift(b)),
-    "lsl": lambda s, a, b: s.words.shift_left(a, _shift(b)),
+    "asr": lambda s, a, b: s.words.floor(s.words.signed(a), shift_of(b)),
+    "lsr": lambda s, a, b: s.words.floor(s.words.unsigned(a), shift_of(b)),
+    "lsl": lambda s, a, b: s.words.shift_left(a, shift_of(b)),
     "uxth": lambda s, a: s.words.low_bits(a, 16),
     "uxtb": lambda s, a: s.words.low_bits(a, 8),
     "and": lambda s, a, b: s.words.masked(a, b),

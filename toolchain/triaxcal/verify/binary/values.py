@@ -45,6 +45,19 @@ def constant(number: int) -> Value:
     return Value(poly(number), number, number)
 
 
+def shift_of(value: Value) -> int:
+    """The number of bits by which a word is shifted.
+
+    Raises
+    ------
+    UnprovenError
+        When it depends on the inputs.
+    """
+    if value.number is None or not 0 <= value.number < 32:
+        raise UnprovenError("a shift that depends on the inputs")
+    return value.number
+
+
 class Words:
     """Arithmetic of words on one path, whose own facts are `path`."""
 
