@@ -428,21 +428,65 @@ def is_worker_of(parent: int) -> bool:
     return False
 
 
-def test_an_imu_is_left_out(tmp_path: Path) -> None:
-    work = plan_work([UNITS / "AT-SIM", UNITS / "IMU-SIM"], tmp_path)
-    assert work.skipped == [(UNITS / "IMU-SIM", "an IMU, which triaxcal dynamic calibrates")]
-    assert [order.name for order in work.orders] == ["AT-SIM"]
-
-
-def test_the_series_names_what_it_leaves_to_another_command(tmp_path: Path) -> None:
-    """An IMU is named with the reason; a stray file is none of its units."""
+def test_a_simulated_imu_without_its_recording_is_skipped_and_a_real_one_refused(
+    tmp_path: Path,
+) -> None:
+    """A stray file is no unit of the series."""
     folder = units(tmp_path / "units", 1)
-    (folder / "IMU").mkdir()
-    (folder / "IMU" / "unit.toml").write_text('serial = "IMU"\n[dynamic]\n', encoding="utf-8")
+    for name in ("SIM", "REAL"):
+        shutil.copytree(
+            UNITS / "IMU-SIM", folder / name, ignore=shutil.ignore_patterns("recording.csv")
+        )
+        text = (folder / name / "unit.toml").read_text(encoding="utf-8")
+        (folder / name / "unit.toml").write_text(text.replace("IMU-SIM-001", name), "utf-8")
+    (folder / "REAL" / "imu_truth.toml").unlink()
     (folder / "notes.txt").touch()
-    _, series, _ = run(folder, tmp_path / "build")
-    assert series.skipped == {"IMU": "an IMU, which triaxcal dynamic calibrates"}
+    work, series, _ = run(folder, tmp_path / "build")
+    assert series.skipped == {
+        "SIM": "a simulated IMU without its recording, which "
+        f"triaxcal simulate {folder / 'SIM'} makes"
+    }
+    assert len(work.skipped) == 2
     assert list(series.entries) == ["U-1"]
+    assert series.refused["REAL"].startswith(
+        f"{folder}/REAL/recording.csv: cannot be read: no such file or directory"
+    )
+    assert "\n" not in series.refused["REAL"]
+
+
+@pytest.mark.parametrize("where", ["../recording.csv", "/absolute/recording.csv"])
+def test_an_imu_s_recording_that_lies_elsewhere_is_refused(tmp_path: Path, where: str) -> None:
+    folder = tmp_path / "units"
+    shutil.copytree(UNITS / "IMU-SIM", folder / "A")
+    text = (folder / "A" / "unit.toml").read_text(encoding="utf-8")
+    (folder / "A" / "unit.toml").write_text(text.replace("recording.csv", where), "utf-8")
+    (folder / "A" / "imu_truth.toml").unlink()
+    (outcome,) = plan_work([folder / "A"], tmp_path / "build").refused
+    assert "recording.csv lies outside of the unit's folder; expected a file" in outcome.refusal
+
+
+def test_what_is_written_on_paper_does_not_stop_a_unit(tmp_path: Path) -> None:
+    """[passport] is not in the hash of the inputs, but the passport is made anew."""
+    shutil.copytree(UNITS / "AT-CHERNIAK", tmp_path / "units" / "AT-CHERNIAK")
+    unit, build = tmp_path / "units" / "AT-CHERNIAK", tmp_path / "build"
+    before = plan_work([unit], build).orders[0].key
+    with (unit / "unit.toml").open("a", encoding="utf-8") as file:
+        file.write('\n[passport]\nlanguages = ["en", "de"]\n')
+    (order,) = plan_work([unit], build).orders
+    assert order.key != before
+    outcome = make_unit(order)
+    assert outcome.refusal == ""
+    assert "passport.de.html" in outcome.files
+
+
+def test_a_unit_of_several_recordings_brings_them_all(tmp_path: Path) -> None:
+    folder = tmp_path / "units" / "HAND"
+    folder.mkdir(parents=True)
+    (folder / "unit.toml").write_text('serial = "H-1"\n[recording]\nfile = ["b.csv", "a*.csv"]\n')
+    for name in ("a1.csv", "a2.csv", "b.csv", "c.csv"):
+        (folder / name).write_text("ax,ay,az\n")
+    (order,) = plan_work([folder], tmp_path / "build").orders
+    assert order.files == ("unit.toml", "b.csv", "a1.csv", "a2.csv")
 
 
 def test_a_unit_of_a_recording_brings_its_recording(tmp_path: Path) -> None:

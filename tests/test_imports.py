@@ -46,7 +46,7 @@ MAY_IMPORT = {
     },
     "batch": {
         "base", "model", "unit", "readings", "fitting", "fixedpoint", "codegen", "delivery",
-        "device",
+        "device", "dynamic", "simulation",
     },
     "report": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",

@@ -18,7 +18,7 @@ from triaxcal.batch.order import Outcome
 
 JOURNAL_FILE = "series.jsonl"
 FORMAT = 1
-RENEWED = ("verification.json", "passport.html", "passport.json")
+RENEWED = ("verification.json", "passport.html", "passport.json", "dynamic.html")
 """Files that `triaxcal verify` may renew after the unit was made."""
 
 

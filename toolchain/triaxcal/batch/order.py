@@ -31,7 +31,7 @@ class Order:
     toolchain : str
         What the result must be made by (`batch.toolchain`).
     files : tuple of str
-        Names of its inputs: unit.toml, and measurements.csv or a recording, which may be a folder.
+        Names of its inputs: unit.toml, and measurements.csv or recordings, which may be folders.
     device : bytes
         Record of the device that was verified, for its passport; empty where there is none.
     inputs : dict

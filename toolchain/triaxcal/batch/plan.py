@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -14,9 +15,11 @@ from triaxcal.batch import journal
 from triaxcal.batch.order import Order, Outcome, planned, refused
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.device.record import record_path
+from triaxcal.dynamic.description import read_dynamic
 from triaxcal.readings.measurements import MEASUREMENTS_FILE
+from triaxcal.simulation.imu_unit import IMU_TRUTH_FILE
 from triaxcal.unit.folder import UNIT_FILE, find_unit, list_units
-from triaxcal.unit.recordingfile import is_in_folder
+from triaxcal.unit.recordingfile import files_in, is_in_folder
 
 
 @dataclass(frozen=True)
@@ -82,17 +85,53 @@ def plan_work(folders: Iterable[Path], build: Path) -> Work:
 def _not_of_a_series(path: Path) -> str:
     if path.is_file():
         return "a file, not a unit's folder"
-    description = path / UNIT_FILE
-    if description.is_file() and has_table(description, "dynamic"):
-        return "an IMU, which triaxcal dynamic calibrates"
+    simulated = is_imu(path) and (path / IMU_TRUTH_FILE).is_file()
+    if simulated and not read_dynamic(path).recording.exists():
+        return f"a simulated IMU without its recording, which triaxcal simulate {path} makes"
     return ""
+
+
+def is_imu(folder: Path) -> bool:
+    """Whether the unit.toml of a folder describes an IMU.
+
+    Raises
+    ------
+    RefusedError
+        When the file is no TOML.
+    """
+    description = folder / UNIT_FILE
+    return description.is_file() and has_table(description, "dynamic")
 
 
 def _order(folder: Path, by: str) -> Order:
     description = find_unit(folder)
+    if is_imu(folder):
+        return planned(folder, by, _imu_files(folder))
     # A recording that lies elsewhere is refused when the unit is made.
-    named = (_recorded(description), *_pair(description))
-    return planned(folder, by, (UNIT_FILE, *filter(is_in_folder, named)))
+    named = [*filter(is_in_folder, (*_recorded(description), *_pair(description)))]
+    files = files_in(folder, named)
+    return planned(folder, by, (UNIT_FILE, *(f.relative_to(folder).as_posix() for f in files)))
+
+
+def _imu_files(folder: Path) -> tuple[str, ...]:
+    """Names of the files of an IMU, in their order.
+
+    Raises
+    ------
+    RefusedError
+        As `read_dynamic`, and where one lies elsewhere: it would not travel with its unit.
+    """
+    imu = read_dynamic(folder)
+    names = tuple(Path(os.path.relpath(file, folder)).as_posix() for file in imu.inputs)
+    for name in names:
+        if not is_in_folder(name):
+            raise RefusedError(
+                f"{imu.path}, [dynamic] recording",
+                f"{name} lies outside of the unit's folder",
+                expected="a file in the folder of its unit",
+                remedy="copy it there",
+            )
+    return names
 
 
 def _device(build: Path, folder: Path) -> bytes:
@@ -113,12 +152,13 @@ def _pair(path: Path) -> tuple[str, ...]:
     return (name,) if isinstance(name, str) else ()
 
 
-def _recorded(path: Path) -> str:
-    """Name of what was measured: measurements.csv, or the file of [recording]."""
+def _recorded(path: Path) -> tuple[str, ...]:
+    """Names of what was measured: measurements.csv, or the files of [recording]."""
     if not has_table(path, "recording"):
-        return MEASUREMENTS_FILE
+        return (MEASUREMENTS_FILE,)
     recording = read_toml(path)["recording"]
-    return str(recording.get("file", "")) if isinstance(recording, dict) else ""
+    named = recording.get("file", "") if isinstance(recording, dict) else ""
+    return tuple(map(str, named)) if isinstance(named, list) else (str(named),)
 
 
 def _clashes(orders: list[Order], before: dict[str, dict[str, Any]]) -> dict[str, RefusedError]:

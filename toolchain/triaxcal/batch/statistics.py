@@ -108,11 +108,23 @@ class Run:
     told: bool
 
 
+def triads(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Records of accelerometers."""
+    return [r for r in records if "states" not in r]
+
+
+def imus(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Records of IMUs."""
+    return [r for r in records if "states" in r]
+
+
 def alike(records: Sequence[dict[str, Any]]) -> list[list[dict[str, Any]]]:
-    """Records by the unit of their readings, the most first: only these can be compared."""
-    groups: dict[str, list[dict[str, Any]]] = defaultdict(list)
-    for r in records:
-        groups[r["reading_unit"]].append(r)
+    """Records by what can be compared, the most first: the unit of readings, an IMU's states."""
+    groups: dict[tuple[str, ...], list[dict[str, Any]]] = defaultdict(list)
+    for r in triads(records):
+        groups[(r["reading_unit"],)].append(r)
+    for r in imus(records):
+        groups[("", *(f"{s['name']} {s['unit']}" for s in r["states"]))].append(r)
     return sorted(groups.values(), key=len, reverse=True)
 
 
@@ -124,10 +136,15 @@ def _scales(reading_unit: str) -> tuple[tuple[float, str], ...]:
 
 
 def quantities(records: Sequence[dict[str, Any]]) -> list[Quantity]:
-    """Constants at T0 and their two temperature coefficients, 36 in all, of readings in one unit.
+    """Quantities of records that are `alike`.
 
-    In mV, µV and nV where the readings are volts.
+    Of an IMU its states. Else constants at T0 and their two temperature coefficients, 36 in all, in
+    mV, µV and nV where the readings are volts.
     """
+    if "states" in records[0]:
+        values = np.array([[s["value"] for s in r["states"]] for r in records])
+        states = enumerate(records[0]["states"])
+        return [Quantity(s["label"], s["unit"].replace("^2", "²"), values[:, k]) for k, s in states]
     (f0, u0), (f1, u1), (f2, u2) = _scales(records[0]["reading_unit"])
     at_t0 = np.array([r["at_t0"] for r in records])
     by_temp = np.array([r["temperature_coefficients"] for r in records])
@@ -166,7 +183,7 @@ def runs(records: Sequence[dict[str, Any]]) -> list[Run]:
 
     Of units whose readings are in one unit.
     """
-    records = [r for r in records if r["placement_pattern_g"] is not None]
+    records = [r for r in triads(records) if r["placement_pattern_g"] is not None]
     groups: dict[tuple[str, str], list[int]] = defaultdict(list)
     for k, r in enumerate(records):
         if r["rig"] or r["date"]:

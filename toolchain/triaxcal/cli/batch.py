@@ -54,7 +54,8 @@ def batch(
 ) -> None:
     """Calibrate many units; unchanged ones are not repeated.
 
-    UNITS are the folders of the units, as units/*. The series gets a page of its own.
+    UNITS are the folders of the units, as units/*, accelerometers and IMUs. The series gets a page
+    of its own.
     """
     if learn_priors:
         found = triaxcal.learn_priors(

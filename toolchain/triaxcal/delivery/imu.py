@@ -121,7 +121,7 @@ def deliver_described(unit: DynamicDescription, progress: Progress | None = None
 
 
 def _inputs_sha256(unit: DynamicDescription) -> str:
-    return files_sha256((unit.path, unit.recording), "put it there, or correct [dynamic] recording")
+    return files_sha256(unit.inputs, "put it there, or correct [dynamic] recording")
 
 
 def imu_c(fitted: FittedImu) -> ImuC:

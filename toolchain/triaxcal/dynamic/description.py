@@ -74,6 +74,11 @@ class DynamicDescription:
     device: Device | None = None
     measured: Measured = field(default_factory=Measured)
 
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """Files that the result is made of: unit.toml first."""
+        return self.path, self.recording
+
     def state_blocks(self) -> tuple[StateBlock, ...]:
         """Blocks of the extensions that are switched on."""
         return tuple(b for name in self.blocks for b in EXTENSIONS[name].blocks)

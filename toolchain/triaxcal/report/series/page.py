@@ -20,10 +20,12 @@ from triaxcal.batch.statistics import (
     Quantity,
     Run,
     alike,
+    imus,
     outlier_factor,
     outliers,
     quantities,
     runs,
+    triads,
 )
 from triaxcal.delivery.verdict import PASSED
 from triaxcal.report.pictures.series import (
@@ -55,6 +57,7 @@ def series_files(series: Series, build: Path | None = None) -> dict[str, bytes]:
     """
     records = series.records
     rows = rows_of(series, build)
+    accelerometers = triads(records)
     groups = [(group, quantities(group)) for group in alike(records)]
     far = [o for group, found in groups for o in outliers(group, found)]
     by_run = [r for group, _ in groups for r in runs(group)]
@@ -74,19 +77,19 @@ def series_files(series: Series, build: Path | None = None) -> dict[str, bytes]:
         ],
         "more_refusals": max(0, len(series.refused) - MOST_ROWS),
         "yield": _percent(dict(verdicts)[PASSED], len(records) + len(series.refused)),
-        "models": Counter(r["thermal_model"] for r in records).most_common(),
-        "sources": Counter(r["worst_source"] for r in records if r["worst_source"]).most_common(),
-        "acceptance": [_acceptance(records, w) for w in _WHERES if records],
-        "t0": ", ".join(sorted({f"{r['t0_degc']:g}" for r in records})),
+        "models": Counter(r["thermal_model"] for r in accelerometers).most_common(),
+        "sources": Counter(
+            r["worst_source"] for r in accelerometers if r["worst_source"]
+        ).most_common(),
+        "kinds": _kinds(records),
+        "triads": len(accelerometers),
+        "acceptance": [_acceptance(accelerometers, w) for w in _WHERES if accelerometers],
+        "t0": ", ".join(sorted({f"{r['t0_degc']:g}" for r in accelerometers})),
         "width": WIDTH,
         "height": HEIGHT,
         "base": BASE,
         "groups": [
-            {
-                "unit": group[0]["reading_unit"],
-                "units": len(group),
-                "histograms": [histogram(q, group, far, _factor(group)) for q in found],
-            }
+            _group(group, [histogram(q, group, far, _factor(group, found)) for q in found])
             for group, found in groups
         ],
         "outliers": [
@@ -94,7 +97,7 @@ def series_files(series: Series, build: Path | None = None) -> dict[str, bytes]:
             for o in far[:MOST_ROWS]
         ],
         "more_outliers": max(0, len(far) - MOST_ROWS),
-        "factor": f"{_factor(groups[0][0]):.2f}" if groups and _factor(groups[0][0]) else "",
+        "factor": _factor_words(groups),
         "enough": bool(groups) and len(groups[0][0]) >= FEWEST_UNITS,
         "fewest": FEWEST_UNITS,
         "runs": [_run(r) for r in by_run[:60]],
@@ -102,7 +105,7 @@ def series_files(series: Series, build: Path | None = None) -> dict[str, bytes]:
         "drift": drift(by_run),
         "left": LEFT,
         "right": WIDTH - RIGHT,
-        "errors": _error_histograms(records),
+        "errors": _error_histograms(accelerometers),
         "rows": rows,
         "skipped": len(series.skipped),
         "csv": units_csv(rows),
@@ -162,9 +165,36 @@ def _spreads(outlier: Outlier) -> str:
     return scaled(outlier.spreads, max(outlier.spreads, 10.0), 3)
 
 
-def _factor(group: Sequence[dict[str, Any]]) -> float | None:
+def _factor(group: Sequence[dict[str, Any]], found: Sequence[Quantity]) -> float | None:
     """Spreads beyond which a unit is far from the others; None of too few units."""
-    return outlier_factor(len(group), 36) if len(group) >= FEWEST_UNITS else None
+    return outlier_factor(len(group), len(found)) if len(group) >= FEWEST_UNITS else None
+
+
+def _factor_words(groups: Sequence[tuple[list[dict[str, Any]], list[Quantity]]]) -> str:
+    """That of the largest group; empty where it has too few units."""
+    factor = _factor(*groups[0]) if groups else None
+    return "" if factor is None else f"{factor:.2f}"
+
+
+def _kinds(records: Sequence[dict[str, Any]]) -> str:
+    """What the series is of, in words."""
+    names = {"triaxial accelerometers": triads(records), "IMUs": imus(records)}
+    return " and ".join([name for name, found in names.items() if found] or names)
+
+
+def _group(group: Sequence[dict[str, Any]], pictures: list[dict[str, Any]]) -> dict[str, Any]:
+    """Histograms of units that can be compared: of an IMU block by block, with the units' sd."""
+    found: dict[str, Any] = {"units": len(group), "unit": group[0].get("reading_unit", "")}
+    if not imus(group):
+        return found | {"parts": [{"title": "", "histograms": pictures}], "imus": ""}
+    parts: dict[str, list[dict[str, Any]]] = {}
+    for k, (state, picture) in enumerate(zip(group[0]["states"], pictures, strict=True)):
+        sd = float(np.median([r["states"][k]["sd"] for r in group]))
+        picture["sd"] = f"{significant(sd)} {picture['unit']}"
+        parts.setdefault(state["block"], []).append(picture)
+    blocks = ", ".join(group[0]["blocks"]) or "none"
+    titled = [{"title": t[0].upper() + t[1:], "histograms": h} for t, h in parts.items()]
+    return found | {"parts": titled, "imus": f"extensions: {blocks}"}
 
 
 def _error_histograms(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

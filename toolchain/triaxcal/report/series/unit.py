@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import traceback
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +13,19 @@ import numpy as np
 from triaxcal import __version__
 from triaxcal.base.errors import RefusedError
 from triaxcal.batch.order import Order, Outcome, refused
+from triaxcal.batch.plan import is_imu
 from triaxcal.batch.toolchain import toolchain
 from triaxcal.codegen.compiler import start_reference
 from triaxcal.codegen.objects import SharedObjects
 from triaxcal.codegen.routines import Reference
+from triaxcal.delivery.inputs import files_sha256
 from triaxcal.delivery.unit import Delivery, deliver
 from triaxcal.device.record import DeviceRecord, parsed_record
 from triaxcal.model.curves import ThermalModel
 from triaxcal.model.types import FloatArray
 from triaxcal.report.files import all_files
 from triaxcal.report.passport.content import Passport, passport
+from triaxcal.report.series.imu import imu_files_and_record
 from triaxcal.unit.recordingfile import is_in_folder
 
 _GRID = 23
@@ -45,10 +48,10 @@ def make_unit(order: Order) -> Outcome:
                     raise RefusedError(str(folder / name), "lies outside of the unit's folder")
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 (folder / name).write_bytes(content)
-            delivery = deliver(folder, _reference(), _objects())
-            order.refuse_change(delivery.inputs_sha256)
-            made = passport(delivery, {}, _device(order))
-            return Outcome(order.name, order.key, "", all_files(delivery, made), unit_record(made))
+            make = imu_files_and_record if is_imu(folder) else partial(_triad, order)
+            files, record = make(folder)
+            order.refuse_change(files_sha256((folder / file for file in order.files), ""))
+            return Outcome(order.name, order.key, "", files, record)
         except RefusedError as refusal:
             return refused(order, str(refusal).replace(str(folder), order.folder))
         except Exception as fault:
@@ -60,6 +63,13 @@ def make_unit(order: Order) -> Outcome:
                 f"{Path(frame.filename).name}:{frame.lineno}: {type(fault).__name__}: {fault}; "
                 "please report it with the unit's folder",
             )
+
+
+def _triad(order: Order, folder: Path) -> tuple[dict[str, bytes], dict[str, Any]]:
+    """Files and record of an accelerometer."""
+    delivery = deliver(folder, _reference(), _objects())
+    made = passport(delivery, {}, _device(order))
+    return all_files(delivery, made), unit_record(made)
 
 
 def _device(order: Order) -> DeviceRecord | None:

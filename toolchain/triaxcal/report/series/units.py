@@ -81,17 +81,18 @@ def rows_of(series: Series, build: Path | None = None) -> list[Row]:
 
 
 def _made(record: dict[str, Any]) -> Row:
+    imu = "states" in record
     errors = _errors_g(record)
     return Row(
         unit=record["unit"],
         result=record["result"],
         why="" if record["result"] == PASSED else record["verdict"],
-        href=href(record["unit"], PASSPORT),
+        href=href(record["unit"], IMU_PAGE if imu else PASSPORT),
         serial=record["serial"],
         kind=record.get("kind") or _UNKNOWN_KIND[record["placement_pattern_g"] is not None],
         errors=tuple(Cell("") if e is None else Cell(significant(1e3 * e, 3), e) for e in errors),
         errors_g=errors,
-        model=record["thermal_model"],
+        model=f"{len(record['states'])} states" if imu else record["thermal_model"],
         rig=record["rig"] or "",
         date=record["date"] or "",
     )
@@ -103,7 +104,7 @@ def _skipped(name: str, why: str, build: Path | None) -> Row:
 
 
 def _errors_g(record: dict[str, Any]) -> tuple[float | None, ...]:
-    found = {a["where"]: a for a in record["acceptance"]}
+    found = {a["where"]: a for a in record.get("acceptance", ())}
     largest = [
         found[where]["largest_residual_g"] if where in found else None for _, where in _WHERE
     ]
