@@ -13,7 +13,7 @@ from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.reading import read_recording
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
-from triaxcal.simulation.imu_motion import three_axes
+from triaxcal.simulation.imu_motion import SWEPT, three_axes
 from triaxcal.simulation.unit import write_simulated_unit
 
 REPO = Path(__file__).parent.parent
@@ -46,13 +46,13 @@ def test_the_reader_gets_the_simulated_samples_back(unit: Path) -> None:
     assert write_simulated_unit(unit) == unit / "recording.csv"
     read = read_recording(read_dynamic(unit))
     truth = draw_truth(MEMS, 20240229, ("delay", "g-drift"))
-    made = simulate_imu(truth, three_axes(1.5, still_s=30.0), 50.0, 20240229)
+    made = simulate_imu(truth, three_axes(1.5, still_s=30.0, temperature=SWEPT), 50.0, 20240229)
     assert (read.latitude_deg, read.gravity_m_per_s2) == (50.0, 9.8107)
     assert read.rate_convention == made.rate_convention
     assert read.force_convention == made.force_convention
     back, there = read.all(), made.all()
-    # Ten digits of 60 deg/s, 9.8 m/s^2, 200 s, 20 degC.
-    for name, size in (("time_s", 1e3), ("rate", 1.1), ("force", 10.0), ("temp_degc", 30.0)):
+    # Ten digits of 60 deg/s, 9.8 m/s^2, 200 s, 85 degC.
+    for name, size in (("time_s", 1e3), ("rate", 1.1), ("force", 10.0), ("temp_degc", 100.0)):
         error = np.abs(getattr(back, name) - getattr(there, name))
         assert error.max() <= 0.5e-9 * size, name
 

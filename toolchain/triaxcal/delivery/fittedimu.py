@@ -107,6 +107,7 @@ def saved_for_c(done: DynamicUnit, device: Device) -> SavedForC:
         f"gyro code: {gyro.bits} bits for {gyro_deg_per_s:.9g} deg/s full scale",
         *turned_columns(done.unit),
         *(f"not corrected: {title}" for title in left_out(done.result.layout)),
+        *_unknown_temperature(done),
         f"verdict of the filter: {verdict(done.result)}",
         "not tested: nothing was held out, and no limit is stated for an IMU",
     )
@@ -114,6 +115,11 @@ def saved_for_c(done: DynamicUnit, device: Device) -> SavedForC:
     axes = ", ".join(columns["force"][0]), ", ".join(columns["rate"][0])
     date = done.unit.measured.date
     return SavedForC(device, header, axes, "" if date is None else date.isoformat())
+
+
+def _unknown_temperature(done: DynamicUnit) -> tuple[str, ...]:
+    known = done.recorded_degc is not None
+    return () if known else ("not shown: no temperature was recorded, the constants are of one",)
 
 
 def turned_columns(unit: DynamicDescription) -> list[str]:

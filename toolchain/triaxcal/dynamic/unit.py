@@ -11,8 +11,7 @@ from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.missing import Effect, missing_effects
 from triaxcal.dynamic.observability import Observability, observability
 from triaxcal.dynamic.reading import read_recording
-from triaxcal.dynamic.recording import ImuRecording
-from triaxcal.model.thermal.shape import ends_of
+from triaxcal.dynamic.temperatures import recorded_temperatures, refuse_beyond
 
 
 @dataclass(frozen=True)
@@ -30,6 +29,8 @@ class DynamicUnit:
         What was left out or repaired when the recording was read.
     range_degc : tuple of two floats, or None
         Working temperatures: those of [device], else of the recording; None where it has none.
+    recorded_degc : tuple of two floats, or None
+        Lowest and highest temperature that was recorded.
     """
 
     unit: DynamicDescription
@@ -38,6 +39,7 @@ class DynamicUnit:
     off: tuple[Effect, ...]
     findings: tuple[str, ...]
     range_degc: tuple[float, float] | None = None
+    recorded_degc: tuple[float, float] | None = None
 
 
 def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUnit:
@@ -57,10 +59,13 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     Raises
     ------
     RefusedError
-        As `read_recording` and `calibrate_dynamic`.
+        As `read_recording`, `recorded_temperatures` and `calibrate_dynamic`; when the working range
+        is beyond the temperatures that were recorded.
     """
     report = progress or (lambda _step, _part: None)
     recording = read_recording(unit)
+    temperatures = recorded_temperatures(recording)
+    unknown = refuse_beyond(unit, temperatures)
     result = calibrate_dynamic(
         recording,
         unit.noise,
@@ -70,11 +75,7 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     )
     off = missing_effects(recording, unit.noise, result, lambda part: report("effects off", part))
     seen = observability(result.layout, result.covariance)
-    range_degc = _recorded_degc(recording) if unit.device is None else unit.device.range_degc
-    return DynamicUnit(unit, result, seen, off, recording.findings, range_degc)
-
-
-def _recorded_degc(recording: ImuRecording) -> tuple[float, float] | None:
-    temps = (piece.temp_degc for piece in recording.pieces())
-    ends = [ends_of(t) for t in temps if t is not None and len(t)]
-    return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
+    recorded = None if temperatures is None else temperatures.ends_degc
+    range_degc = recorded if unit.device is None else unit.device.range_degc
+    findings = (*recording.findings, *unknown)
+    return DynamicUnit(unit, result, seen, off, findings, range_degc, recorded)

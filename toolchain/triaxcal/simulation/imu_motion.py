@@ -125,6 +125,9 @@ class TemperatureDrift:
 WARMING = TemperatureDrift(start_degc=20.0, end_degc=45.0, wave_degc=3.0)
 """Switched on cold, beside an air conditioner."""
 
+SWEPT = TemperatureDrift(start_degc=22.5, end_degc=22.5, wave_degc=62.5, period_s=240.0)
+"""-40 to 85 degC and back, again and again: faster than any chamber."""
+
 
 @dataclass(frozen=True)
 class ImuMotion:

@@ -17,6 +17,7 @@ from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import EFFECTS, GRADES, Grade, draw_truth
 from triaxcal.simulation.imu_motion import (
     PRECISE_TABLE,
+    SWEPT,
     WARMING,
     ImuMotion,
     Move,
@@ -89,7 +90,8 @@ class _Motion:
     table
         rough: 1 deg off level, wobbling, no angles; precise: no wobble, its angle is recorded.
     temperature
-        constant: 20 degC; warming: 20 to 45 degC, with waves.
+        constant: 20 degC; warming: 20 to 45 degC, with waves; swept: -40 to 85 degC and back in
+        four minutes, again and again.
     """
 
     rate_hz: float = setting(number(1.0, 1e4), unit="Hz", example="50")
@@ -106,7 +108,9 @@ class _Motion:
     )
     still_s: float = setting(number(1.0, 36000.0), unit="s", example="30")
     table: RoughTable = setting(meaning({"rough": RoughTable(), "precise": PRECISE_TABLE}))
-    temperature: TemperatureDrift | None = setting(meaning({"constant": None, "warming": WARMING}))
+    temperature: TemperatureDrift | None = setting(
+        meaning({"constant": None, "warming": WARMING, "swept": SWEPT})
+    )
 
 
 IMU_TRUTH = FileKeys(

@@ -1,0 +1,136 @@
+"""What temperatures a recording was made at, whether its thermometer worked, and what follows.
+
+Nothing is known of the constants outside of the temperatures that were recorded, so the working
+range stays within them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.dynamic.description import DynamicDescription
+from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.model.thermal.shape import EDGE_DEGC, PLAUSIBLE_DEGC, ends_of
+from triaxcal.model.types import FloatArray
+
+PIECE_S = 5.0
+"""Medians over so long are the temperatures of a recording: one wrong reading is none."""
+STUCK_S = 60.0
+RESOLVED = 3.0
+"""Steps of a thermometer whose noise is so many times its resolution never stay away for long."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Temperatures of a recording.
+
+    Attributes
+    ----------
+    start_s, degc : arrays, shape (k,)
+        Medians over `PIECE_S`, and when each begins.
+    """
+
+    start_s: FloatArray
+    degc: FloatArray
+
+    @property
+    def ends_degc(self) -> tuple[float, float]:
+        """Lowest and highest."""
+        return ends_of(self.degc)
+
+
+def recorded_temperatures(recording: ImuRecording) -> Recorded | None:
+    """Temperatures of a recording, or None where it has none.
+
+    Raises
+    ------
+    RefusedError
+        When the thermometer is stuck, or reads what no thermometer of an IMU reads.
+    """
+    length = max(1, round(PIECE_S * recording.rate_hz))
+    start, degc = [], []
+    steps = _Steps()
+    for chunk in recording.chunks(length):
+        if chunk.temp_degc is None:
+            return None
+        start.append(float(chunk.time_s[0]))
+        degc.append(float(np.median(chunk.temp_degc)))
+        steps.add(chunk.time_s, chunk.temp_degc)
+    steps.refuse_stuck(recording.name)
+    found = Recorded(np.array(start), np.array(degc))
+    low, high = found.ends_degc
+    if not (PLAUSIBLE_DEGC[0] <= low and high <= PLAUSIBLE_DEGC[1]):
+        raise RefusedError(
+            recording.name,
+            f"temperatures of {low:.5g} to {high:.5g} degC",
+            expected=f"{PLAUSIBLE_DEGC[0]:g} to {PLAUSIBLE_DEGC[1]:g} degC",
+            remedy="check temp_column and temperature_unit in [dynamic]",
+        )
+    return found
+
+
+class _Steps:
+    """Runs of equal readings, and how large the steps between others are."""
+
+    def __init__(self) -> None:
+        self.since_s = self.longest_s = self.longest_start_s = self.value = math.nan
+        self.sizes: list[FloatArray] = []
+
+    def add(self, time_s: FloatArray, degc: FloatArray) -> None:
+        """The next readings of the recording."""
+        if math.isnan(self.value):
+            self.since_s, self.longest_s, self.longest_start_s = time_s[0], 0.0, time_s[0]
+            self.value = degc[0]
+        step = np.diff(degc, prepend=self.value)
+        changed = np.flatnonzero(step)
+        begins = np.concatenate([[self.since_s], time_s[changed]])
+        ends = np.concatenate([time_s[changed], time_s[-1:]])
+        k = int(np.argmax(ends - begins))
+        if ends[k] - begins[k] > self.longest_s:
+            self.longest_s, self.longest_start_s = float(ends[k] - begins[k]), float(begins[k])
+        self.since_s, self.value = float(begins[-1]), float(degc[-1])
+        self.sizes.append(np.abs(step[changed]))
+
+    def refuse_stuck(self, name: str) -> None:
+        """Refuse a run of equal readings that the thermometer's own noise makes impossible."""
+        sizes = np.concatenate(self.sizes)
+        if len(sizes) == 0 or self.longest_s < STUCK_S:
+            return
+        if float(np.median(sizes)) >= RESOLVED * float(sizes.min()):
+            raise RefusedError(
+                f"{name}, {self.longest_start_s:.1f} s",
+                f"the temperature reads the same for {self.longest_s:.0f} s, and elsewhere changes "
+                f"by {np.median(sizes):.2g} degC from reading to reading: the thermometer is stuck",
+                expected="a thermometer that follows the unit",
+                remedy="record again, or cut the recording there",
+            )
+
+
+def refuse_beyond(unit: DynamicDescription, recorded: Recorded | None) -> tuple[str, ...]:
+    """Refuse a working range beyond what was recorded; returns what to say where nothing was.
+
+    Raises
+    ------
+    RefusedError
+    """
+    if unit.device is None:
+        return ()
+    low, high = unit.device.range_degc
+    if recorded is None:
+        text = f"that the constants hold over the {low:g} to {high:g} degC of [device] is not shown"
+        return (f"no temperature was recorded: {text}",)
+    first, last = recorded.ends_degc
+    if first - EDGE_DEGC <= low and high <= last + EDGE_DEGC:
+        return ()
+    inner = math.ceil(10 * (first - EDGE_DEGC)) / 10, math.floor(10 * (last + EDGE_DEGC)) / 10
+    raise RefusedError(
+        f"{unit.path}, [device] range_degc",
+        f"{low:g} to {high:g} degC, and the temperatures recorded are {first:.1f} to {last:.1f} "
+        "degC",
+        expected=f"at most {EDGE_DEGC:g} degC beyond what was recorded: nothing is extrapolated",
+        remedy=f"record over the whole range, or state [{inner[0]:g}, {inner[1]:g}]",
+    )
