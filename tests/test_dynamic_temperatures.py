@@ -34,7 +34,7 @@ def test_a_working_range_beyond_the_recording_is_refused(tmp_path: Path) -> None
     table = table_of(mems_short()[1])
     table[:, TEMP] = np.linspace(19.9, 28.1, len(table))
     unit = write_unit(tmp_path / "IMU", table, WITH_COLUMN + DEVICE)
-    # Medians over 5 s: the ends are 0.1 degC inside, and 0.5 degC more are allowed.
+    # Medians over 5 s: the ends are 0.2 degC inside, and 0.5 degC more are allowed.
     assert refusal(unit) == (
         "IMU/unit.toml, [device] range_degc: -40 to 85 degC, and the temperatures recorded are "
         "20.0 to 28.1 degC; expected at most 0.5 degC beyond what was recorded: nothing is "

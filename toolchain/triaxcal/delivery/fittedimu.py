@@ -102,7 +102,7 @@ def saved_for_c(done: DynamicUnit, device: Device) -> SavedForC:
     accel, gyro = device.accel_adc, device.gyro_adc
     gyro_deg_per_s = math.degrees(gyro.full_scale_v)
     header = (
-        f"both triads from {done.unit.recording.name}, {low:g} to {high:g} degC",
+        f"both triads from {done.unit.recording_words}, {low:g} to {high:g} degC",
         f"accelerometer code: {accel.bits} bits for {accel.full_scale_v:.9g} g full scale",
         f"gyro code: {gyro.bits} bits for {gyro_deg_per_s:.9g} deg/s full scale",
         *turned_columns(done.unit),

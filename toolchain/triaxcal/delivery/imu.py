@@ -110,7 +110,7 @@ def deliver_described(unit: DynamicDescription, progress: Progress | None = None
     """
     if unit.device is not None:
         find_compiler()  # before minutes of filtering, not after
-    inputs = _inputs_sha256(unit) if unit.recording.exists() else ""
+    inputs = _inputs_sha256(unit) if all(f.exists() for f in unit.inputs) else ""
     done = calibrate_described(unit, progress)
     if _inputs_sha256(unit) != inputs:
         raise RefusedError(

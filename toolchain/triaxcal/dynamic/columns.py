@@ -9,7 +9,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import TableKeys, Values, setting
-from triaxcal.base.kinds import TEXT, listed, number, word
+from triaxcal.base.kinds import TEXT, Kind, listed, number, word
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.noise import MICRO_G
 from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT
@@ -33,21 +33,74 @@ _FORCE_UNITS = {"m/s^2": 1.0, "g": 1e6 * MICRO_G, "mg": 1e3 * MICRO_G}
 _VELOCITY_UNITS = {"m/s": 1.0, "mm/s": 1e-3}
 
 
+@dataclass(frozen=True)
+class RecordedFile:
+    """A recording: its file, and the temperature that is stated of it, where one is."""
+
+    file: str
+    temp_degc: float | None = None
+
+
+def _recorded_files(value: object) -> tuple[RecordedFile, ...]:
+    if isinstance(value, str):
+        return (RecordedFile(value),)
+    if not isinstance(value, list) or not value:
+        raise ValueError
+    found = []
+    for row in value:
+        if not isinstance(row, dict) or not {"file"} <= set(row) <= {"file", "temp_degc"}:
+            raise ValueError
+        stated = row.get("temp_degc")
+        degc = None if stated is None else number(*PLAUSIBLE_DEGC).parse(stated)
+        found.append(RecordedFile(TEXT.parse(row["file"]), degc))
+    if len({f.file for f in found}) != len(found):
+        raise ValueError
+    return tuple(found)
+
+
+_RECORDED: Kind[tuple[RecordedFile, ...]] = Kind(
+    "the name of a file; or several recordings, each a table [[dynamic.recording]] with file, "
+    "each file once, and at choice temp_degc",
+    _recorded_files,
+    {
+        "oneOf": [
+            TEXT.schema,
+            {
+                "type": "array",
+                "minItems": 1,
+                "items": {
+                    "type": "object",
+                    "properties": {
+                        "file": TEXT.schema,
+                        "temp_degc": number(*PLAUSIBLE_DEGC).schema,
+                    },
+                    "required": ["file"],
+                    "additionalProperties": False,
+                },
+            },
+        ]
+    },
+    example='"recording.csv"',
+)
+
+
 @dataclass(frozen=True, kw_only=True)
-class _RecordedFile:
+class _Recorded:
     """The file, before how it is written.
 
     Attributes
     ----------
     recording
-        File of the readings.
+        File of the readings. Several recordings of the unit are tables [[dynamic.recording]] after
+        the other keys of [dynamic], each with `file`; `temp_degc` states the temperature of one
+        that has no column of it.
     """
 
-    recording: str = setting(TEXT, example='"recording.csv"')
+    recording: tuple[RecordedFile, ...] = setting(_RECORDED, example='"recording.csv"')
 
 
 @dataclass(frozen=True, kw_only=True)
-class DynamicTable(WrittenFile, _RecordedFile):
+class DynamicTable(WrittenFile, _Recorded):
     """[dynamic]: the recording.
 
     Attributes
@@ -145,6 +198,28 @@ def quantities_of(values: Values, found: DynamicTable) -> tuple[Quantity, ...]:
     return tuple(quantities)
 
 
+def refuse_two_temperatures(values: Values, found: DynamicTable) -> None:
+    """Refuse temperatures that are both stated and recorded, or stated of some recordings only.
+
+    Raises
+    ------
+    RefusedError
+    """
+    stated = [recorded.temp_degc is not None for recorded in found.recording]
+    if found.temp_column is not None and any(stated):
+        raise RefusedError(
+            values.where("recording"),
+            "temp_degc and temp_column are both given",
+            expected="one of them: a column of temperatures, or the temperature of each recording",
+        )
+    if any(stated) and not all(stated):
+        raise RefusedError(
+            values.where("recording"),
+            f"temp_degc of {sum(stated)} of {len(stated)} recordings",
+            expected="temp_degc of each recording, or of none",
+        )
+
+
 def names_of(found: DynamicTable) -> list[Column]:
     """Columns, single or in triads."""
     triads = (*found.rate_columns, *found.force_columns, *(found.force2_columns or ()))
@@ -170,7 +245,8 @@ def blocks_of(values: Values, found: DynamicTable) -> tuple[str, ...]:
     for name in found.blocks:
         for block in EXTENSIONS[name].blocks:
             key = _COLUMN_OF.get(block.needs, "")
-            if key and key not in values:
+            stated = key == "temp_column" and found.recording[0].temp_degc is not None
+            if key and key not in values and not stated:
                 raise RefusedError(
                     values.where("blocks"),
                     f'"{name}" is switched on and no {key} is given',

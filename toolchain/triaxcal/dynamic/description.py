@@ -16,10 +16,12 @@ from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.columns import (
     DynamicTable,
+    RecordedFile,
     blocks_of,
     dynamic_table,
     names_of,
     quantities_of,
+    refuse_two_temperatures,
 )
 from triaxcal.dynamic.device import DEVICE, Device, device_of
 from triaxcal.dynamic.noise import DataSheet
@@ -41,7 +43,8 @@ class DynamicDescription:
     name, serial : str
     path : Path
         Its unit.toml, for messages.
-    recording : Path
+    recordings : tuple of RecordedFile
+        In their order.
     file : FileLayout
         How the recording is written.
     clock : ClockLayout
@@ -58,7 +61,7 @@ class DynamicDescription:
     name: str
     serial: str
     path: Path
-    recording: Path
+    recordings: tuple[RecordedFile, ...]
     latitude_deg: float
     gravity_m_per_s2: float
     file: FileLayout
@@ -75,9 +78,19 @@ class DynamicDescription:
     measured: Measured = field(default_factory=Measured)
 
     @property
+    def recording(self) -> Path:
+        """File of the first recording."""
+        return self.path.parent / self.recordings[0].file
+
+    @property
+    def recording_words(self) -> str:
+        """Name of the recording, or of all of them."""
+        return ", ".join(Path(recorded.file).name for recorded in self.recordings)
+
+    @property
     def inputs(self) -> tuple[Path, ...]:
         """Files that the result is made of: unit.toml first."""
-        return self.path, self.recording
+        return self.path, *(self.path.parent / recorded.file for recorded in self.recordings)
 
     def state_blocks(self) -> tuple[StateBlock, ...]:
         """Blocks of the extensions that are switched on."""
@@ -171,11 +184,12 @@ def read_dynamic(folder: Path) -> DynamicDescription:
     if found.rate_hz is not None and found.time_column:
         raise RefusedError(where, "both given", expected=expected)
     check_units(dynamic, found.time_column, found.time_unit)
+    refuse_two_temperatures(dynamic, found)
     return DynamicDescription(
         name=folder.absolute().name,
         serial=tables[""][SERIAL],
         path=path,
-        recording=folder / found.recording,
+        recordings=found.recording,
         latitude_deg=site.latitude_deg,
         gravity_m_per_s2=site.local_gravity_m_per_s2,
         file=found.layout("dynamic", names_of(found)),

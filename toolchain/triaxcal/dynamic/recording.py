@@ -134,6 +134,8 @@ class ImuRecording:
         Needed only where the table's angle readings are used.
     findings : tuple of str
         What was left out or repaired when it was read.
+    starts_s : tuple of float
+        When the second and every further one begins, where it is several recordings.
     """
 
     name: str
@@ -145,6 +147,7 @@ class ImuRecording:
     force_convention: str = INSTANT
     table: Turntable | None = None
     findings: tuple[str, ...] = ()
+    starts_s: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for convention in (self.rate_convention, self.force_convention):

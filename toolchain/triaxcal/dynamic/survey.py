@@ -119,7 +119,7 @@ def survey(recording: ImuRecording) -> Survey:
         section, standing = _section(recording.name, windows, inside, first, last)
         sections.append(section)
         still[inside] = standing
-    stages, use = _stages(windows, sections, still)
+    stages, use = _stages(windows, sections, still, recording.starts_s)
     _refuse_missing_axis(recording.name, windows, still, sections)
     speed = np.linalg.norm(windows.rate, axis=1)
     rate_max = float(speed.max())
@@ -173,9 +173,12 @@ def _turns_evenly(rate: FloatArray, force: FloatArray) -> bool:
 
 
 def _stages(
-    windows: Windows, sections: list[Section], still: BoolArray
+    windows: Windows, sections: list[Section], still: BoolArray, anew: tuple[float, ...] = ()
 ) -> tuple[tuple[Stage, ...], BoolArray]:
-    """Stages, and the windows that belong to one or stand still."""
+    """Stages, and the windows that belong to one or stand still.
+
+    `anew` are times of further recordings: the unit was put on the table anew.
+    """
     bias = np.array([section.rate for section in sections])[windows.section]
     rate = windows.rate - bias
     speed = np.linalg.norm(rate, axis=1)
@@ -198,7 +201,8 @@ def _stages(
         if kind >= 0 and turned >= STAGE_TURN_RAD:
             use[run] = True
             last = stages[-1] if stages else None
-            if last is not None and last.axis == kind:
+            moved = last is None or any(last.start_s < s <= windows.start_s[run[0]] for s in anew)
+            if last is not None and last.axis == kind and not moved:
                 stages[-1] = Stage(kind, last.start_s, end, last.turned_rad + turned)
             else:
                 stages.append(Stage(kind, float(end_before), end, turned))

@@ -53,13 +53,17 @@ def recorded_temperatures(recording: ImuRecording) -> Recorded | None:
     """
     length = max(1, round(PIECE_S * recording.rate_hz))
     start, degc = [], []
-    steps = _Steps()
-    for chunk in recording.chunks(length):
-        if chunk.temp_degc is None:
+    steps, ahead = _Steps(), list(recording.starts_s)
+    for piece in recording.pieces():
+        if piece.temp_degc is None:
             return None
-        start.append(float(chunk.time_s[0]))
-        degc.append(float(np.median(chunk.temp_degc)))
-        steps.add(chunk.time_s, chunk.temp_degc)
+        if ahead and piece.time_s[0] >= ahead[0]:
+            steps.refuse_stuck(recording.name)
+            steps, ahead = _Steps(), ahead[1:]
+        for k in range(0, len(piece), length):
+            start.append(float(piece.time_s[k]))
+            degc.append(float(np.median(piece.temp_degc[k : k + length])))
+        steps.add(piece.time_s, piece.temp_degc)
     steps.refuse_stuck(recording.name)
     found = Recorded(np.array(start), np.array(degc))
     low, high = found.ends_degc

@@ -10,7 +10,7 @@ from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.missing import Effect, missing_effects
 from triaxcal.dynamic.observability import Observability, observability
-from triaxcal.dynamic.reading import read_recording
+from triaxcal.dynamic.several import read_recordings
 from triaxcal.dynamic.temperatures import recorded_temperatures, refuse_beyond
 
 
@@ -48,7 +48,7 @@ def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUni
     Raises
     ------
     RefusedError
-        As `read_dynamic`, `read_recording` and `calibrate_dynamic`.
+        As `read_dynamic`, `read_recordings` and `calibrate_dynamic`.
     """
     return calibrate_described(read_dynamic(folder), progress)
 
@@ -59,11 +59,11 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     Raises
     ------
     RefusedError
-        As `read_recording`, `recorded_temperatures` and `calibrate_dynamic`; when the working range
-        is beyond the temperatures that were recorded.
+        As `read_recordings`, `recorded_temperatures` and `calibrate_dynamic`; where the working
+        range is beyond the temperatures that were recorded.
     """
     report = progress or (lambda _step, _part: None)
-    recording = read_recording(unit)
+    recording = read_recordings(unit)
     temperatures = recorded_temperatures(recording)
     unknown = refuse_beyond(unit, temperatures)
     result = calibrate_dynamic(

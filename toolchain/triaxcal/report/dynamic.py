@@ -45,7 +45,7 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
         "unit": unit.name,
         "serial": unit.serial,
         "inputs_sha256": inputs_sha256,
-        "recording": unit.recording.name,
+        "recording": unit.recording_words,
         "reference_degc": unit.reference_degc,
         "range_degc": done.range_degc and list(done.range_degc),
         "local_gravity_m_per_s2": unit.gravity_m_per_s2,
@@ -112,7 +112,7 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
     last = result.passes[-1]
     lines = [
         f"unit            {unit.name}  (serial {unit.serial})",
-        f"recording       {unit.recording.name}: {found.sections[-1].last + 1:_} samples, "
+        f"recording       {unit.recording_words}: {found.sections[-1].last + 1:_} samples, "
         f"{len(found.sections)} section{'s' * (len(found.sections) > 1)}".replace("_", " "),
         *(f"                {finding}" for finding in done.findings),
         f"                first {found.sections[0].still_s:.0f} s at rest, {axis_up(result)} up",

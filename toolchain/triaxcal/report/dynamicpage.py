@@ -126,7 +126,7 @@ def _badge(made: ImuDelivery) -> tuple[bool, str, str]:
 def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
     unit, result = made.done.unit, made.done.result
     sections = len(result.survey.sections)
-    recording = f"{unit.recording.name}: {thousands(result.survey.sections[-1].last + 1)} samples"
+    recording = f"{unit.recording_words}: {thousands(result.survey.sections[-1].last + 1)} samples"
     freedom = thousands(result.passes[-1].freedom)
     states, passes = len(result.layout) + 3, len(result.passes)
     facts = [
