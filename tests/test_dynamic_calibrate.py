@@ -93,7 +93,7 @@ def test_a_heading_known_to_tens_of_degrees_settles() -> None:
 def test_a_missing_effect_is_named() -> None:
     """The accelerometers 5 ms late: shown while switched off, found when switched on."""
     truth, recording = mems_short()
-    assert not any(e.shown for e in missing_effects(recording, sheet(truth), mems_result()))
+    assert not any(e.shown for e in missing_effects(recording, mems_result()))
     samples = recording.all()
     # A quarter of an interval of 20 ms, by the parabola through three samples.
     before, here, after = samples.force[:-2], samples.force[1:-1], samples.force[2:]
@@ -101,7 +101,7 @@ def test_a_missing_effect_is_named() -> None:
     late[1:-1] = here + 0.125 * (before - after) + 0.03125 * (before - 2 * here + after)
     shifted = changed(recording, force=late)
     off = calibrate_dynamic(shifted, sheet(truth))
-    effects = {e.name: e for e in missing_effects(shifted, sheet(truth), off)}
+    effects = {e.name: e for e in missing_effects(shifted, off)}
     assert effects["delay"].shown
     on = calibrate_dynamic(shifted, sheet(truth), EXTENSIONS["delay"].blocks)
     place = on.layout.place("delay").start

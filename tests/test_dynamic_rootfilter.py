@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from triaxcal.dynamic.rootfilter import RootFilter
+from triaxcal.dynamic.rootfilter import GROUP, GROUPS_MIN, RootFilter
 
 N, BLOCKS = 5, 9
 PRIOR, ATTITUDE = np.full(N, 2.0), np.array([1.0, 2.0, 3.0])
@@ -134,3 +134,51 @@ def test_equals_the_textbook_filter() -> None:
     # The filter has folded in all that no beta is left in: the last block's beta has three rows
     # of its own, which are met exactly.
     assert abs(found.chi_square - innovations) < 1e-9
+
+
+def test_joined_blocks_say_the_same() -> None:
+    """Groups of blocks, eliminated side by side, against all unknowns at once."""
+    made, mean = np.random.default_rng(5).standard_normal((40, 9, 7 + N)), np.arange(N) / 3
+    assert len(made) >= GROUP * GROUPS_MIN
+    x, covariance, residual = dense(made, mean)
+    found = ready(mean)
+    found.run(made, np.full(40, 6))
+    beta, p = found.estimate()
+    root = found.root_covariance()
+    np.testing.assert_allclose(np.concatenate([beta, p]), x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(root @ root.T, covariance, rtol=0, atol=1e-12)
+    assert abs(found.chi_square - residual) < 1e-9
+    assert found.freedom == 240
+
+
+def test_the_root_of_the_determinant_is_that_of_all_unknowns() -> None:
+    """Of the information matrix of every beta and p, whatever was joined."""
+    made = np.random.default_rng(6).standard_normal((40, 9, 7 + N))
+    found = ready(np.zeros(N))
+    found.run(made, np.full(40, 6))
+    found.fold()
+    left = np.concatenate([np.diag(found.R_bb), np.diag(found.R_pp)])
+    whole = found.log_root + np.log(np.abs(left)).sum()
+    width = 3 * 41 + N
+    A = np.zeros((40 * 9 + 3 + N, width))
+    A[:N, -N:], A[N : N + 3, :3] = np.diag(1 / PRIOR), np.diag(1 / ATTITUDE)
+    for k, block in enumerate(made):
+        A[N + 3 + 9 * k :][:9, 3 * k : 3 * k + 6] = block[:, :6]
+        A[N + 3 + 9 * k :][:9, -N:] = block[:, 6:-1]
+    assert abs(whole - np.linalg.slogdet(A.T @ A)[1] / 2) < 1e-9
+
+
+def test_states_that_decay_and_are_driven() -> None:
+    """x becomes a x + w: mean a x, variance a^2 P + q; what is known of the others stays."""
+    found = ready(np.zeros(N))
+    found.run(rows(7), np.full(BLOCKS, 6))
+    _, before = found.estimate()
+    root = found.root_covariance()
+    P = (root @ root.T)[3:, 3:]
+    columns, factor, sd = np.array([1, 3]), np.array([0.5, 0.9]), np.array([0.2, 0.3])
+    found.diffuse(columns, sd, factor)
+    F, q = np.eye(N), np.zeros(N)
+    F[columns, columns], q[columns] = factor, sd**2
+    root = found.root_covariance()
+    np.testing.assert_allclose((root @ root.T)[3:, 3:], F @ P @ F.T + np.diag(q), atol=1e-12)
+    np.testing.assert_allclose(found.estimate()[1], F @ before, rtol=0, atol=1e-12)

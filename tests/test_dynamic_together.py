@@ -83,7 +83,7 @@ def test_an_angle_within_a_circle_is_as_good_as_one_that_counts_on() -> None:
 def shown(recording: ImuRecording, noise: DataSheet) -> dict[str, str]:
     """Hints beside the effects that show, by name."""
     result = calibrate_dynamic(recording, noise)
-    return {e.name: e.hint for e in missing_effects(recording, noise, result) if e.shown}
+    return {e.name: e.hint for e in missing_effects(recording, result) if e.shown}
 
 
 def test_forces_of_reversed_sign_are_diagnosed_where_the_gyros_see_the_earth() -> None:

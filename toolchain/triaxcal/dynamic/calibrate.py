@@ -20,6 +20,7 @@ from triaxcal.dynamic.passdata import PassResult, Reference, Task
 from triaxcal.dynamic.preintegrate import NODES
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.survey import Survey, survey
+from triaxcal.dynamic.wander import wander_of
 from triaxcal.dynamic.window import Frame
 from triaxcal.model.types import FloatArray
 
@@ -53,8 +54,10 @@ class DynamicResult:
     heading_rad : array or None
         Of each section's level frame; None where the unit cannot see the north.
     survey : Survey
+    noise : DataSheet
+        What the filter used.
     frame : Frame
-        Of the last pass.
+        Of the last pass; its layout has the wandering biases after the constants.
     passes : tuple of PassResult
         The last one gave the result.
     """
@@ -66,6 +69,7 @@ class DynamicResult:
     stage_p: FloatArray
     heading_rad: FloatArray | None
     survey: Survey
+    noise: DataSheet
     frame: Frame
     passes: tuple[PassResult, ...]
 
@@ -85,14 +89,16 @@ def calibrate_dynamic(
     wanted = Layout((*BASE, *blocks))
     searching = Layout((*wanted.blocks, north.BLOCK))
     size = _block_size(recording, found)
+    duration_s = found.duration_s
     start = _first_reference(searching, recording, found)
     passes: list[PassResult] = []
     part_of_step, step = 1.0, np.zeros(0)
     for number in range(PASSES_MAX):
         layout = searching if start.heading_rad is None else wanted
-        frame = _frame(layout, recording, size, reference_degc)
+        wander = wander_of(layout, noise, duration_s)
+        frame = _frame(wander.layout, recording, size, reference_degc)
         report = partial(progress, number) if progress is not None else _no_report
-        task = Task(recording, found, frame, noise)
+        task = Task(recording, found, frame, noise, wander)
         done = run_pass(task, start, first=number == 0, progress=report)
         passes.append(done)
         n = len(wanted)
@@ -107,7 +113,7 @@ def calibrate_dynamic(
         if number >= 2 and moved < SETTLED_SD and same_kind:
             covariance = done.root @ done.root.T
             shown = (done.p, sd, covariance, done.stage_p, start.heading_rad)
-            return DynamicResult(layout, *shown, found, frame, tuple(passes))
+            return DynamicResult(layout, *shown, found, noise, frame, tuple(passes))
     raise RefusedError(
         recording.name,
         f"after {PASSES_MAX} passes the constants still move by {moved:.1f} standard deviations",

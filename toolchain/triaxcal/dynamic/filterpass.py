@@ -23,6 +23,7 @@ from triaxcal.dynamic.passdata import History, PassResult, Reference, Task
 from triaxcal.dynamic.preintegrate import BlockEquations, equations
 from triaxcal.dynamic.recording import ImuRecording, ImuSamples, joined
 from triaxcal.dynamic.rootfilter import RootFilter
+from triaxcal.dynamic.steps import Steps
 from triaxcal.dynamic.survey import Section
 from triaxcal.dynamic.whiten import whitened
 from triaxcal.dynamic.window import About, Window, gamma_matrix, inverse_of_one_plus
@@ -58,7 +59,8 @@ class _Pass:
     def __init__(self, task: Task, start: Reference, first: bool) -> None:
         self.recording, self.found = task.recording, task.survey
         self.frame, self.noise, self.start = task.frame, task.noise, start
-        self.p = start.p.copy()
+        self.p = np.zeros(len(self.frame.layout))
+        self.p[: len(start.p)] = start.p
         latitude = math.radians(task.recording.latitude_deg)
         self.north_rate = EARTH_RATE_RAD_PER_S * math.cos(latitude)
         self.up_rate = EARTH_RATE_RAD_PER_S * math.sin(latitude)
@@ -68,6 +70,7 @@ class _Pass:
         if len(self.stage_p):
             self.p[self.reset] = self.stage_p[0]
         self.filter = RootFilter.of_prior(self.frame.layout.prior_sd, -self.p)
+        self.steps = Steps(self.filter, task.wander, self.found.sections[0].start_s)
         self.history = History()
         self.north = np.zeros((len(self.found.sections), 2, 2))
         self.turned = np.zeros(len(self.found.sections))
@@ -88,9 +91,10 @@ class _Pass:
         self._checkpoint(self._time_s)
         if len(self.stage_p):
             self.stage_p[self.stage] = self.p[self.reset] + self.filter.estimate()[1][self.reset]
+        constants = self.steps.wander.constants
         return PassResult(
-            self.p + self.filter.estimate()[1],
-            self.filter.root_covariance()[3:, 3:],
+            (self.p + self.filter.estimate()[1])[:constants],
+            self.filter.root_covariance()[3 : 3 + constants, 3:],
             self.stage_p,
             self.north,
             self.turned,
@@ -108,6 +112,7 @@ class _Pass:
         C = level(force, 0.0 if heading is None else float(heading[number]))
         azimuth_sd = FIXED_SD_RAD if heading is None else HEADING_SD_RAD
         self.filter.restart_attitude(np.array([LEVEL_SD_RAD, LEVEL_SD_RAD, azimuth_sd]))
+        self.steps.move(section.start_s)
         if number > 0 and "north" in layout:
             place = layout.place("north")
             self._forget(np.arange(len(layout))[place], np.zeros(2))
@@ -168,7 +173,7 @@ class _Pass:
         for more, where in self._table_rows(samples, lead, made, use):
             rows = np.concatenate([rows, more], axis=1)
             freedom = freedom + more.shape[1] * where
-        self.filter.run(rows, freedom)
+        self.steps.run(rows, freedom, time_s)
         beta = self._level_again(made, use)
         self.filter.shift(beta, np.zeros_like(self.p))
         size = float(np.abs(beta).max())

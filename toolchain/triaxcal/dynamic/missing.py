@@ -19,9 +19,9 @@ from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.passdata import Reference, Task
 from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.wander import wander_of
 from triaxcal.model.types import FloatArray
 
 SIGNIFICANCE = 1e-3
@@ -60,7 +60,6 @@ class Effect:
 
 def missing_effects(
     recording: ImuRecording,
-    noise: DataSheet,
     result: DynamicResult,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Effect, ...]:
@@ -75,8 +74,9 @@ def missing_effects(
     resets = layout.reset_columns()
     stage_p = np.zeros((len(result.survey.stages), len(resets)))
     stage_p[:, np.isin(resets, result.layout.reset_columns())] = result.stage_p
-    frame = replace(result.frame, layout=layout)
-    task = Task(recording, result.survey, frame, noise)
+    wander = wander_of(layout, result.noise, result.survey.duration_s)
+    frame = replace(result.frame, layout=wander.layout)
+    task = Task(recording, result.survey, frame, result.noise, wander)
     start = Reference(p, stage_p, result.heading_rad)
     done = run_pass(task, start, first=False, progress=progress)
     covariance = done.root @ done.root.T

@@ -17,11 +17,12 @@ MICRO_G = 9.80665e-6
 
 @dataclass(frozen=True)
 class DataSheet:
-    """[noise]: white noise, as data sheets state it.
+    """[noise]: noise of both triads, as data sheets state it.
 
-    Of both triads; a mean over t seconds scatters by N / sqrt(t). Data sheets write the velocity
+    White noise: a mean over t seconds scatters by N / sqrt(t). Data sheets write the velocity
     random walk N, micro-g sqrt(s), in micro-g/sqrt(Hz). (A one-sided spectral density is sqrt(2)
-    times N.)
+    times N.) Bias instability is the lowest Allan deviation, 0.664 B with B of IEEE 952; a random
+    walk K has the Allan deviation K sqrt(t / 3).
 
     Attributes
     ----------
@@ -37,6 +38,14 @@ class DataSheet:
         One reading of the table's angle, at rest.
     axis_wobble_arcsec
         How far the table's axis leans while it turns.
+    gyro_bias_instability_deg_per_h
+        Bias instability of the gyros: the lowest Allan deviation.
+    accel_bias_instability_ug
+        Bias instability of the accelerometers, of both triads: the lowest Allan deviation.
+    gyro_random_walk_deg_per_h_per_sqrt_h
+        Rate random walk K of the gyros.
+    accel_random_walk_ug_per_sqrt_h
+        Acceleration random walk K, of both triads.
     """
 
     gyro_arw_deg_per_sqrt_h: float = setting(number(1e-6, 100.0), unit="deg/sqrt(h)", example="0.3")
@@ -49,6 +58,18 @@ class DataSheet:
     accel_lsb: float = setting(number(0.0, 1e6), 0.0, "micro-g or mm/s")
     table_sd_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec", example="60")
     axis_wobble_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec", example="30")
+    gyro_bias_instability_deg_per_h: float | None = setting(
+        number(0.0, 1e4), None, "deg/h", words="0", example="2"
+    )
+    accel_bias_instability_ug: float | None = setting(
+        number(0.0, 1e5), None, "micro-g", words="0", example="15"
+    )
+    gyro_random_walk_deg_per_h_per_sqrt_h: float | None = setting(
+        number(0.0, 1e4), None, "deg/h/sqrt(h)", words="0", example="1"
+    )
+    accel_random_walk_ug_per_sqrt_h: float | None = setting(
+        number(0.0, 1e5), None, "micro-g/sqrt(h)", words="0", example="5"
+    )
 
     @property
     def rate_density(self) -> float:

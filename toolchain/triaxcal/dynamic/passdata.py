@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.survey import Survey
+from triaxcal.dynamic.wander import Wander
 from triaxcal.dynamic.window import Frame
 from triaxcal.model.types import FloatArray
 
@@ -19,6 +20,7 @@ class Task:
     survey: Survey
     frame: Frame
     noise: DataSheet
+    wander: Wander
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class PassResult:
     ----------
     p : array, shape (n,)
         Constants, SI.
-    root : array, shape (n, n)
+    root : array, shape (n, m)
         root root^T is their covariance.
     stage_p : array, shape (stages, r)
     north : array, shape (sections, 2, 2)

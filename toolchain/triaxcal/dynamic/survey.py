@@ -101,6 +101,12 @@ class Survey:
     still: BoolArray
     rate_max: float
 
+    @property
+    def duration_s(self) -> float:
+        """From the first sample to the last."""
+        w = self.windows
+        return float(w.start_s[-1] + w.duration_s[-1] - w.start_s[0])
+
 
 def survey(recording: ImuRecording) -> Survey:
     """Read a recording once.

@@ -73,7 +73,7 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
         reference_degc=unit.reference_degc,
         progress=lambda number, part: report(f"pass {number + 1}", part),
     )
-    off = missing_effects(recording, unit.noise, result, lambda part: report("effects off", part))
+    off = missing_effects(recording, result, lambda part: report("effects off", part))
     seen = observability(result.layout, result.covariance)
     recorded = None if temperatures is None else temperatures.ends_degc
     range_degc = recorded if unit.device is None else unit.device.range_degc

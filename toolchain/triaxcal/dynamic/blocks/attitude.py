@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from triaxcal.model.types import FloatArray
+
+ComplexArray = NDArray[np.complex128]
 
 
 def skew(x: FloatArray) -> FloatArray:
@@ -26,8 +29,8 @@ def quaternion_of(rotation_vector: FloatArray) -> FloatArray:
 
 def quaternion_product(a: FloatArray, b: FloatArray) -> FloatArray:
     """a b, shape (..., 4)."""
-    aw, ax, ay, az = np.moveaxis(a, -1, 0)
-    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    aw, ax, ay, az = (a[..., k] for k in range(4))
+    bw, bx, by, bz = (b[..., k] for k in range(4))
     return np.stack(
         [
             aw * bw - ax * bx - ay * by - az * bz,
@@ -60,7 +63,10 @@ def rotation_of(rotation_vector: FloatArray) -> FloatArray:
 def running_product(steps: FloatArray) -> FloatArray:
     """q_1 ... q_k for every k, of unit quaternions of shape (n, 4).
 
-    Blocks of about sqrt(n) run side by side; then their ends are chained.
+    Blocks of about sqrt(n) run side by side; then their ends are chained. A quaternion is a pair
+    of complex numbers, q = u + v j with u = w + x i and v = y + z i, so that
+
+        (u, v) (u', v') = (u u' - v v'*, u v' + v u'*).
     """
     n = len(steps)
     side = max(1, round(n**0.5))
@@ -68,16 +74,23 @@ def running_product(steps: FloatArray) -> FloatArray:
     padded = np.zeros((blocks * side, 4))
     padded[:, 0] = 1.0
     padded[:n] = steps
-    grid = padded.reshape(blocks, side, 4)
+    pairs = padded.view(np.complex128).reshape(blocks, side, 2)
+    u, v = (np.ascontiguousarray(pairs[:, :, k].T) for k in (0, 1))
     for j in range(1, side):
-        grid[:, j] = quaternion_product(grid[:, j - 1], grid[:, j])
-    before = grid[0, -1]
+        u[j], v[j] = _pair_product(u[j - 1], v[j - 1], u[j], v[j])
+    u, v = np.ascontiguousarray(u.T), np.ascontiguousarray(v.T)
     for b in range(1, blocks):
-        grid[b] = quaternion_product(before, grid[b])
-        before = grid[b, -1]
+        u[b], v[b] = _pair_product(u[b - 1, -1], v[b - 1, -1], u[b], v[b])
+    pairs[:, :, 0], pairs[:, :, 1] = u, v
     result = padded[:n]
     result /= np.sqrt(np.einsum("ij,ij->i", result, result))[:, None]
     return result
+
+
+def _pair_product(
+    u: ComplexArray, v: ComplexArray, u2: ComplexArray, v2: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
+    return u * u2 - v * v2.conj(), u * v2 + v * u2.conj()
 
 
 def level(force: FloatArray, heading_rad: float) -> FloatArray:
