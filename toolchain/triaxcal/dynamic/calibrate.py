@@ -129,7 +129,8 @@ def _no_report(part: float) -> None:
 def _frame(layout: Layout, recording: ImuRecording, size: int, reference_degc: float) -> Frame:
     conventions = recording.rate_convention, recording.force_convention
     gravity, interval_s = recording.gravity_m_per_s2, 1 / recording.rate_hz
-    return Frame(layout, *conventions, gravity, size, interval_s, reference_degc)
+    part = 1.0 if recording.force_hz is None else recording.force_hz * interval_s
+    return Frame(layout, *conventions, gravity, size, interval_s, reference_degc, part)
 
 
 def _block_size(recording: ImuRecording, found: Survey) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -195,7 +195,7 @@ def quantities_of(values: Values, found: DynamicTable) -> tuple[Quantity, ...]:
     if found.table_angle_column is not None:
         column = (found.table_angle_column,)
         quantities.append(Quantity("table_angle_rad", "table_angle_column", column, np.radians))
-    return tuple(quantities)
+    return tuple(replace(quantity, apart=True) for quantity in quantities)
 
 
 def refuse_two_temperatures(values: Values, found: DynamicTable) -> None:

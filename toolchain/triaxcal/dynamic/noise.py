@@ -83,7 +83,7 @@ class DataSheet:
         return density * MICRO_G
 
     def mean_force_variance(
-        self, duration_s: float, samples: int, convention: str, second: bool = False
+        self, duration_s: float, samples: float, convention: str, second: bool = False
     ) -> float:
         """Variance of the mean of a block of samples, (m/s^2)^2, with the counting of `accel_lsb`.
 

@@ -59,6 +59,9 @@ class BlockEquations:
         The same for the second triad.
     C : array, shape (b + 1, 3, 3)
         L'^T at the ends of the blocks.
+    turn_variance, force_variance : arrays, shape (b,)
+        Of the turn, rad^2, and of the mean force, (m/s^2)^2, beyond their noise: where samples were
+        lost.
     """
 
     duration_s: FloatArray
@@ -70,6 +73,8 @@ class BlockEquations:
     y2: FloatArray | None
     F2: FloatArray | None
     C: FloatArray
+    turn_variance: FloatArray
+    force_variance: FloatArray
 
 
 @dataclass(frozen=True)
@@ -131,7 +136,9 @@ def equations(window: Window) -> BlockEquations:
     if "second-matrix" in frame.layout:
         y2, F2 = _force_rows(window, _second_triad(window), path, duration)
     Phi = np.eye(3) - skew(window.about.earth) * duration[:, None, None]
-    return BlockEquations(duration, Phi, G, G_lag, y, F, y2, F2, C_ends)
+    turn = window.summed(window.samples.turn_variance)
+    force = window.summed(window.samples.force_variance) / frame.block**2
+    return BlockEquations(duration, Phi, G, G_lag, y, F, y2, F2, C_ends, turn, force)
 
 
 def _trajectory(

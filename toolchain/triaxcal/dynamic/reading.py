@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.description import DynamicDescription
+from triaxcal.dynamic.parts import Log
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording, ImuSamples
+from triaxcal.dynamic.repair import repaired
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.format import PIECE
+from triaxcal.readings.held import HELD_MIN
 from triaxcal.readings.table import TIME, ReadTable, read_table
 
+UNEVEN = 0.01
+"""Of a step: stamps that are nearer to even ones cost nothing."""
 FULL_SCALE = 0.999
 """Of the stated range: scale factors have errors too."""
 
@@ -33,29 +39,65 @@ def read_recording(unit: DynamicDescription) -> ImuRecording:
             expected="the recording that unit.toml names",
             remedy=_how_to_get_it(unit),
         )
-    table = read_table(path, unit.file, unit.clock, unit.quantities)
+    table = read_table(path, unit.file, unit.clock, unit.quantities, ordered=False)
     if len(table.spool) < 3:
         raise RefusedError(str(path), "holds fewer than three samples")
-    if INCREMENT in {unit.rate_convention, unit.force_convention} and table.left_out:
-        raise RefusedError(
-            str(path),
-            "; ".join(table.findings),
-            expected="every increment, because the increments are summed",
-            remedy="record again, or cut the recording there",
-        )
-    # Of the first piece: a clock that steps aside later does not count.
-    step_s = float(np.median(np.diff(table.spool.rows(0, PIECE)[:, 0])))
-    rate_hz = unit.clock.rate_hz or 1.0 / step_s
-    return ImuRecording(
+    about = ImuRecording(
         name=str(path),
-        pieces=lambda: _pieces(unit, table, 1.0 / rate_hz),
-        rate_hz=rate_hz,
+        pieces=tuple,
+        rate_hz=unit.clock.rate_hz or 1.0,
         latitude_deg=unit.latitude_deg,
         gravity_m_per_s2=unit.gravity_m_per_s2,
         rate_convention=unit.rate_convention,
         force_convention=unit.force_convention,
         table=unit.table,
         findings=table.findings,
+    )
+    step_s = even_step(table)
+    if step_s is not None:
+        rate_hz = unit.clock.rate_hz or 1 / step_s
+        return replace(about, pieces=lambda: _pieces(unit, table, 1 / rate_hz), rate_hz=rate_hz)
+    found = repaired([_log_of(unit, table)])
+    _refuse_full_scale(unit, found.samples.time_s, found.samples.rate, 1 / found.rate_hz)
+    return replace(
+        about,
+        pieces=lambda: (found.samples[k : k + PIECE] for k in range(0, len(found.samples), PIECE)),
+        rate_hz=found.rate_hz,
+        findings=(*table.findings, *found.findings),
+        force_hz=found.force_hz,
+    )
+
+
+def even_step(table: ReadTable) -> float | None:
+    """Step of a log in which nothing is to be repaired, s; None of any other.
+
+    Such a log is never held in memory.
+    """
+    time_s = table.spool.rows(0, PIECE)[:, 0]
+    step_s = float(np.median(np.diff(time_s)))
+    last_s, repeats, rows = float(time_s[0]) - step_s, np.zeros(len(table.columns)), 0
+    triads = [part for part in table.columns.values() if part.stop - part.start == len("xyz")]
+    for _, piece in table.spool.pieces():
+        step = np.diff(piece[:, 0], prepend=last_s)
+        last_s = float(piece[-1, 0])
+        if np.abs(step - step_s).max() > UNEVEN * step_s or not np.isfinite(piece).all():
+            return None
+        rows += len(piece)
+        for k, part in enumerate(triads):
+            repeats[k] += (piece[1:, part] == piece[:-1, part]).all(axis=1).sum()
+    return None if (repeats > HELD_MIN * rows).any() else step_s
+
+
+def _log_of(unit: DynamicDescription, table: ReadTable) -> Log:
+    rows = np.concatenate([piece for _, piece in table.spool.pieces()])
+    return Log(
+        source=table.source,
+        row_word=table.row_word,
+        rows=rows[:, 1],
+        time_s=rows[:, 0],
+        columns={q.name: rows[:, table.columns[q.name]] for q in unit.quantities},
+        rate_hz=unit.clock.rate_hz,
+        increments=INCREMENT in {unit.rate_convention, unit.force_convention},
     )
 
 

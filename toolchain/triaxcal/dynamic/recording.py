@@ -42,6 +42,10 @@ class ImuSamples:
         Second accelerometer triad, as `force`.
     table_angle_rad : array, shape (n,), or None
         Reading of the turntable about its axis, continuous over whole turns.
+    turn_variance, force_variance : arrays, shape (n,), or None
+        Of samples that were lost and interpolated, beyond the noise of a sample: of the angle over
+        its interval, rad^2, and of the force, (m/s^2)^2; summed over a block they are the
+        variances of its sums. Zero elsewhere.
     """
 
     time_s: FloatArray
@@ -50,6 +54,8 @@ class ImuSamples:
     temp_degc: FloatArray | None = None
     force2: FloatArray | None = None
     table_angle_rad: FloatArray | None = None
+    turn_variance: FloatArray | None = None
+    force_variance: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time_s)
@@ -74,13 +80,21 @@ _SHAPES: dict[str, tuple[int, ...]] = {
     "temp_degc": (),
     "force2": (3,),
     "table_angle_rad": (),
+    "turn_variance": (),
+    "force_variance": (),
 }
+_DOUBTS = ("turn_variance", "force_variance")
+"""Columns that are zero where nothing was lost."""
 
 
 def joined(parts: Iterable[ImuSamples]) -> ImuSamples:
     """One piece of several that follow each other and have the same columns."""
     listed = list(parts)
     found = {name: [getattr(part, name) for part in listed] for name in _SHAPES}
+    for name in _DOUBTS:
+        if any(value is not None for value in found[name]):
+            pairs = zip(listed, found[name], strict=True)
+            found[name] = [np.zeros(len(part)) if v is None else v for part, v in pairs]
     columns: dict[str, Any] = {
         k: None if c[0] is None else np.concatenate(c) for k, c in found.items()
     }
@@ -136,6 +150,8 @@ class ImuRecording:
         What was left out or repaired when it was read.
     starts_s : tuple of float
         When the second and every further one begins, where it is several recordings.
+    force_hz : float or None
+        At which the accelerometers were sampled, where that is slower than the samples.
     """
 
     name: str
@@ -148,6 +164,7 @@ class ImuRecording:
     table: Turntable | None = None
     findings: tuple[str, ...] = ()
     starts_s: tuple[float, ...] = ()
+    force_hz: float | None = None
 
     def __post_init__(self) -> None:
         for convention in (self.rate_convention, self.force_convention):

@@ -35,6 +35,8 @@ class Frame:
         Nominal interval of the samples.
     reference_degc : float
         From which temperatures are counted.
+    force_part : float
+        Accelerometer samples a sample: below 1 where the accelerometers are slower.
     """
 
     layout: Layout
@@ -44,6 +46,7 @@ class Frame:
     block: int
     interval_s: float
     reference_degc: float
+    force_part: float = 1.0
 
     @property
     def rate_is_increment(self) -> bool:
@@ -122,6 +125,13 @@ class Window:
             return np.zeros(len(self.samples))
         delta: FloatArray = self.samples.temp_degc - self.frame.reference_degc
         return delta
+
+    def summed(self, variance: FloatArray | None) -> FloatArray:
+        """Sums (blocks,) of the variances of samples; zeros where none were lost."""
+        if variance is None:
+            return np.zeros(self.blocks)
+        sums: FloatArray = variance[self.inside].reshape(self.blocks, -1).sum(axis=1)
+        return sums
 
     def part(self, name: str) -> FloatArray:
         """Reference values of a block's constants; zeros where it is not switched on."""

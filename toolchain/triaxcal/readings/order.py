@@ -75,10 +75,10 @@ class Order:
         self._waiting = rows[count:]
         if not count:
             return rows[:0]
-        rising = _rising(rows[:, 0], self._newest)
-        keep, time_s = rising[:count], rows[:count, 0]
+        rise = rising(rows[:, 0], self._newest)
+        keep, time_s = rise[:count], rows[:count, 0]
         newest = np.maximum.accumulate(np.append(self._newest, np.where(keep, time_s, -np.inf)))
-        later = np.minimum.accumulate(np.where(rising, rows[:, 0], np.inf)[::-1])[::-1][:count]
+        later = np.minimum.accumulate(np.where(rise, rows[:, 0], np.inf)[::-1])[::-1][:count]
         step = time_s - newest[:-1]
         repeated = ~keep & (step == 0.0)
         back = ~keep & ~repeated
@@ -136,7 +136,7 @@ class Order:
         )
 
 
-def _rising(time_s: FloatArray, before: float) -> BoolArray:
+def rising(time_s: FloatArray, before: float) -> BoolArray:
     """Rows of the longest sequence whose times rise, all later than `before`.
 
     A row that is later than all before it and earlier than all after it is in every such sequence;

@@ -15,7 +15,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.tomltable import shown
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.readings.clock import Clock
 from triaxcal.readings.format import Block
 from triaxcal.readings.opened import RecordingFile
@@ -46,6 +46,9 @@ class Quantity:
         From the unit of the file, array of shape (n, columns) to the same.
     needed : bool
         Whether a row without it is left out; otherwise what is missing is 0.
+    apart : bool
+        Whether it may come at a rate of its own: what is missing is NaN, and a row is left out that
+        has none of those that are apart.
     unit : str
         Of the values in the file, by unit.toml; "" where nothing states it.
     """
@@ -56,6 +59,7 @@ class Quantity:
     convert: Callable[[FloatArray], FloatArray] = lambda values: values
     needed: bool = True
     unit: str = ""
+    apart: bool = False
 
 
 def signed(name: str, key: str, columns: Sequence[SignedColumn], scale: float = 1.0) -> Quantity:
@@ -244,7 +248,7 @@ class _Reading:
         """Rows with all needed readings of each block; an empty block at the end."""
         for block in self._file.blocks(self._numbers, self._texts):
             rows = self._rows(block)
-            whole = np.isfinite(rows).all(axis=1)
+            whole = self._whole(rows)
             self.count += len(rows)
             self.missing += int((~whole).sum())
             if not whole.all():
@@ -252,6 +256,16 @@ class _Reading:
             if whole.any():
                 yield rows[whole]
         yield np.empty((0, self.width))
+
+    def _whole(self, rows: FloatArray) -> BoolArray:
+        finite = np.isfinite(rows)
+        apart = [self.columns[q.name] for q in self._quantities if q.apart]
+        if not apart:
+            return np.asarray(finite.all(axis=1))
+        some = np.stack([finite[:, part].all(axis=1) for part in apart], axis=1)
+        for part in apart:
+            finite[:, part] = True
+        return np.asarray(finite.all(axis=1) & some.any(axis=1))
 
     def _rows(self, block: Block) -> FloatArray:
         dates, labels = block.texts[: self._dates], block.texts[self._dates :]
@@ -261,7 +275,7 @@ class _Reading:
         for quantity in self._quantities:
             part = self.columns[quantity.name]
             found = quantity.convert(rows[:, part])
-            rows[:, part] = found if quantity.needed else np.nan_to_num(found)
+            rows[:, part] = found if quantity.needed or quantity.apart else np.nan_to_num(found)
         return rows
 
     def findings(self) -> tuple[str, ...]:

@@ -1,0 +1,144 @@
+"""Logs of a simulated IMU as loggers write them: rows are lost, late, doubled, exchanged, repeated.
+
+Each function takes the rows of a whole log, columns time, rates, forces, shape (n, 7), at
+`RATE_HZ`, and gives the rows of the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from triaxcal.dynamic.parts import Log
+from triaxcal.dynamic.repair import Repaired, repaired
+
+RATE_HZ = 100.0
+Rows = np.ndarray
+RNG = np.random.default_rng
+
+
+def log_of(rows: Rows, rate_hz: float | None = None, *, increments: bool = False) -> Log:
+    return Log(
+        "log.csv",
+        "row",
+        np.arange(1.0, len(rows) + 1),
+        rows[:, 0].copy(),
+        {"rate": rows[:, 1:4].copy(), "force": rows[:, 4:7].copy()},
+        rate_hz,
+        increments,
+    )
+
+
+def mended(rows: Rows) -> Repaired:
+    return repaired([log_of(rows)])
+
+
+def fastest(rows: Rows) -> int:
+    """Row in the fastest turn."""
+    return int(np.argmax(np.linalg.norm(rows[:, 1:4], axis=1)))
+
+
+def one_lost(rows: Rows) -> Rows:
+    """In the turn whose rate changes most."""
+    change = np.linalg.norm(np.diff(rows[:, 1:4], axis=0), axis=1)
+    return np.delete(rows, int(np.argmax(change)), 0)
+
+
+def some_lost(rows: Rows) -> Rows:
+    return rows[RNG(5).random(len(rows)) > 0.01]
+
+
+def holes_of_50_ms(rows: Rows) -> Rows:
+    speed = np.linalg.norm(rows[:, 1:4], axis=1)
+    turning = np.flatnonzero(speed > 0.7 * speed.max())
+    starts = turning[:: len(turning) // 6]
+    return np.delete(rows, np.concatenate([np.arange(k, k + 5) for k in starts]), 0)
+
+
+def jitter(rows: Rows) -> Rows:
+    late = 1e-3 * RNG(6).standard_normal(len(rows))
+    return np.column_stack([rows[:, 0] + late, rows[:, 1:]])
+
+
+def late_stamps(rows: Rows) -> Rows:
+    """A busy computer: late by a millisecond, now and then by three rows."""
+    late = 1e-3 * RNG(7).exponential(size=len(rows))
+    late[50::97] += 0.03
+    return np.column_stack([rows[:, 0] + late, rows[:, 1:]])
+
+
+def jitter_and_lost(rows: Rows) -> Rows:
+    return some_lost(jitter(rows))
+
+
+def early_stamps(rows: Rows) -> Rows:
+    """Rows in order, each fiftieth stamp a row and a half early."""
+    early = np.zeros(len(rows))
+    early[49::50] = 0.015
+    return np.column_stack([rows[:, 0] - early, rows[:, 1:]])
+
+
+def coarse_stamps(rows: Rows) -> Rows:
+    return np.column_stack([np.floor(rows[:, 0] * 370 + 0.3) / 370, rows[:, 1:]])
+
+
+def doubled(rows: Rows) -> Rows:
+    return np.repeat(rows, 1 + (RNG(8).random(len(rows)) < 0.02), axis=0)
+
+
+def exchanged(rows: Rows) -> Rows:
+    order = np.arange(len(rows))
+    for k in range(50, len(rows) - 5, 331):
+        order[[k, k + 2]] = order[[k + 2, k]]
+    return rows[order]
+
+
+def held_twice(rows: Rows) -> Rows:
+    """The logger is twice as fast as the sensor."""
+    time = np.arange(2 * len(rows)) / (2 * RATE_HZ) + rows[0, 0]
+    return np.column_stack([time, np.repeat(rows[:, 1:], 2, axis=0)])
+
+
+def held_at_250_hz(rows: Rows) -> Rows:
+    """The logger asks at times of its own and gets the newest sample."""
+    time = np.arange(0.0113, rows[-1, 0], 0.004)
+    newest = np.searchsorted(rows[:, 0], time + 1e-9, side="right") - 1
+    return np.column_stack([time, rows[newest, 1:]])
+
+
+def forces_held(rows: Rows) -> Rows:
+    """The accelerometers are four times slower, and the log repeats them."""
+    forces = np.repeat(rows[::4, 4:], 4, axis=0)[: len(rows)]
+    return np.column_stack([rows[:, :4], forces])
+
+
+def forces_empty(rows: Rows) -> Rows:
+    """The accelerometers are four times slower, and their cells are empty between."""
+    spoiled = rows.copy()
+    spoiled[np.arange(len(rows)) % 4 != 1, 4:] = np.nan
+    return spoiled
+
+
+def forces_between(rows: Rows) -> Rows:
+    """Each sensor writes rows of its own."""
+    gyros, forces = rows.copy(), rows[::3].copy()
+    gyros[:, 4:], forces[:, 1:4] = np.nan, np.nan
+    both = np.vstack([gyros, forces])
+    return both[np.argsort(both[:, 0], kind="stable")]
+
+
+Spoil = Callable[[Rows], Rows]
+NOTHING_LOST: tuple[Spoil, ...] = (
+    jitter,
+    late_stamps,
+    early_stamps,
+    coarse_stamps,
+    doubled,
+    exchanged,
+    held_twice,
+    held_at_250_hz,
+)
+"""Kinds after which every sample is there, at its time."""
+LOST: tuple[Spoil, ...] = (one_lost, some_lost, holes_of_50_ms, jitter_and_lost)
+SLOW_FORCES: tuple[Spoil, ...] = (forces_held, forces_empty, forces_between)

@@ -1,0 +1,223 @@
+"""The even clock behind the stamps of a log: samples are taken evenly, stamps are late or rounded.
+
+A sensor samples by an oscillator; what writes the stamp is a computer, and is late by as much as it
+had other things to do. So the stamps t of the rows are numbered by the beats of an even clock, and
+
+    t = offset + step * number + drift + jitter
+
+is fitted robustly: `offset`, `step` and a slow drift of the rate. Rows that are absent leave beats
+without a row. A beat is missing where the stamps stay late by a whole step, and not where one of
+them is late.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from triaxcal.model.types import BoolArray, FloatArray, IntArray
+
+EXACT = 1e-3
+"""Of a step: stamps that are nearer to the even clock than this stay as they are."""
+PAUSE_S = 0.25
+"""After a longer pause a clock need not go on with the same beats."""
+_CLEAN = 0.25
+"""Of a step: where all steps are so near to whole ones, rounding numbers them."""
+_REACH = 8
+"""Rows on each side whose median says how late the stamps are there."""
+_SPAN = 100
+"""Rows over which a step is measured: few enough that most spans have lost none."""
+_BIN = 200
+_ORDER_MAX = 5
+_FASTEST = 0.9
+"""Quantile of the change of the readings, above which they tell when they were taken."""
+_BETTER = 0.8
+"""Of the squares that are missed: both times miss by noise where nothing moves."""
+_EXACT_S = 1e-9
+"""Stamps have no more digits."""
+_FAR = 4.0
+"""Stamps that are later by so many deviations do not count."""
+_LOOSE = 4.0
+"""Mean square of the bins' means about a curve over that of their noise, where it is enough:
+what is less than two deviations of a bin is not worth more bends."""
+
+
+@dataclass(frozen=True)
+class EvenClock:
+    """Numbered rows.
+
+    Attributes
+    ----------
+    number : array, shape (n,)
+        Beats since the first row, rising.
+    time_s : array, shape (n,)
+        Time of each row: its stamp, or that of the even clock where `smoothed`.
+    step_s : float
+    rms_s : float
+        Of the stamps about the even clock.
+    smoothed : bool
+    """
+
+    number: IntArray
+    time_s: FloatArray
+    step_s: float
+    rms_s: float
+    smoothed: bool
+
+    @property
+    def lost(self) -> int:
+        """Beats without a row."""
+        return int(self.number[-1]) + 1 - len(self.number)
+
+
+def step_of(stamps_s: FloatArray) -> float:
+    """Step of most rows in the order of the file, s."""
+    span = max(1, min(_SPAN, len(stamps_s) // 4))
+    about = float(np.median(stamps_s[span:] - stamps_s[:-span])) / span
+    steps = np.diff(stamps_s)
+    near = np.abs(steps - about) < 0.5 * about
+    # Spans hold lost rows, steps do not; of a clock coarser than the rows no step says anything.
+    return float(steps[near].mean()) if near.sum() > 0.5 * len(steps) else about
+
+
+def even_clock(stamps_s: FloatArray, step_s: float) -> EvenClock:
+    """Number rising stamps, shape (n,) with n > 1, of a clock of about `step_s`."""
+    number = numbered(stamps_s, step_s)
+    time_s, residual_s = _smoothed(stamps_s, number, step_s)
+    rms_s = float(np.sqrt(np.mean(residual_s**2)))
+    step_s = float(np.median(np.diff(time_s) / np.diff(number)))
+    if rms_s < EXACT * step_s:
+        return EvenClock(number, stamps_s, step_s, rms_s, False)
+    return EvenClock(number, time_s, step_s, rms_s, True)
+
+
+def taken_at_stamps(stamps_s: FloatArray, clock: EvenClock, values: FloatArray) -> bool:
+    """Whether the readings (n, columns) say that the stamps are right and the samples uneven.
+
+    Each reading is foretold by the cubic through the four around it, once at the stamps and once at
+    even times. Where the readings change fastest, the wrong times miss by more.
+    """
+    if not clock.smoothed:
+        return False
+    index = np.flatnonzero(clock.number[4:] - clock.number[:-4] == 4) + 2
+    if len(index) == 0:
+        return False
+    change = np.abs(values[index + 1] - values[index - 1]).max(axis=1)
+    index = index[change >= np.quantile(change, _FASTEST)]
+    around = index[:, None] + np.array([-2, -1, 1, 2])
+    missed = []
+    for time_s in (stamps_s, clock.time_s):
+        x = (time_s[around] - time_s[index][:, None]) / clock.step_s
+        weights = np.ones_like(x)
+        for j in range(4):
+            for k in range(4):
+                if k != j:
+                    weights[:, j] *= -x[:, k] / (x[:, j] - x[:, k])
+        miss = np.einsum("nj,njc->nc", weights, values[around]) - values[index]
+        missed.append(float(np.median((miss**2).sum(axis=1))))
+    return missed[0] < _BETTER * missed[1]
+
+
+def numbered(stamps_s: FloatArray, step_s: float) -> IntArray:
+    """Beats since the first row, shape (n,)."""
+    steps = np.diff(stamps_s) / step_s
+    whole = np.maximum(np.rint(steps), 1.0)
+    pause = steps * step_s > PAUSE_S
+    if np.all(np.abs(steps - whole)[~pause] < _CLEAN):
+        return np.concatenate([[0], np.cumsum(whole)]).astype(np.int64)
+    beats = np.where(pause, whole, 1.0)
+    edges = [0, *(np.flatnonzero(pause) + 1).tolist(), len(stamps_s)]
+    for first, last in pairwise(edges):
+        beats[first : last - 1] += _lost_after(stamps_s[first:last], step_s)
+    return np.concatenate([[0], np.cumsum(beats)]).astype(np.int64)
+
+
+def _lost_after(stamps_s: FloatArray, step_s: float) -> FloatArray:
+    """Beats without a row after each row but the last, where the stamps are jittered."""
+    count = len(stamps_s)
+    lost = np.zeros(max(count - 1, 0))
+    if count < 2 * _REACH:
+        return lost
+    late = stamps_s / step_s - np.arange(count)
+    middle = median_filter(late, 2 * _REACH + 1, mode="nearest")
+    before = np.concatenate([np.full(_REACH, middle[0]), middle[:-_REACH]])[: count - 1]
+    after = np.concatenate([middle[_REACH:], np.full(_REACH, middle[-1])])[1:]
+    stays = np.flatnonzero(after - before > 0.5)
+    steps = np.diff(stamps_s) / step_s - 1.0
+    for run in np.split(stays, np.flatnonzero(np.diff(stays) > 1) + 1) if len(stays) else ():
+        beats = int(np.rint(after[run[-1]] - before[run[0]]))
+        for _ in range(beats):
+            # One after the other at the longest step that is left: several may be lost close by.
+            worst = run[int(np.argmax(steps[run] - lost[run]))]
+            lost[worst] += 1.0
+    return lost
+
+
+def _smoothed(
+    stamps_s: FloatArray, number: IntArray, step_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Times of the even clock, and what the stamps are off, of each part without a long pause."""
+    time_s, residual = np.empty(len(stamps_s)), np.empty(len(stamps_s))
+    pauses = np.flatnonzero(np.diff(number) * step_s > PAUSE_S) + 1
+    for part in np.split(np.arange(len(stamps_s)), pauses):
+        beat = (number[part] - number[part[0]]).astype(np.float64)
+        since = stamps_s[part] - stamps_s[part[0]]
+        own_s = float(since[-1] / beat[-1]) if beat[-1] >= _SPAN else step_s
+        late = since - own_s * beat
+        drift = _curve(beat, late)
+        time_s[part] = stamps_s[part[0]] + own_s * beat + drift
+        residual[part] = late - drift
+    return time_s, residual
+
+
+def _curve(beat: FloatArray, late: FloatArray) -> FloatArray:
+    """Slow curve through `late`, shape (n,): a line, or as much more as the drift of a rate needs.
+
+    Through means of bins, without the stamps that are far from the others.
+    """
+    bins = max(1, min(len(beat) // _BIN, 400))
+    if len(beat) < 8 or bins < 2:
+        return np.full(len(beat), np.median(late)) if len(beat) < 8 else _line(beat, late)
+    parts = np.array_split(np.arange(len(beat)), bins)
+    means = [_clipped_mean(late[part]) for part in parts]
+    x = np.array([beat[part].mean() for part in parts])
+    y = np.array([mean for mean, _ in means])
+    sd = float(np.median([sd for _, sd in means]))
+    scale = max(float(beat[-1]), 1.0)
+    for order in range(1, min(_ORDER_MAX, bins - 2) + 1):
+        fitted = np.polynomial.Polynomial.fit(x / scale, y, order)
+        left = y - fitted(x / scale)
+        if float(left @ left) <= _LOOSE * max(sd, _EXACT_S) ** 2 * (bins - order - 1):
+            return np.asarray(fitted(beat / scale))
+    if bins <= 3:
+        return _line(beat, late)
+    first, last = (np.polynomial.Polynomial.fit(x[k], y[k], 1) for k in ([0, 1], [-2, -1]))
+    curve = np.interp(beat, x, y)
+    curve = np.where(beat < x[0], first(beat), curve)
+    return np.where(beat > x[-1], last(beat), curve)
+
+
+def _clipped_mean(values: FloatArray) -> tuple[float, float]:
+    """Mean without what is far from the median, and its standard deviation."""
+    kept = values[_near(values)]
+    return float(kept.mean()), float(kept.std() / np.sqrt(len(kept)))
+
+
+def _near(values: FloatArray) -> BoolArray:
+    """Values that are not far from the median, by the width of the middle two thirds."""
+    low, middle, high = np.quantile(values, [0.16, 0.5, 0.84])
+    near: BoolArray = np.abs(values - middle) <= _FAR * (high - low) / 2 + _EXACT_S
+    return near
+
+
+def _line(beat: FloatArray, late: FloatArray) -> FloatArray:
+    """Robust line: twice without what is far from it."""
+    keep = np.ones(len(beat), dtype=bool)
+    line = np.polynomial.Polynomial([0.0])
+    for _ in range(3):
+        line = np.polynomial.Polynomial.fit(beat[keep], late[keep], 1)
+        keep = _near(late - line(beat))
+    return np.asarray(line(beat))
