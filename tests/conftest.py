@@ -62,6 +62,7 @@ LONG = {
     "rig/test_cli_rig.py",
     "rig/test_fil_bus.py",
     "rig/test_firmware.py",
+    "rig/test_imu_log.py",
     "rig/test_live.py",
     "rig/test_logs.py",
     "rig/test_recording.py",

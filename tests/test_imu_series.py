@@ -173,3 +173,32 @@ def test_imus_of_other_states_and_accelerometers_are_not_compared() -> None:
     assert "Series · triaxial accelerometers and IMUs" in text
     assert "2 IMUs, extensions: none" in text
     assert "1 IMU, extensions: delay" in text
+
+
+# ---- units whose recording is a log of CAN frames ----
+
+
+@pytest.mark.parametrize("table", ["recording", "dynamic"])
+def test_the_descriptions_of_a_log_s_bus_go_with_its_unit(tmp_path: Path, table: str) -> None:
+    folder = tmp_path / "units" / "CAN"
+    (folder / "rig").mkdir(parents=True)
+    shutil.copytree(UNITS / "IMU-SIM", folder, dirs_exist_ok=True)
+    (folder / "imu_truth.toml").unlink()
+    change(folder / "unit.toml", **{'recording = "recording.csv"': 'recording = "frames.log"'})
+    change(folder / "unit.toml", **{"[dynamic]": '[dynamic]\nrig = "rig/rig.toml"'})
+    if table == "recording":
+        text = 'serial = "C"\n[recording]\nfile = "frames.log"\nrig = "rig/rig.toml"\n'
+        (folder / "unit.toml").write_text(text, encoding="utf-8")
+    (folder / "frames.log").touch()
+    rig = '[rig]\nfile = "imu.dbc"\nmore_files = ["../warm.dbc"]\n'
+    (folder / "rig" / "rig.toml").write_text(rig, encoding="utf-8")
+    for name in ("rig/imu.dbc", "warm.dbc"):
+        (folder / name).touch()
+    if table == "dynamic":
+        assert "outside of the unit's folder" in plan_work([folder], tmp_path).refused[0].refusal
+    change(folder / "rig" / "rig.toml", **{"../warm.dbc": "imu.dbc"})
+    (order,) = plan_work([folder], tmp_path).orders
+    assert order.files == ("unit.toml", "frames.log", "rig/rig.toml", "rig/imu.dbc")
+    with (folder / "rig" / "imu.dbc").open("a", encoding="utf-8") as file:
+        file.write("\n")
+    assert plan_work([folder], tmp_path).orders[0].key != order.key

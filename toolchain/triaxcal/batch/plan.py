@@ -108,9 +108,31 @@ def _order(folder: Path, by: str) -> Order:
     if is_imu(folder):
         return planned(folder, by, _imu_files(folder))
     # A recording that lies elsewhere is refused when the unit is made.
-    named = [*filter(is_in_folder, (*_recorded(description), *_pair(description)))]
-    files = files_in(folder, named)
+    named = (*_recorded(description), *_bus(folder, "recording"), *_pair(description))
+    files = files_in(folder, [*filter(is_in_folder, named)])
     return planned(folder, by, (UNIT_FILE, *(f.relative_to(folder).as_posix() for f in files)))
+
+
+def _bus(folder: Path, table: str) -> tuple[str, ...]:
+    """Names of the files that describe the bus of a log that [recording] or [dynamic] names."""
+    if not has_table(folder / UNIT_FILE, table):
+        return ()
+    written = read_toml(folder / UNIT_FILE)[table]
+    rigs = _texts(written, "rig")
+    inner = [
+        (Path(rig).parent / name).as_posix()
+        for rig in rigs
+        if is_in_folder(rig) and (folder / rig).is_file()
+        for name in _texts(read_toml(folder / rig).get("rig"), "file", "more_files")
+    ]
+    return tuple(dict.fromkeys([*_texts(written, "dbc"), *rigs, *inner]))
+
+
+def _texts(table: object, *keys: str) -> list[str]:
+    """Texts, or lists of texts, of a table of a file that was not checked yet."""
+    found = [table.get(key) for key in keys] if isinstance(table, dict) else []
+    every = [item for value in found for item in (value if isinstance(value, list) else [value])]
+    return [item for item in every if isinstance(item, str)]
 
 
 def _imu_files(folder: Path) -> tuple[str, ...]:
@@ -122,7 +144,8 @@ def _imu_files(folder: Path) -> tuple[str, ...]:
         As `read_dynamic`, and where one lies elsewhere: it would not travel with its unit.
     """
     imu = read_dynamic(folder)
-    names = tuple(Path(os.path.relpath(file, folder)).as_posix() for file in imu.inputs)
+    names = [Path(os.path.relpath(file, folder)).as_posix() for file in imu.inputs]
+    names += [name for name in _bus(folder, "dynamic") if name not in names]
     for name in names:
         if not is_in_folder(name):
             raise RefusedError(
@@ -131,7 +154,7 @@ def _imu_files(folder: Path) -> tuple[str, ...]:
                 expected="a file in the folder of its unit",
                 remedy="copy it there",
             )
-    return names
+    return tuple(names)
 
 
 def _device(build: Path, folder: Path) -> bytes:

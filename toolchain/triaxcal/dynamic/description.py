@@ -89,8 +89,10 @@ class DynamicDescription:
 
     @property
     def inputs(self) -> tuple[Path, ...]:
-        """Files that the result is made of: unit.toml first."""
-        return self.path, *(self.path.parent / recorded.file for recorded in self.recordings)
+        """Files that the result is made of: unit.toml, recordings, description of their bus."""
+        recordings = (recorded.file for recorded in self.recordings)
+        bus = (name for name in (self.file.dbc, self.file.rig) if name is not None)
+        return self.path, *(self.path.parent / name for name in (*recordings, *bus))
 
     def state_blocks(self) -> tuple[StateBlock, ...]:
         """Blocks of the extensions that are switched on."""

@@ -143,8 +143,10 @@ class RigDescription:
     bus_files : tuple of Path
         The first is the rig's.
     messages : mapping
-        Those that are read, by name: of the axes in the order x, y, z, then the others.
+        Those that are read, by name: of the axes in the order x, y, z, of gyros, then the others.
     axes : tuple of three Recorded
+    gyros : tuple of Recorded
+        Rates about x, y, z of an IMU, which a sample has besides; empty where there are none.
     temperature : Recorded or None
     join : str
         "counter", "age", or "" where one frame has all axes.
@@ -173,6 +175,7 @@ class RigDescription:
     age_s: float = 0.0
     sample_at: str = ""
     warnings: tuple[str, ...] = field(default=())
+    gyros: tuple[Recorded, ...] = ()
     lines: LineFormat | None = None
 
     @property
@@ -197,8 +200,13 @@ class RigDescription:
 
     @property
     def axis_messages(self) -> tuple[str, ...]:
-        """Messages of the axes, each once."""
-        return tuple(dict.fromkeys(axis.message for axis in self.axes))
+        """Messages of the axes and gyros, each once."""
+        return tuple(dict.fromkeys(axis.message for axis in self.sampled))
+
+    @property
+    def sampled(self) -> tuple[Recorded, ...]:
+        """What a sample has: axes, then gyros."""
+        return (*self.axes, *self.gyros)
 
     def moved(self, id_offset: int = 0, source_address: int | None = None) -> RigDescription:
         """Description of another unit of this make.

@@ -7,6 +7,7 @@ by the reading of one code of unit.toml, and is what the firmware's code would b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -26,6 +27,16 @@ ACCELERATIONS: Mapping[str, float] = MappingProxyType(
     }
 )  # fmt: skip
 """Units of acceleration in bus descriptions, lower case without blanks, in g."""
+RATES: Mapping[str, float] = MappingProxyType(
+    {
+        **dict.fromkeys(("deg/s", "°/s", "deg/sec", "degree/s", "degrees/s", "dps"), 1.0),
+        **dict.fromkeys(("mdeg/s", "m°/s", "mdps"), 1e-3),
+        **dict.fromkeys(("deg/h", "°/h", "dph"), 1 / 3600),
+        **dict.fromkeys(("rad/s", "rad/sec", "rads"), 180 / math.pi),
+        "mrad/s": 0.18 / math.pi,
+    }
+)
+"""Units of rate in bus descriptions, lower case without blanks, in deg/s."""
 TEMPERATURES: Mapping[str, tuple[float, float]] = MappingProxyType(
     {
         **dict.fromkeys(
@@ -67,12 +78,13 @@ def unit_of(text: str) -> str:
     names = [
         *((ACCELERATIONS, name) for name in ("m/s^2", "g", "mg")),
         *((VOLTAGES, name) for name in ("V", "mV")),
+        *((RATES, name) for name in ("deg/s", "rad/s", "deg/h")),
         *((TEMPERATURES, name) for name in ("degC", "K", "degF")),
     ]
     for table, name in names:
         if known in table and table[known] == table[folded(name)]:
             return name
-    tables = (ACCELERATIONS, VOLTAGES, TEMPERATURES, CODES)
+    tables = (ACCELERATIONS, VOLTAGES, RATES, TEMPERATURES, CODES)
     return text if any(known in table for table in tables) else ""
 
 

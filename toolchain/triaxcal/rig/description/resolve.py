@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.rig.description.buslookup import Described, Names
@@ -10,6 +10,7 @@ from triaxcal.rig.description.description import MessageUse, RigDescription, Sam
 from triaxcal.rig.description.messageuse import use_of
 from triaxcal.rig.description.recorded import (
     ACCELERATIONS,
+    RATES,
     TEMPERATURES,
     TIMES_US,
     VOLTAGES,
@@ -21,6 +22,7 @@ from triaxcal.rig.description.recorded import (
 from triaxcal.rig.description.rigkeys import MessageKeys, SignalKeys
 
 AXES = ("x", "y", "z")
+GYROS = ("gyro_x", "gyro_y", "gyro_z")
 
 
 def resolved(  # noqa: PLR0917
@@ -49,23 +51,24 @@ def resolved(  # noqa: PLR0917
         As `read_description`.
     """
     names = Names(source, files)
-    axes = _axes(names, keys)
+    axes, gyros = _axes(names, keys), _gyros(names, keys)
+    sampled = (*axes, *gyros)
     others = {
         key: names.signal(key, text)
         for key in ("temperature", "sample_time", "serial", "rate")
         if (text := getattr(keys, key)) is not None
     }
-    used = [axis.message for axis in axes] + [other.message for other in others.values()]
+    used = [axis.message for axis in sampled] + [other.message for other in others.values()]
     for message in messages:
         names.message(f"{source}, [message.{message}]", message)
     uses = {
         m: use_of(names, m, messages.get(m, MessageKeys()), channel) for m in dict.fromkeys(used)
     }
     _refuse_overlaps(names, uses)
-    _refuse_two_roles(names, dict(zip(AXES, axes, strict=True)) | others, uses)
-    _refuse_shared_bits(names, [*axes, *others.values()], uses)
+    _refuse_two_roles(names, dict(zip((*AXES, *GYROS), sampled, strict=False)) | others, uses)
+    _refuse_shared_bits(names, [*sampled, *others.values()], uses)
     _refuse_idle(names, messages, uses)
-    join, at = _joining(names, keys, axes, uses)
+    join, at = _joining(names, keys, sampled, uses)
     return RigDescription(
         name=name,
         sha256=sha256,
@@ -73,8 +76,9 @@ def resolved(  # noqa: PLR0917
         bus_sha256=files[0].sha256,
         messages=uses,
         axes=axes,
+        gyros=gyros,
         temperature=_temperature(names, keys, others.get("temperature")),
-        sample_time=_sample_time(names, keys, axes, others.get("sample_time")),
+        sample_time=_sample_time(names, keys, sampled, others.get("sample_time")),
         serial=_whole(names, "serial", others.get("serial")),
         serial_is=keys.serial_is,
         rate=_whole(names, "rate", others.get("rate")),
@@ -86,9 +90,33 @@ def resolved(  # noqa: PLR0917
 
 
 def _axes(names: Names, keys: SignalKeys) -> tuple[Recorded, Recorded, Recorded]:
+    x, y, z = _triad(names, keys, AXES, (*ACCELERATIONS, *VOLTAGES), (keys.record, keys.unit))
+    return x, y, z
+
+
+def _gyros(names: Names, keys: SignalKeys) -> tuple[Recorded, ...]:
+    """Those of an IMU; none where no key names one."""
+    absent = [key for key in GYROS if getattr(keys, key) is None]
+    if len(absent) == len(GYROS):
+        return ()
+    if absent:
+        raise RefusedError(
+            f"{names.source}, [signals] {absent[0]}", "missing", expected="all three gyros or none"
+        )
+    return _triad(names, keys, GYROS, RATES, (keys.gyro_record, keys.gyro_unit))
+
+
+def _triad(
+    names: Names,
+    keys: SignalKeys,
+    wanted: Sequence[str],
+    known: Collection[str],
+    how: tuple[str | None, str | None],
+) -> tuple[Recorded, ...]:
+    """Three signals of one kind; `how` they are recorded, and their unit."""
     found = []
     by_signal: dict[str, str] = {}
-    for axis in AXES:
+    for axis in wanted:
         where = names.signal(axis, getattr(keys, axis))
         place = f"{names.source}, [signals] {axis}"
         if where.label in by_signal:
@@ -98,17 +126,15 @@ def _axes(names: Names, keys: SignalKeys) -> tuple[Recorded, Recorded, Recorded]
                 expected="a signal for each axis",
             )
         by_signal[where.label] = axis
-        known = (*ACCELERATIONS, *VOLTAGES)
-        found.append(recorded(where, keys.record, keys.unit, place, known))
-    x, y, z = found
+        found.append(recorded(where, *how, place, known))
     if len({axis.as_value for axis in found}) > 1:
         raise RefusedError(
             f"{names.source}, [signals]",
             "some axes are floats and some are integers",
             expected="axes of one kind",
-            remedy='state record = "value"',
+            remedy='state record = "value" (of gyros, gyro_record)',
         )
-    return x, y, z
+    return tuple(found)
 
 
 def _temperature(names: Names, keys: SignalKeys, where: SignalUnit | None) -> Recorded | None:

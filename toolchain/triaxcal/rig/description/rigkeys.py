@@ -55,15 +55,25 @@ class SignalKeys:
         Acceleration along y.
     z
         Acceleration along z.
+    gyro_x
+        Rate about x, of an IMU; with gyro_y and gyro_z.
+    gyro_y
+        Rate about y.
+    gyro_z
+        Rate about z.
     temperature
         Temperature of the unit; a session needs it.
     record
         What is recorded of the axes: the raw integer ("raw"), or the physical value divided by the
         reading of one code of unit.toml ("value").
+    gyro_record
+        The same of the gyros; "value" is the physical value itself.
     temperature_record
         The same of the temperature.
     unit
         Unit of the axes' physical values.
+    gyro_unit
+        Unit of the gyros' physical values.
     temperature_unit
         Unit of the temperature's physical value.
     sample_time
@@ -88,14 +98,23 @@ class SignalKeys:
     x: str = setting(_AXIS, example='"IMU.AccX"')
     y: str = setting(_AXIS, example='"IMU.AccY"')
     z: str = setting(_AXIS, example='"IMU.AccZ"')
+    gyro_x: str | None = setting(_AXIS, None, example='"IMU.RateX"')
+    gyro_y: str | None = setting(_AXIS, None, example='"IMU.RateY"')
+    gyro_z: str | None = setting(_AXIS, None, example='"IMU.RateZ"')
     temperature: str | None = setting(_NAME, None, example='"IMU.Temp"')
     record: str | None = setting(
+        word(("raw", "value")), None, words='"raw" of integers, "value" of floats', example='"raw"'
+    )
+    gyro_record: str | None = setting(
         word(("raw", "value")), None, words='"raw" of integers, "value" of floats', example='"raw"'
     )
     temperature_record: str | None = setting(
         word(("raw", "value")), None, words='"raw" of integers, "value" of floats', example='"raw"'
     )
     unit: str | None = setting(_NAME, None, words="that of the bus description", example='"g"')
+    gyro_unit: str | None = setting(
+        _NAME, None, words="that of the bus description", example='"deg/s"'
+    )
     temperature_unit: str | None = setting(
         _NAME, None, words="that of the bus description", example='"degC"'
     )

@@ -190,9 +190,9 @@ ENTRY = Format(
     doc="With `dbc`: a column is a signal, as Message.Signal, in the unit of the bus description. "
     "The axes are signals of one message, whose clock is the time of arrival. J1939's "
     "reserved values are left out, a CRC, a counter and a status are not looked at. With `rig`: "
-    "the columns are x, y, z and temperature of a rig description, which joins several messages "
-    "and checks CRCs, counters and statuses. ASC, BLF, "
-    "CSV, MF4 (bus logging), SQLite, TRC and text of candump, also compressed by gzip.",
+    "the columns are x, y, z, gyro_x, gyro_y, gyro_z and temperature of a rig description, "
+    "which joins several messages and checks CRCs, counters and statuses. ASC, BLF, CSV, MF4 (bus "
+    "logging), SQLite, TRC and text of candump, also compressed by gzip.",
     open=_open,
     extensions=(".asc", ".blf", ".trc"),
     package="cantools",

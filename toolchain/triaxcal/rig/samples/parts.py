@@ -26,7 +26,7 @@ class PartPlan:
 def parts_of(rig: RigDescription) -> list[PartPlan]:
     """Parts of a sample: what one frame gives of it."""
     by_frame: dict[tuple[str, tuple[Condition, ...]], list[int]] = {}
-    for i, axis in enumerate(rig.axes):
+    for i, axis in enumerate(rig.sampled):
         by_frame.setdefault((axis.message, axis.conditions), []).append(i)
     return [
         PartPlan(rig.messages[name], conditions, tuple(axes))
@@ -49,13 +49,13 @@ def lacking(joined: Joined) -> BoolArray | None:
 
 
 def codes_of(parts: list[Part], plans: list[PartPlan]) -> np.ndarray:
-    """What is recorded, shape (n, 3)."""
+    """What is recorded, shape (n, 3), or (n, 6) with gyros."""
     by_axis = {
         axis: column
         for part, plan in zip(parts, plans, strict=True)
         for axis, column in zip(plan.axes, part.axes, strict=True)
     }
-    return np.stack([by_axis[axis] for axis in range(3)], axis=1)
+    return np.stack([by_axis[axis] for axis in range(len(by_axis))], axis=1)
 
 
 def status_of_parts(parts: list[Part], zero: IntArray) -> IntArray:

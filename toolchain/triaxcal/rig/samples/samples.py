@@ -49,6 +49,8 @@ class Samples:
         Time of arrival.
     codes : int64 or float64 array, shape (n, 3)
         What is recorded, axis order x, y, z: raw integers, or values in codes of unit.toml.
+    gyros : array, shape (n, 3) or (n, 0)
+        The same of the gyros; values are physical ones.
     status : int64 array, shape (n,)
         Bits in which the status differs from a good one.
     jump : bool array, shape (n,)
@@ -67,6 +69,7 @@ class Samples:
     codes: np.ndarray
     status: IntArray
     jump: BoolArray
+    gyros: np.ndarray
     temp_number: IntArray
     temp_code: np.ndarray
     serials: frozenset[int]
@@ -199,7 +202,8 @@ class SampleDecoder:
         return Samples(
             number=number,
             t_ns=joined.t_ns[new],
-            codes=codes,
+            codes=codes[:, :3],
+            gyros=codes[:, 3:],
             status=status,
             jump=jump,
             temp_number=temp_number[known],
@@ -217,7 +221,7 @@ class SampleDecoder:
         clock = self._rig.sample_time
         axes, good = [], None
         for axis in plan.axes:
-            numbers, there = self._number(use, self._rig.axes[axis], rows, axis)
+            numbers, there = self._number(use, self._rig.sampled[axis], rows, axis)
             axes.append(numbers)
             if there is not None:
                 good = there if good is None else good & there
@@ -244,7 +248,8 @@ class SampleDecoder:
             raw = signal.raw(rows.data).view(np.int64)
             return raw, available(use, signal, raw)
         there = available(use, signal, signal.number(rows.data))
-        return signal.value(rows.data) * self._coding.axes[axis], there
+        factor = self._coding.axes[axis] if axis < 3 else 1.0  # a gyro has no code of unit.toml
+        return signal.value(rows.data) * factor, there
 
     def _temperatures(self, rows: Mapping[str, Rows]) -> tuple[IntArray, np.ndarray, IntArray]:
         """Places and codes of the thermometer, and places of those that are none."""

@@ -128,6 +128,7 @@ class FrameMaker:
             _key(axis): _sent(axis, codes[:, i], self._coding.axes[i], 0.0)
             for i, axis in enumerate(rig.axes)
         }
+        found |= {_key(gyro): _sent(gyro, _still(gyro, zero), 1.0, 0.0) for gyro in rig.gyros}
         if rig.temperature is not None:
             found[_key(rig.temperature)] = _sent(rig.temperature, temps, *self._coding.temperature)
         if rig.sample_time is not None:
@@ -205,10 +206,15 @@ def _sent(what: Recorded, codes: IntArray, factor: float, shift: float) -> IntAr
     return numbers.astype(kind).view(whole).astype(np.int64)
 
 
+def _still(gyro: Recorded, zero: IntArray) -> IntArray:
+    """What is recorded of a gyro that does not turn."""
+    return zero if gyro.as_value else zero + round(-gyro.zero / gyro.step)
+
+
 def _kinds(rig: RigDescription) -> list[_Kind]:
     """Kinds of frames that carry a signal of [signals]."""
     often: dict[tuple[str, tuple[Condition, ...]], int] = {}
-    for axis in rig.axes:
+    for axis in rig.sampled:
         often.setdefault((axis.message, axis.conditions), _AXES)
     for what, how in (
         (rig.temperature, _TEMPERATURE),
