@@ -77,6 +77,8 @@ KINDS = {
     "automotive-imu": Kind(
         OFFSET_BINARY + "8", "degc_per_code = 1\ndegc_at_zero = -50", 1.0, 4.0, 3e-4
     ),
+    # An accelerometer session of an IMU: its gyros stand still. 1 V stands for 1 g.
+    "can-imu": Kind("bits = 16\nfull_scale_v = 8", FINE_DEGC, 1.0, 0.004, 5e-4),
     # 0 g is the code 32000; one code is 0.01 m/s^2.
     "j1939-inclinometer": Kind(
         OFFSET_BINARY + "66.8281", "degc_per_code = 0.03125\ndegc_at_zero = -273",
