@@ -18,7 +18,7 @@ from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.routines import Generated, start_generated
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.delivery import unit as delivery_module
-from triaxcal.delivery.firmware import compensation_of
+from triaxcal.delivery.order import compensation_of
 from triaxcal.delivery.unit import Delivery, deliver
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.calibrate import calibrate

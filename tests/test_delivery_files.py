@@ -20,6 +20,7 @@ from triaxcal.codegen.identity import IDENTITY_SIZE, Identity, identity_of
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.outputs.image import IMAGE_FILE
 from triaxcal.codegen.tryout import model_error_g
+from triaxcal.delivery.order import ERROR_SHARE
 from triaxcal.delivery.unit import Delivery
 from triaxcal.model.metrological import exact_gain_and_offset, worst_force_error_g
 from triaxcal.report.files import all_files
@@ -171,4 +172,4 @@ def test_stated_model_error_is_that_of_the_planned_functions(
     assert delivery.firmware.error_g == total
     # The plan's functions are the same polynomials about another origin: 1e-15 of 2 g/V x 2.5 V.
     assert abs(found - expected) <= 1e-13
-    assert found <= delivery.unit.model_error_max_micro_g * 1e-6
+    assert delivery.firmware.functions.share <= ERROR_SHARE

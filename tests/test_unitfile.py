@@ -81,7 +81,7 @@ def test_defaults(tmp_path: Path) -> None:
         thermal=ThermalChoice("auto"),
         method="matrix",
         output_q=24,
-        model_error_max_micro_g=1.0,
+        model_error_max_micro_g=None,
         limits=Limits(3e-4, 10e-4),
     )
 

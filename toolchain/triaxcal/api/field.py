@@ -13,6 +13,7 @@ from triaxcal.base.arrays import finite
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.fitted import Fitted, columns_of
 from triaxcal.delivery.inputs import files_sha256
+from triaxcal.delivery.order import choose_functions
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
@@ -159,8 +160,10 @@ def bring_up_to_date(
     before = done.calibration.update
     earlier = () if before is None else before.parents
     logs = () if before is None else (*before.earlier_sha256, before.recording_sha256)
-    source = Source((*earlier, done.inputs_sha256), Path(poses.source).name, digest, logs)
     parts = done.unit, done.measurements, done.calibration
+    order = choose_functions(*parts).plan.shape.order
+    parents = (*earlier, done.inputs_sha256)
+    source = Source(parents, Path(poses.source).name, digest, logs, order)
     found = update_by_poses(
         parts, poses, gravity_g, allowed, source, drift_is_stated=drift != _DRIFT_BY_LIMITS
     )

@@ -27,22 +27,14 @@ def settled_codes(
     whole = adc.code_max == 2 ** (adc.bits - 1) - 1 and adc.code_min == -(2 ** (adc.bits - 1))
     if squares is None or not squares.included or not whole:
         return unit, calibration
+    from triaxcal.delivery.order import compensation_of  # noqa: PLC0415
     from triaxcal.fixedpoint.plan import make_plan  # noqa: PLC0415
-    from triaxcal.model.methods.compensation import compensate  # noqa: PLC0415
 
     for halvings in range(_HALVINGS):
         largest = 2 ** (adc.bits - 1 - halvings)
         own = replace(unit, adc=replace(adc, code_min=-largest, code_max=largest - 1))
         try:
-            functions = compensate(
-                calibration.thermal,
-                own.method,
-                calibration.range_degc,
-                own.adc.largest_v,
-                own.model_error_max_micro_g * 1e-6,
-                terms=calibration.terms,
-            )
-            make_plan(functions, own)
+            make_plan(compensation_of(own, calibration, own.method), own)
         except RefusedError:
             continue
         if not halvings:

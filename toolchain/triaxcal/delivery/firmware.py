@@ -9,16 +9,16 @@ from functools import cached_property
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
 from triaxcal.base.screentext import table
 from triaxcal.codegen.angles import angles_plan
 from triaxcal.codegen.constants import Provenance
 from triaxcal.codegen.outputs.output import Job
 from triaxcal.codegen.outputs.registry import output_files
 from triaxcal.codegen.routines import Answers, Int32Array
-from triaxcal.codegen.tryout import model_error_g, run_on_dwells
+from triaxcal.codegen.tryout import run_on_dwells
 from triaxcal.delivery.fitted import Fitted
 from triaxcal.delivery.judgement import verdict_on
+from triaxcal.delivery.order import Functions, choose_functions
 from triaxcal.delivery.verdict import Verdict
 from triaxcal.fitting.converter import input_words, plain_name
 from triaxcal.fitting.core.calibration import Calibration
@@ -26,10 +26,10 @@ from triaxcal.fitting.tilter.acceptance import dwells_in_range
 from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.arithmetic import INT32_MAX
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
-from triaxcal.fixedpoint.plan import Plan, make_plan
-from triaxcal.fixedpoint.proof import Bound, prove
+from triaxcal.fixedpoint.plan import Plan
+from triaxcal.fixedpoint.proof import Bound
 from triaxcal.fixedpoint.rate import RATE_Q
-from triaxcal.model.methods.compensation import Compensation, compensate
+from triaxcal.model.methods.compensation import Compensation
 from triaxcal.model.methods.method import DIRECT, INVERSE
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.model.metrological import unpack_constants
@@ -57,29 +57,37 @@ class Firmware:
     Attributes
     ----------
     fitted : Fitted
-    compensation : Compensation
-        Functions of temperature, in floats.
-    plan : Plan
-        The same in integers.
-    model_error_g : float
-        Largest error of the compensation against K(T)^-1 (U - U0(T)) at any temperature code and
-        any raw code, in g.
+    functions : Functions
+        Of temperature, and what they miss.
     """
 
     fitted: Fitted
-    compensation: Compensation
-    plan: Plan
-    model_error_g: float
+    functions: Functions
 
-    @cached_property
+    @property
+    def compensation(self) -> Compensation:
+        """Functions of temperature, in floats."""
+        return self.functions.compensation
+
+    @property
+    def plan(self) -> Plan:
+        """The same in integers."""
+        return self.functions.plan
+
+    @property
+    def model_error_g(self) -> float:
+        """Largest error of the compensation against K(T)^-1 (U - U0(T)), for any codes, in g."""
+        return self.functions.model_error_g
+
+    @property
     def bound(self) -> Bound:
         """Proven error of the arithmetic."""
-        return prove(self.plan)
+        return self.functions.bound
 
     @property
     def error_g(self) -> float:
         """Largest error against K(T)^-1 (U - U0(T)): that of arithmetic and method."""
-        return self.bound.lsb * 2.0**-self.plan.shape.output_q + self.model_error_g
+        return self.functions.error_g
 
     @property
     def angles(self) -> AnglesPlan | None:
@@ -149,27 +157,11 @@ def make_firmware(fitted: Fitted) -> Firmware:
         When no integers of the format hold the functions, they miss the fitted model by more than
         [compensation] model_error_max_micro_g, or a binary decision rule refuses the unit.
     """
-    unit, calibration = fitted.unit, fitted.calibration
-    compensation = compensation_of(unit, calibration, unit.method)
-    plan = replace(make_plan(compensation, unit), reading=calibration.reading_unit)
-    error_g = model_error_g(unit, calibration.thermal, plan)
-    _refuse_model_error(unit, plan, error_g)
-    made = Firmware(fitted, compensation, plan, error_g)
+    unit = fitted.unit
+    made = Firmware(fitted, choose_functions(unit, fitted.measurements, fitted.calibration))
     if unit.limits.rule.binary and made.verdict.refusal is not None:
         raise made.verdict.refusal
     return made
-
-
-def compensation_of(unit: UnitDescription, calibration: Calibration, method: str) -> Compensation:
-    """The functions that the device evaluates for one method."""
-    return compensate(
-        calibration.thermal,
-        method,
-        calibration.range_degc,
-        unit.adc.largest_v,
-        unit.model_error_max_micro_g * 1e-6,
-        terms=calibration.terms,
-    )
 
 
 def _files(firmware: Firmware) -> dict[str, bytes]:
@@ -228,15 +220,3 @@ def _tested(verdict: Verdict) -> list[str]:
     """The verdict, and what was held against each limit."""
     words = textwrap.wrap(f"verdict: {verdict.words}", _WIDTH, subsequent_indent="  ")
     return [*words, *(f"  {line}" for line in table(verdict.heads, verdict.rows))]
-
-
-def _refuse_model_error(unit: UnitDescription, plan: Plan, error_g: float) -> None:
-    """The order of N(T) is chosen on a grid; what counts is every temperature code."""
-    limit_g = unit.model_error_max_micro_g * 1e-6
-    if METHODS[unit.method].keeps_error and error_g > limit_g:
-        raise RefusedError(
-            f"{unit.source}, [compensation] model_error_max_micro_g",
-            f"N(T) of order {plan.shape.order} is {error_g * 1e6:.4g} micro-g off the fitted model",
-            expected=f"at most {limit_g * 1e6:g} micro-g",
-            remedy='choose method = "inverse", or allow more',
-        )

@@ -20,6 +20,7 @@ from triaxcal.base.errors import RefusedError, refused_by_system
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.base.plaindata import Custom, plain, rebuilt
 from triaxcal.delivery.fitted import Fitted
+from triaxcal.delivery.order import Functions
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel, relative_coefficients
 from triaxcal.model.metrological import CONSTANT_NAMES
@@ -89,8 +90,11 @@ class Saved:
         return Saved(source, c.serial, c.thermal, c.terms, c.range_degc, c.reading_unit, fitted)
 
 
-def calibration_json(fitted: Fitted) -> bytes:
-    """Constants, curves, covariance and provenance; file-formats.md has the layout."""
+def calibration_json(fitted: Fitted, functions: Functions | None = None) -> bytes:
+    """Constants, curves, covariance and provenance; file-formats.md has the layout.
+
+    `functions` are those of the firmware that it is delivered with.
+    """
     calibration = fitted.calibration
     curves = calibration.thermal.curves
     document = {
@@ -117,6 +121,7 @@ def calibration_json(fitted: Fitted) -> bytes:
         "candidates": plain(calibration.candidates, _CUSTOM),
         "selection_reason": calibration.selection_reason,
         **_beyond_the_tilter(calibration),
+        **({} if functions is None else {"compensation": functions.document()}),
         "fit": _state(fitted),
     }
     return json_bytes(document)

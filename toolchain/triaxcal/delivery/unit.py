@@ -27,8 +27,9 @@ from triaxcal.codegen.routines import (
 )
 from triaxcal.codegen.selftest import check_selftest
 from triaxcal.codegen.tryout import MethodResult, run_on_dwells
-from triaxcal.delivery.firmware import Firmware, compensation_of, make_firmware, rate_codes
+from triaxcal.delivery.firmware import Firmware, make_firmware, rate_codes
 from triaxcal.delivery.fitted import Fitted, fit_folder, refuse_beyond_limits
+from triaxcal.delivery.order import compensation_of
 from triaxcal.delivery.verdict import Verdict
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.acceptance import dwells_in_range

@@ -44,7 +44,7 @@ def all_files(delivery: Delivery, made: Passport | None = None) -> dict[str, byt
         certificate[CERTIFICATE] = certificate_xml(unit_passport, details)
     return {
         **delivery.files,
-        "calibration.json": calibration_json(delivery),
+        "calibration.json": calibration_json(delivery, delivery.firmware.functions),
         "verification.json": verification_json(delivery),
         "residuals.svg": residuals_svg(delivery),
         **passport_files(unit_passport),

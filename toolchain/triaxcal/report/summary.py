@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from triaxcal.base.screentext import table
+from triaxcal.delivery.order import Functions
 from triaxcal.delivery.unit import Delivery
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import RecordingFit
@@ -22,6 +23,9 @@ from triaxcal.unit.choices import ESTIMATOR_WORDS
 _LABEL = 16
 CONDITION_SHOWN = 1e6
 """A condition number from here on says that a constant is not seen at all."""
+HORNER_STEP_ON_M3 = 4
+"""Instructions of one step in the portable C: load, SMULL, addition and the copy of the low word.
+tests/targets counts them."""
 
 
 def summary(made: Passport, files: Iterable[str], where: str) -> str:
@@ -64,6 +68,7 @@ def _head(made: Passport) -> str:
             *(_entry("stated", caution_words(caution)) for caution in made.cautions),
             _entry("thermal model", calibration.selection_reason),
             _entry("method", method),
+            *_order(delivery.firmware.functions),
             _entry(
                 "range",
                 f"{low:g} to {high:g} degC, {codes} temperature codes; "
@@ -104,6 +109,28 @@ def _method_words(delivery: Delivery) -> str:
         f"{what[shape.form]} of order {shape.order} on {segments}; within "
         f"{delivery.model_error_g * 1e6:.3g} micro-g of K(T)^-1 (U - U0(T)) for every raw code"
     )
+
+
+def _order(functions: Functions) -> list[str]:
+    """Why the functions have their order, and what it saves."""
+    if functions.share_max is None:
+        return []
+    order = functions.plan.shape.order
+    share = (
+        f"{order}: method and arithmetic are {functions.share:.3f} of the least standard "
+        f"uncertainty, and add {functions.growth * 100:.2g} % to it"
+    )
+    if functions.share > functions.share_max:
+        share += f"; more than {functions.share_max:g}: raise compensation.output_q"
+    lines = [share]
+    if saved := functions.coefficients_saved:
+        steps = 12 * (functions.order_before - order)
+        lines.append(
+            f"within 1 micro-g it would be {functions.order_before}: saved are {saved} coefficients"
+            f", {4 * saved} bytes of flash and {HORNER_STEP_ON_M3 * steps} instructions of "
+            "set_temperature (Cortex-M3)"
+        )
+    return [_entry("order", *lines)]
 
 
 def _constants(calibration: Calibration) -> str:

@@ -18,7 +18,15 @@ from triaxcal.targets.build import TargetError, Toolset, build, in_parallel, run
 from triaxcal.targets.cores.core import Core
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import Counts, build_plugin, measure
-from triaxcal.targets.shapes import CUBIC, CUBIC_LEFT, GYRO, QUADRATIC, RATE_ALONE, Case
+from triaxcal.targets.shapes import (
+    CUBIC,
+    CUBIC_LEFT,
+    GYRO,
+    ORDER_4,
+    QUADRATIC,
+    RATE_ALONE,
+    Case,
+)
 from triaxcal.targets.sizes import Flash, flash_of
 from triaxcal.unit.arithmetic import LIMBS, PORTABLE, THUMB1, THUMB2
 
@@ -82,7 +90,7 @@ def _has(case: Case, form: str) -> bool:
 
 
 BENCH_SHAPES = (
-    CUBIC, CUBIC_LEFT, "AT-SIM", "AT-CHERNIAK", "inverse", QUADRATIC, RATE_ALONE, GYRO,
+    CUBIC, CUBIC_LEFT, ORDER_4, "AT-CHERNIAK", "inverse", QUADRATIC, RATE_ALONE, GYRO,
 )  # fmt: skip
 
 

@@ -14,16 +14,16 @@ from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.names import Names, names_of
 from triaxcal.codegen.render import arithmetic_of, render_routine, routine_file
 from triaxcal.codegen.selftest import render_selftest
-from triaxcal.delivery.firmware import compensation_of
 from triaxcal.delivery.inputs import inputs_sha256
+from triaxcal.delivery.order import choose_functions
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.gyro import make_gyro_plan
-from triaxcal.fixedpoint.plan import Plan, make_plan
+from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.methods.imu import EXAMPLE_SENSITIVITY, ImuCompensation
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS, Terms
-from triaxcal.readings.measurements import MEASUREMENTS_FILE, read_measurements
+from triaxcal.readings.measurements import MEASUREMENTS_FILE, MeasurementSet, read_measurements
 from triaxcal.unit.angles import PITCH_ROLL, ZENITH_TOOL_FACE, AnglesChoice
 from triaxcal.unit.description import UnitDescription, read_unit
 
@@ -83,6 +83,7 @@ class Case:
 
 Change = Callable[[UnitDescription], UnitDescription]
 CUBIC = "cubic"
+ORDER_4 = "order 4"
 CUBIC_LEFT = "cubic, left-justified"
 QUADRATIC, RATE, GYRO = "quadratic terms", "dT/dt", "gyro"
 RATE_ALONE = "cubic, dT/dt"
@@ -98,34 +99,40 @@ def _order_3(unit: UnitDescription) -> UnitDescription:
     return replace(unit, model_error_max_micro_g=10.0)
 
 
+def _order_4(unit: UnitDescription) -> UnitDescription:
+    return replace(unit, model_error_max_micro_g=1.0)
+
+
 def _left_justified(unit: UnitDescription) -> UnitDescription:
     return replace(unit, adc=replace(unit.adc, bits=32, code_min=-(2**31), code_max=2**31 - 1))
 
 
 def _odd_range(unit: UnitDescription) -> UnitDescription:
-    return replace(unit, adc=replace(unit.adc, code_min=-8_000_000, code_max=8_000_000))
+    adc = replace(unit.adc, code_min=-8_000_000, code_max=8_000_000)
+    return replace(_order_4(unit), adc=adc)
 
 
 _SHAPES: tuple[tuple[str, str, str, Change], ...] = (
-    (CUBIC, "AT-SIM", "N(T) of order 3", _order_3),
+    (CUBIC, "AT-SIM", "AT-SIM as shipped: N(T) of order 3", lambda u: u),
     (CUBIC_LEFT, "AT-SIM", "raw codes that fill int32", lambda u: _left_justified(_order_3(u))),
-    ("AT-SIM", "AT-SIM", "as shipped", lambda u: u),
+    (ORDER_4, "AT-SIM", "within 1 micro-g: N(T) of order 4", _order_4),
     ("AT-CHERNIAK", "AT-CHERNIAK", "as shipped: piecewise", lambda u: u),
     ("inverse", "AT-SIM", "K(T) inverted on the device", lambda u: replace(u, method="inverse")),
-    ("saturating", "AT-SIM", "output_q 28: no spare bits", lambda u: replace(u, output_q=28)),
-    ("no spare bit", "AT-SIM", "output_q 27", lambda u: replace(u, output_q=27)),
+    ("saturating", "AT-SIM", "output_q 28: no spare bits", lambda u: replace(
+        _order_4(u), output_q=28)),
+    ("no spare bit", "AT-SIM", "output_q 27", lambda u: replace(_order_4(u), output_q=27)),
     ("odd range", "AT-SIM", "raw codes -8000000 to 8000000", _odd_range),
     (QUADRATIC, "AT-SIM", "18 quadratic terms, order 3", _order_3),
     (RATE, "AT-SIM", "a term in dT/dt and quadratic terms, inverse", lambda u: replace(
         u, method="inverse")),
     (RATE_ALONE, "AT-SIM", "a term in dT/dt, order 3", _order_3),
     (GYRO, "AT-SIM", "a gyro with g-sensitivity, order 3", _order_3),
-    ("16 bits", "AT-SIM", "16-bit raw codes", lambda u: replace(u, adc=replace(
+    ("16 bits", "AT-SIM", "16-bit raw codes", lambda u: replace(_order_4(u), adc=replace(
         u.adc, bits=16, code_min=-(2**15), code_max=2**15 - 1))),
     ("fine thermometer", "AT-SIM", "110000 temperature codes", lambda u: replace(
-        u, temperature_sensor=replace(u.temperature_sensor, degc_per_code=0.001))),
+        _order_4(u), temperature_sensor=replace(u.temperature_sensor, degc_per_code=0.001))),
     (ANGLES[ZENITH_TOOL_FACE], "AT-SIM", "with zenith and tool face", lambda u: replace(
-        u, angles=AnglesChoice(ZENITH_TOOL_FACE))),
+        _order_4(u), angles=AnglesChoice(ZENITH_TOOL_FACE))),
     (ANGLES[PITCH_ROLL], "AT-CHERNIAK", "with pitch and roll", lambda u: replace(
         u, angles=AnglesChoice(PITCH_ROLL))),
 )  # fmt: skip
@@ -160,9 +167,10 @@ def unit_case(folder: Path) -> Case:
 
 
 @cache
-def _calibrated(folder: Path) -> tuple[UnitDescription, Calibration]:
+def _calibrated(folder: Path) -> tuple[UnitDescription, MeasurementSet, Calibration]:
     unit = read_unit(folder)
-    return unit, calibrate(unit, read_measurements(folder / MEASUREMENTS_FILE, unit))
+    measurements = read_measurements(folder / MEASUREMENTS_FILE, unit)
+    return unit, measurements, calibrate(unit, measurements)
 
 
 def made_case(folder: Path, name: str, note: str, change: Change, terms: Terms) -> Case:
@@ -173,10 +181,10 @@ def made_case(folder: Path, name: str, note: str, change: Change, terms: Terms) 
     RefusedError
         When the unit's files are refused.
     """
-    described, calibration = _calibrated(folder)
+    described, measurements, calibration = _calibrated(folder)
     unit, calibration = change(described), replace(calibration, terms=terms)
-    compensation = compensation_of(unit, calibration, unit.method)
-    plan = make_plan(compensation, unit)
+    functions = choose_functions(unit, measurements, calibration)
+    compensation, plan = functions.compensation, functions.plan
     if name == GYRO:
         # The curves of the accelerometer with rad/s for g: a rate of some hundred deg/s.
         imu = ImuCompensation(compensation, compensation, EXAMPLE_SENSITIVITY)

@@ -114,6 +114,19 @@ class Uncertainty:
             each.append(np.sqrt(np.maximum(variance, 0.0)))
         return _expanded(np.stack(each), sources)
 
+    @cached_property
+    def least_standard_g(self) -> float:
+        """Least over temperature of the standard uncertainties of a_x, a_y, a_z and |a|, in g.
+
+        Each in its worst orientation, without known offsets.
+        """
+        variance = sum(
+            force_variance(s.force, DIRECTIONS)
+            for s in self.sources
+            if s.force is not None and not s.offset
+        )
+        return math.sqrt(float(np.max(variance, axis=1).min()))
+
     @property
     def worst_over_temperature(self) -> FloatArray:
         """Expanded uncertainty in the worst orientation, (n, 4): a_x, a_y, a_z, |a|, in g."""

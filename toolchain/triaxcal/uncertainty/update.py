@@ -45,12 +45,15 @@ class Source:
     recording, recording_sha256 : str
     earlier_sha256 : tuple of str
         Of the recordings of the updates before.
+    order : int
+        Of the functions that the device has.
     """
 
     parents: tuple[str, ...]
     recording: str
     recording_sha256: str
     earlier_sha256: tuple[str, ...] = ()
+    order: int = 0
 
 
 def update_by_poses(
@@ -100,6 +103,7 @@ def update_by_poses(
         drift.axes_rad,
         found.chi_square,
         source.earlier_sha256,
+        source.order,
     )
     calibration = replace(updated_calibration(made, solved), update=record)
     return replace(made, calibration=calibration)

@@ -93,12 +93,15 @@ class Compensation:
     output_q
         The LSB of the result is 2^-output_q g.
     model_error_max_micro_g
-        How far the firmware's functions may be from the fitted model.
+        How far the firmware's functions may be from the fitted model. By default the lowest order
+        is taken with which method and arithmetic together stay below 0.3 of the unit's uncertainty.
     """
 
     method: str = setting(TEXT)
     output_q: int = setting(whole(*OUTPUT_Q_RANGE), 24)
-    model_error_max_micro_g: float = setting(number(1e-3, 1e6), 1.0, "micro-g")
+    model_error_max_micro_g: float | None = setting(
+        number(1e-3, 1e6), None, "micro-g", words="0.3 of the uncertainty", example="1"
+    )
 
 
 FIT, SENSOR = TableKeys.of(Fit), TableKeys.of(Sensor)

@@ -147,7 +147,7 @@ class UnitDescription:
     thermal: ThermalChoice
     method: str
     output_q: int
-    model_error_max_micro_g: float
+    model_error_max_micro_g: float | None
     limits: Limits
     stated: StatedUncertainty = field(default_factory=StatedUncertainty)
     certificate: CertificateDetails | None = None
@@ -161,6 +161,12 @@ class UnitDescription:
     prefix: str = DEFAULT_PREFIX
     angles: AnglesChoice | None = None
     arithmetic: str = PORTABLE
+
+    @property
+    def model_error_max_g(self) -> float | None:
+        """How far the firmware's functions may be from the fitted model, where it is stated."""
+        stated = self.model_error_max_micro_g
+        return None if stated is None else stated * 1e-6
 
     @property
     def reading_unit(self) -> str:

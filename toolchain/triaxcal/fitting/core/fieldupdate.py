@@ -26,6 +26,9 @@ class Update:
         Of the poses against the calibration before, drift allowed for; `poses` are expected.
     earlier_sha256 : tuple of str
         Of the recordings of the updates before this one.
+    order : int
+        Of the functions that the device had before, 0 where it is not known: a larger uncertainty
+        is no reason for another C.
     """
 
     parents: tuple[str, ...]
@@ -38,3 +41,4 @@ class Update:
     axes_drift: float
     chi_square: float
     earlier_sha256: tuple[str, ...] = ()
+    order: int = 0

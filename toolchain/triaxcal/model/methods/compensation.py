@@ -72,14 +72,16 @@ def compensate(
     error_max_g: float,
     *,
     terms: Terms = NO_TERMS,
+    order_min: int = 1,
 ) -> Compensation:
     """Functions that the device evaluates for a fitted thermal model.
 
-    `voltage_max_v` and `error_max_g` are those of a `Target`. `terms` are taken over as they are:
-    they apply to the linear result, whatever computes it.
+    `voltage_max_v`, `error_max_g` and `order_min` are those of a `Target`. `terms` are taken over
+    as they are: they apply to the linear result, whatever computes it.
     """
     entry = METHODS[method]
-    target = Target(_restrict(thermal.curves, range_degc), voltage_max_v, error_max_g)
+    curves = _restrict(thermal.curves, range_degc)
+    target = Target(curves, voltage_max_v, error_max_g, order_min)
     return Compensation(method, entry.form, entry.functions(thermal, target), terms)
 
 

@@ -23,10 +23,10 @@ MAX_ORDER = 9
 def _functions(thermal: ThermalModel, target: Target) -> PiecewisePolynomial:
     """N(T) and b(T) by interpolation at Chebyshev points, one polynomial a segment.
 
-    The order is the lowest whose error stays within the target's, or `MAX_ORDER`: the caller
-    measures what was reached, by `worst_force_error_g`, at every temperature code.
+    The order is the lowest from `order_min` whose error stays within the target's, or `MAX_ORDER`:
+    the caller measures what was reached, by `worst_force_error_g`, at every temperature code.
     """
-    for order in range(1, MAX_ORDER + 1):
+    for order in range(target.order_min, MAX_ORDER + 1):
         result = _chebyshev(thermal, target.curves.breaks_degc, order)
         # A tenth is left for the codes between the samples.
         if _sampled_error_g(thermal, result, target.voltage_max_v) <= 0.9 * target.error_max_g:

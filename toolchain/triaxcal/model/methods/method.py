@@ -23,11 +23,14 @@ class Target:
         Largest |U_j|.
     error_max_g : float
         Largest error against K(T)^-1 (U - U0(T)).
+    order_min : int
+        Lowest order of functions that are fitted to them.
     """
 
     curves: PiecewisePolynomial
     voltage_max_v: float
     error_max_g: float
+    order_min: int = 1
 
 
 @dataclass(frozen=True)

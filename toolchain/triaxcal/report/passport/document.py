@@ -39,6 +39,7 @@ def passport_json(p: Passport) -> bytes:
         **_known(p),
         **_angles(p),
         "warnings": [*p.uncertainty.warnings, *filter(None, [p.cause])],
+        "compensation": d.firmware.functions.document(),
         "files_sha256": sha256_of_files(d.files),
         "tools": dict(p.tools),
         "device": _device(p),

@@ -145,6 +145,14 @@ def verification(p: Passport, t: Speaker) -> Rows:
         ),
         (t("verification.both"), t("verification.both_value", size=g_in_words(d.firmware.error_g))),
         (
+            t("verification.share"),
+            t(
+                "verification.share_value",
+                share=f"{d.firmware.functions.share:.2g}",
+                order=d.plan.shape.order,
+            ),
+        ),
+        (
             t("verification.check"),
             t("verification.check_value", count=thousands(d.check.total), sets=sets),
         ),
