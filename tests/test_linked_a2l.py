@@ -9,6 +9,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -177,7 +178,7 @@ def test_a_variable_that_is_loaded_from_an_image(made: Firmware, tmp_path: Path)
     for variable, told in (
         ("none", f"{elf}: no variable none; expected one triax_calib_t of this name; give its"),
         ("other", f"{elf}: 2 variables other; expected one triax_calib_t of this name; give it a"),
-        ("twice", f"{elf}: twice has 4 bytes; expected the 260 bytes of triax_calib_t of this"),
+        ("twice", f"{elf}: twice has 4 bytes; expected the 212 bytes of triax_calib_t of this"),
     ):
         with pytest.raises(triaxcal.RefusedError) as refusal:
             linked_constants(elf, made.plan, made.provenance, variable)
@@ -250,7 +251,7 @@ def test_what_no_can_bus_has_is_refused(made: Firmware, xcp: XcpOnCan, told: str
 
 def test_a_prefix_stands_in_every_name(made: Firmware) -> None:
     """Two sensors in one project of a tool: no name of one is a name of the other."""
-    left = replace(made, plan=replace(made.plan, prefix="left_accel"))
+    left = with_plan(made, prefix="left_accel")
     names = [
         set(re.findall(r"/begin \w+ ([A-Za-z]\w*) ", calib_a2l(f).decode())) for f in (made, left)
     ]
@@ -269,20 +270,26 @@ def refusal_of(elf: Path, firmware: Firmware) -> str:
     return text
 
 
+def with_plan(firmware: Firmware, **changes: Any) -> Firmware:
+    """The firmware with its plan changed."""
+    functions = firmware.functions
+    return replace(firmware, functions=replace(functions, plan=replace(functions.plan, **changes)))
+
+
 def with_other_word(firmware: Firmware) -> Firmware:
     """The same shape, one coefficient other by one."""
     segment = firmware.plan.segments[0]
     coefficients = segment.coefficients.copy()
     coefficients[0, 0] += 1
     segments = (replace(segment, coefficients=coefficients), *firmware.plan.segments[1:])
-    return replace(firmware, plan=replace(firmware.plan, segments=segments))
+    return with_plan(firmware, segments=segments)
 
 
 def test_constants_of_another_unit_are_refused(made: Firmware, tmp_path: Path) -> None:
     elf = build(made, tmp_path, TARGETS["host"])
     word = int(made.plan.segments[0].coefficients[0, 0])
     assert refusal_of(elf, with_other_word(made)) == (
-        f"{elf}: 1 of 65 constants are not those of the unit, the first at byte 20 ({word}); "
+        f"{elf}: 1 of 53 constants are not those of the unit, the first at byte 20 ({word}); "
         f"expected {word + 1} there; link the C of this delivery, or name the unit that the "
         "program was linked for"
     )
@@ -313,7 +320,7 @@ def test_another_shape_is_named(
     assert f"the constants triax have the shape {shapes[0]}; expected the shape {shapes[1]};" in (
         refusal_of(elf, other)
     )
-    left = replace(made, plan=replace(made.plan, prefix="left_accel"))
+    left = with_plan(made, prefix="left_accel")
     unit = f"{shapes[0]}_{made.provenance.inputs_sha256[:8]}"
     assert (
         f"no symbol left_accel_{unit}_calib_constants, but triax_{unit}_calib_constants; expected "

@@ -157,9 +157,10 @@ def choose_functions(
             break
         order = found.plan.shape.order
         found = made(allowed_g - found.arithmetic_g)
+    added_g = _OF_ARITHMETIC * found.arithmetic_g
     if found.error_g > allowed_g:
-        found = made(_OF_ARITHMETIC * found.arithmetic_g)
-    _refuse_model_error(unit, found, max(allowed_g, ONE_MICRO_G))
+        found = made(added_g)
+    _refuse_model_error(unit, found, max(allowed_g, added_g, ONE_MICRO_G))
     before = compensation_of(unit, calibration, unit.method, ONE_MICRO_G).curves.order
     return replace(found, share_max=ERROR_SHARE, order_before=before)
 
