@@ -29,6 +29,7 @@ from triaxcal.base.tools import TOOLS, install_advice, missing_tools
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import render_routine
+from triaxcal.report.summary import HORNER_STEP_ON_M3
 from triaxcal.targets import bench_table, counting, matrix
 from triaxcal.targets.bench import Subject, _write_subject, cost_of
 from triaxcal.targets.build import TargetError, Toolset, build, compiled, emulate
@@ -47,6 +48,7 @@ from triaxcal.targets.shapes import (
     CUBIC,
     CUBIC_LEFT,
     GYRO,
+    ORDER_4,
     RATE_ALONE,
     Case,
     shipped_cases,
@@ -300,9 +302,9 @@ def test_rates_and_forces_are_given_and_counted(tmp_path: Path) -> None:
     plugin = build_plugin(tmp_path)
     costs = {
         name: cost_of(Subject(case_named(name), PORTABLE, ""), M3, tmp_path / str(i), plugin)
-        for i, name in enumerate((CUBIC, RATE_ALONE, GYRO))
+        for i, name in enumerate((CUBIC, ORDER_4, RATE_ALONE, GYRO))
     }
-    assert [c.failure for c in costs.values()] == ["", "", ""]
+    assert [c.failure for c in costs.values()] == [""] * 4
     counts = {name: c.counts for name, c in costs.items() if c.counts}
     # Three multiplications of a rate; nine of a force, each with its load.
     assert counts[RATE_ALONE].set.least > counts[CUBIC].set.most + 3
@@ -311,6 +313,9 @@ def test_rates_and_forces_are_given_and_counted(tmp_path: Path) -> None:
     flash = {name: c.flash for name, c in costs.items() if c.flash}
     assert flash[RATE_ALONE].tables == flash[CUBIC].tables + 4 * 6
     assert flash[GYRO].tables == flash[CUBIC].tables + 4 * 9
+    # What the summary says that an order saves.
+    assert counts[ORDER_4].set.least == counts[CUBIC].set.most + 12 * HORNER_STEP_ON_M3
+    assert flash[ORDER_4].tables == flash[CUBIC].tables + 4 * 12
 
 
 def test_a_program_that_fails_is_reported(tmp_path: Path) -> None:
