@@ -94,6 +94,7 @@ LONG = {
     "test_imu_delivery_thermal.py",
     "test_imu_production.py",
     "test_imu_series.py",
+    "test_imu_verdict.py",
     "test_page_languages.py",
     "test_series_page.py",
     "test_test_report.py",

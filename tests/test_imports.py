@@ -20,6 +20,7 @@ MAY_IMPORT = {
     "fitting": {"base", "model", "unit", "readings", "poses"},
     "diagnosis": {"base", "model", "unit", "readings", "poses", "fitting"},
     "dynamic": {"base", "model", "unit", "readings", "poses"},
+    "evidence": {"base", "model", "unit", "readings", "poses", "dynamic"},
     "fixedpoint": {"base", "model", "unit"},
     "codegen": {"base", "model", "unit", "readings", "fixedpoint"},
     "uncertainty": {"base", "model", "unit", "readings", "poses", "fitting", "fixedpoint"},
@@ -31,7 +32,7 @@ MAY_IMPORT = {
     "keytable": {"base", "unit", "dynamic", "simulation", "design", "rig"},
     "delivery": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
-        "fixedpoint", "codegen", "uncertainty",
+        "evidence", "fixedpoint", "codegen", "uncertainty",
     },
     "performance": {
         "base", "model", "unit", "readings", "fitting", "uncertainty", "noise", "delivery",
@@ -50,7 +51,8 @@ MAY_IMPORT = {
     },
     "report": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
-        "fixedpoint", "codegen", "uncertainty", "delivery", "batch", "device", "performance",
+        "evidence", "fixedpoint", "codegen", "uncertainty", "delivery", "batch", "device",
+        "performance",
     },
 }  # fmt: skip
 """What each room may import: what lies below it. None but the API imports report, which reads all,
@@ -58,7 +60,14 @@ nor the API, nor cli, which calls all."""
 MAY_IMPORT["api"] = set(MAY_IMPORT)
 
 ONLY_IN = {
-    "scipy": {"fitting", "dynamic", "readings", "noise", "performance"},  # readings: MAT-files
+    "scipy": {
+        "fitting",
+        "dynamic",
+        "evidence",
+        "readings",
+        "noise",
+        "performance",
+    },  # readings: MAT-files
     "allantools": {"noise"},
     "can": {"rig", "device"},
     "pyxcp": {"device"},

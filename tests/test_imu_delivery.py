@@ -219,29 +219,43 @@ def test_what_is_written_and_said(ran: Ran) -> None:
     assert f"inputs sha256 {stated['inputs_sha256'][:16]}." in header
     assert "accelerometer code: 21 bits for 10.48576 g full scale" in header
     assert "not corrected: delay of the accelerometers behind the gyros" in header
-    assert "verdict of the filter: innovations" in header
-    assert "not tested: nothing was held out, and no limit is stated for an IMU" in header
+    assert ran.made.verdict.result == "passed"
+    assert "* verdict: passed\n" in header
+    assert "held-out rests: |a| - g of " in header
+    said = fitted["verdict"]
+    assert (said["result"], said["passed"], said["words"]) == ("passed", True, "passed")
+    assert [c["name"] for c in said["checks"]][:3] == [
+        "innovations",
+        "held-out rests",
+        "held-out turns",
+    ]
+    assert "verdict         passed\n" in ran.output
+    for check in said["checks"]:
+        assert check["held"]
+        assert f"<td>{html.escape(check['words'])}</td><td>held</td>" in page
 
 
 def test_the_page_warns_of_what_was_left_out(ran: Ran) -> None:
-    """An effect that shows, and more noise than stated."""
+    """An effect that shows, what was not tested, and what was left in doubt."""
     made, (first, *others) = ran.made, ran.made.done.off
     page = dynamic_page(made, {}).decode()
-    assert '<div class="badge"><b>CONSISTENT</b><small>innovations ' in page
+    assert '<div class="badge"><b>PASSED</b><small>innovations ' in page
     assert '<p class="warning">' not in page
-    shown = replace(made.done, off=(replace(first, chi_square=900.0, shown=True), *others))
+    shown = replace(made.done, off=(replace(first, shown=True, moves_sd=0.4), *others))
     page = html.unescape(dynamic_page(replace(made, done=shown), {}).decode())
-    assert '<div class="badge warn"><b>AN EFFECT IS MISSING</b><small>' in page
     assert (
-        "The recording shows an effect that is switched off, "
-        f'{first.title}: switch on "{first.name}" in [dynamic] blocks.</p>'
+        f"The recording shows an effect that is switched off, {first.title}: it would move no "
+        "constant by more than 0.4 standard deviations. Switch on "
+        f'"{first.name}" in [dynamic] blocks.</p>'
     ) in page
-    last = made.done.result.passes[-1]
-    noisy = replace(last, chi_square=4.0 * last.freedom)
-    result = replace(made.done.result, passes=(*made.done.result.passes[:-1], noisy))
-    page = dynamic_page(replace(made, done=replace(made.done, result=result)), {}).decode()
-    assert "NOT CONSISTENT</b><small>innovations 2.00 times the stated noise" in page
-    assert '<p class="warning">The innovations 2.00 times the stated noise' in page
+    untested = replace(made.evidence, not_tested=("D11 not observable",))
+    page = dynamic_page(replace(made, evidence=untested), {}).decode()
+    assert '<div class="badge"><b>PASSED ON THE RECORDING</b>' in page
+    assert '<p class="warning">D11 not observable.</p>' in page
+    blunt = replace(made.evidence, doubts=("the noise is stated too large",))
+    page = dynamic_page(replace(made, evidence=blunt), {}).decode()
+    assert '<div class="badge warn"><b>NOT SHOWN</b>' in page
+    assert "Not shown to be right: the noise is stated too large.</p>" in page
 
 
 def test_the_page_calls_constants_by_names_for_people(ran: Ran) -> None:

@@ -244,9 +244,12 @@ def _deliver_imu(unit: Path, build: Path, progress: Progress | None) -> Delivere
     from triaxcal.report.dynamic import dynamic_files, dynamic_summary  # noqa: PLC0415
     from triaxcal.report.imuc import C_FILES  # noqa: PLC0415
 
-    made = deliver_imu(unit, progress)
+    target = build / unit.absolute().name
+    try:
+        made = deliver_imu(unit, progress)
+    except RefusedError as refusal:
+        raise _beside_earlier(refusal, target) from refusal
     files = dynamic_files(made)
-    target = build / made.done.unit.name
     publish(files, target, C_FILES)
     text = dynamic_summary(made, files, str(target))
     return Delivered(target, tuple(files), ImuCalibration.of(made), text)

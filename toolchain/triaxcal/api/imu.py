@@ -12,10 +12,12 @@ import numpy as np
 from triaxcal.api.arguments import refuse_other_length, temperatures
 from triaxcal.base.arrays import finite
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.plaindata import rebuilt
 from triaxcal.base.progress import Progress
 from triaxcal.base.publish import renew
 from triaxcal.delivery.fittedimu import FittedImu, read_saved_for_c
-from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_described, imu_c
+from triaxcal.delivery.imu import ImuC, ImuDelivery, fit_described, imu_c
+from triaxcal.delivery.imuverdict import UNKNOWN, ImuVerdict
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
@@ -121,7 +123,7 @@ class ImuCalibration:
         """Calibration of a delivery."""
         from triaxcal.report.dynamic import calibration_document  # noqa: PLC0415
 
-        return cls(calibration_document(delivery.done, delivery.inputs_sha256), delivery)
+        return cls(calibration_document(delivery), delivery)
 
     def __repr__(self) -> str:
         return f"<triaxcal.ImuCalibration {self.serial}, {len(self.states)} states>"
@@ -138,10 +140,16 @@ class ImuCalibration:
         anywhere = (self.reference_degc - 1.0, self.reference_degc + 1.0)
         return model_of_states(self.layout, self._p, self.reference_degc, gravity, anywhere)
 
+    @cached_property
+    def verdict(self) -> ImuVerdict:
+        """Whether it may be delivered, and whether it has passed."""
+        found = self.document.get("verdict")  # earlier files have none
+        return UNKNOWN if found is None else rebuilt(ImuVerdict, found)
+
     @property
-    def verdict(self) -> str:
-        """How consistent recording and model are, by the innovations, in words."""
-        return str(self.document["innovations"]["verdict"])
+    def passed(self) -> bool:
+        """Whether every check that was made holds, and nothing is left in doubt."""
+        return self.verdict.passed
 
     def constants(self, temp_degc: Any = None) -> ImuConstants:
         """Constants at temperatures; None is `reference_degc`.
@@ -225,8 +233,10 @@ class ImuCalibration:
         Raises
         ------
         RefusedError
-            Where it has none, or a compiler is missing.
+            Where it has none, the verdict refuses, or a compiler is missing.
         """
+        if self.verdict.refused:
+            raise RefusedError(self.source, f"refused, so there is no C: {self.verdict.refused}")
         if self._delivery is not None and self._delivery.c is not None:
             return self._delivery.c
         return imu_c(self.fitted)
@@ -246,9 +256,11 @@ def read_imu(folder: str | Path) -> Imu:
 def fit_imu(imu: Imu, progress: Progress | None = None) -> ImuCalibration:
     """Calibrate an IMU from its recording; with [device], its C is made and checked as well.
 
+    A calibration that its verdict refuses is returned all the same, without C: `verdict` says why.
+
     Raises
     ------
     RefusedError
         When the recording cannot be read, or does not determine a calibration.
     """
-    return ImuCalibration.of(deliver_described(imu.description, progress))
+    return ImuCalibration.of(fit_described(imu.description, progress))

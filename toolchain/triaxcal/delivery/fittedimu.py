@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.plaindata import plain, rebuilt
 from triaxcal.codegen.constants import Provenance
-from triaxcal.dynamic.consistency import verdict
+from triaxcal.delivery.imuverdict import ImuVerdict
 from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.device import REQUIRED, Device
 from triaxcal.dynamic.imumodel import imu_model, left_out
@@ -20,6 +21,9 @@ from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.fitting.converter import plain_name
 from triaxcal.model.methods.imu import ImuModel
+
+_WIDTH = 96
+"""Characters of a line of the header."""
 
 
 @dataclass(frozen=True)
@@ -88,15 +92,16 @@ class FittedImu:
         return accel, gyro
 
 
-def fitted_imu(done: DynamicUnit, device: Device, inputs_sha256: str) -> FittedImu:
-    """What the C of a dynamic calibration is made of."""
-    unit, layout = done.unit, done.result.layout
+def fitted_imu(done: DynamicUnit, verdict: ImuVerdict, inputs_sha256: str) -> FittedImu:
+    """What the C of a dynamic calibration with [device] is made of."""
+    unit, layout, device = done.unit, done.result.layout, done.unit.device
+    assert device is not None
     model = imu_model(done.result, device.range_degc)
-    saved = saved_for_c(done, device)
+    saved = saved_for_c(done, device, verdict)
     return FittedImu(unit.name, unit.serial, inputs_sha256, str(unit.path), layout, model, saved)
 
 
-def saved_for_c(done: DynamicUnit, device: Device) -> SavedForC:
+def saved_for_c(done: DynamicUnit, device: Device, verdict: ImuVerdict) -> SavedForC:
     """What calibration.json says for the C."""
     low, high = device.range_degc
     accel, gyro = device.accel_adc, device.gyro_adc
@@ -108,8 +113,7 @@ def saved_for_c(done: DynamicUnit, device: Device) -> SavedForC:
         *turned_columns(done.unit),
         *(f"not corrected: {title}" for title in left_out(done.result.layout)),
         *_unknown_temperature(done),
-        f"verdict of the filter: {verdict(done.result)}",
-        "not tested: nothing was held out, and no limit is stated for an IMU",
+        *_verdict_lines(verdict),
     )
     columns = _signed_columns(done.unit)
     axes = ", ".join(columns["force"][0]), ", ".join(columns["rate"][0])
@@ -120,6 +124,12 @@ def saved_for_c(done: DynamicUnit, device: Device) -> SavedForC:
 def _unknown_temperature(done: DynamicUnit) -> tuple[str, ...]:
     known = done.recorded_degc is not None
     return () if known else ("not shown: no temperature was recorded, the constants are of one",)
+
+
+def _verdict_lines(verdict: ImuVerdict) -> list[str]:
+    """The verdict, and what was held against each limit."""
+    lines = [f"verdict: {verdict.words}", *map(str, verdict.checks), *verdict.notes]
+    return [line for text in lines for line in textwrap.wrap(text, _WIDTH, subsequent_indent="  ")]
 
 
 def turned_columns(unit: DynamicDescription) -> list[str]:
@@ -144,10 +154,10 @@ def _signed_columns(unit: DynamicDescription) -> dict[str, tuple[list[str], bool
     return found
 
 
-def firmware_document(done: DynamicUnit) -> dict[str, Any]:
+def firmware_document(done: DynamicUnit, verdict: ImuVerdict) -> dict[str, Any]:
     """The key `firmware` of calibration.json; nothing where there is no [device]."""
     device = done.unit.device
-    return {} if device is None else {"firmware": plain(saved_for_c(done, device))}
+    return {} if device is None else {"firmware": plain(saved_for_c(done, device, verdict))}
 
 
 def read_saved_for_c(source: str, document: Mapping[str, Any]) -> SavedForC:

@@ -16,10 +16,13 @@ from triaxcal.base.progress import Progress
 from triaxcal.codegen.compilers import find_compiler
 from triaxcal.codegen.imu import ImuBuild, build_imu
 from triaxcal.delivery.fittedimu import FittedImu, fitted_imu
+from triaxcal.delivery.imuverdict import ImuVerdict, judge_imu, refusal_of
 from triaxcal.delivery.inputs import files_sha256
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.device import Device
 from triaxcal.dynamic.unit import DynamicUnit, calibrate_described
+from triaxcal.evidence.check import Evidence
+from triaxcal.evidence.examine import examine
 from triaxcal.fixedpoint.gyro import TriadDescription
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.curves import ThermalModel
@@ -82,11 +85,17 @@ class ImuC:
 
 @dataclass(frozen=True)
 class ImuDelivery:
-    """A calibrated IMU; `c` is None where unit.toml has no [device]."""
+    """A calibrated IMU; `c` is None where unit.toml has no [device], or the verdict refuses."""
 
     done: DynamicUnit
     inputs_sha256: str
     c: ImuC | None
+    evidence: Evidence
+
+    @property
+    def verdict(self) -> ImuVerdict:
+        """Whether it may be delivered, and whether it has passed."""
+        return judge_imu(self.done, self.evidence)
 
 
 def deliver_imu(folder: Path, progress: Progress | None = None) -> ImuDelivery:
@@ -106,6 +115,21 @@ def deliver_described(unit: DynamicDescription, progress: Progress | None = None
     Raises
     ------
     RefusedError
+        As `fit_described` and `build_imu`; when the verdict refuses.
+    """
+    made = fit_described(unit, progress)
+    refusal = refusal_of(made.done, made.evidence)
+    if refusal is not None:
+        raise refusal
+    return made
+
+
+def fit_described(unit: DynamicDescription, progress: Progress | None = None) -> ImuDelivery:
+    """As `deliver_described`; what the verdict refuses is returned all the same, without C.
+
+    Raises
+    ------
+    RefusedError
         As `calibrate_described` and `build_imu`; when the inputs change meanwhile.
     """
     if unit.device is not None:
@@ -116,8 +140,11 @@ def deliver_described(unit: DynamicDescription, progress: Progress | None = None
         raise RefusedError(
             str(unit.path.parent), "changed while it was read", remedy="run it again"
         )
-    c = None if unit.device is None else imu_c(fitted_imu(done, unit.device, inputs))
-    return ImuDelivery(done, inputs, c)
+    found = examine(done, progress or (lambda _step, _part: None))
+    c = None
+    if unit.device is not None and not found.failed:
+        c = imu_c(fitted_imu(done, judge_imu(done, found), inputs))
+    return ImuDelivery(done, inputs, c, found)
 
 
 def _inputs_sha256(unit: DynamicDescription) -> str:

@@ -1,4 +1,4 @@
-"""unit.toml of a unit on a turntable: [site], [dynamic], [noise], [table], [device]."""
+"""unit.toml of a unit on a turntable: [site], [dynamic], [noise], [table], [limits], [device]."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from triaxcal.dynamic.columns import (
     refuse_two_temperatures,
 )
 from triaxcal.dynamic.device import DEVICE, Device, device_of
+from triaxcal.dynamic.limits import IMU_LIMITS, ImuLimits
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import Turntable
 from triaxcal.model.types import FloatArray
@@ -56,6 +57,8 @@ class DynamicDescription:
         What the firmware's codes are; without it there is no C.
     measured : Measured
         When and where the recording was made.
+    limits : ImuLimits
+        What is demanded of the constants.
     """
 
     name: str
@@ -76,6 +79,7 @@ class DynamicDescription:
     table: Turntable | None
     device: Device | None = None
     measured: Measured = field(default_factory=Measured)
+    limits: ImuLimits = field(default_factory=ImuLimits)
 
     @property
     def recording(self) -> Path:
@@ -154,6 +158,7 @@ def imu_file() -> FileKeys:
             dynamic_table(),
             TableKeys.of(DataSheet),
             TableKeys.of(_TablePapers, optional=True),
+            IMU_LIMITS,
             DEVICE,
             MEASURED,
         ),
@@ -208,6 +213,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         table=_table(tables["table"]),
         device=device_of(tables["device"]),
         measured=tables["measured"].record(Measured),
+        limits=tables["limits"].record(ImuLimits),
     )
 
 

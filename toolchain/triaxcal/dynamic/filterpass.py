@@ -66,6 +66,7 @@ class _Pass:
         self.up_rate = EARTH_RATE_RAD_PER_S * math.sin(latitude)
         self.reset = self.frame.layout.reset_columns()
         self.stage = 0
+        self.cuts_s, self.watch = task.cuts_s, task.watch
         self.stage_p = start.stage_p.copy()
         if len(self.stage_p):
             self.p[self.reset] = self.stage_p[0]
@@ -110,13 +111,16 @@ class _Pass:
         bias = layout.part(self.p, "accelerometer-bias")[:3]
         force = inverse_of_one_plus(gamma) @ (section.force - bias)
         C = level(force, 0.0 if heading is None else float(heading[number]))
-        azimuth_sd = FIXED_SD_RAD if heading is None else HEADING_SD_RAD
-        self.filter.restart_attitude(np.array([LEVEL_SD_RAD, LEVEL_SD_RAD, azimuth_sd]))
+        self._forget_attitude()
         self.steps.move(section.start_s)
         if number > 0 and "north" in layout:
             place = layout.place("north")
             self._forget(np.arange(len(layout))[place], np.zeros(2))
         return C
+
+    def _forget_attitude(self) -> None:
+        azimuth_sd = FIXED_SD_RAD if self.start.heading_rad is None else HEADING_SD_RAD
+        self.filter.restart_attitude(np.array([LEVEL_SD_RAD, LEVEL_SD_RAD, azimuth_sd]))
 
     def _forget(self, columns: IntArray, values: FloatArray) -> None:
         """New states in `columns`, linearised about `values`."""
@@ -156,11 +160,16 @@ class _Pass:
             pool, lead = pool[keep:], end - keep
 
     def _until_next_stage(self, time_s: float, blocks: int) -> int:
-        """At most so many blocks that a segment ends where the unit was put on the table anew."""
+        """At most so many blocks that a segment ends at the next mounting, and at the next cut."""
         self._next_stage(time_s)
-        if blocks == 0 or self.stage + 1 >= len(self.found.stages):
+        if self.cuts_s and time_s >= self.cuts_s[0]:
+            self._forget_attitude()
+            self.cuts_s = tuple(cut for cut in self.cuts_s if cut > time_s)
+        stages = self.found.stages[self.stage + 1 : self.stage + 2]
+        ends = [stage.start_s for stage in stages] + list(self.cuts_s[:1])
+        if blocks == 0 or not ends:
             return blocks
-        left_s = self.found.stages[self.stage + 1].start_s - time_s
+        left_s = min(ends) - time_s
         return min(blocks, max(1, math.ceil(left_s / (self.frame.block * self.frame.interval_s))))
 
     def _segment(self, samples: ImuSamples, lead: int, blocks: int, C: FloatArray) -> FloatArray:
@@ -174,6 +183,9 @@ class _Pass:
             rows = np.concatenate([rows, more], axis=1)
             freedom = freedom + more.shape[1] * where
         self.steps.run(rows, freedom, time_s)
+        if self.watch is not None:
+            self.watch.segment(time_s, made)
+            use = use * self.watch.level((time_s[:-1] + time_s[1:]) / 2)
         beta = self._level_again(made, use)
         self.filter.shift(beta, np.zeros_like(self.p))
         size = float(np.abs(beta).max())

@@ -18,11 +18,12 @@ from triaxcal.dynamic.blocks.block import Extension
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
+from triaxcal.dynamic.imumodel import IN_MODEL
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.passdata import Reference, Task
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.wander import wander_of
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import FloatArray, IntArray
 
 SIGNIFICANCE = 1e-3
 """Some seven tests on each recording: one false alarm in a hundred and forty recordings."""
@@ -48,6 +49,14 @@ class Effect:
         Whether the recording shows it beyond `SIGNIFICANCE`.
     hint : str
         A mistake of conventions that looks so; or "".
+    alone : float
+        Chi-square of its states where no other effect is switched on: by so much it lowers that of
+        the innovations.
+    moves_sd : float
+        By how many of its standard deviations the constant of the C that it moves most would
+        change, if this effect alone were switched on.
+    moved : str
+        Which constant that is.
     """
 
     name: str
@@ -56,6 +65,9 @@ class Effect:
     states: int
     shown: bool
     hint: str = ""
+    alone: float = 0.0
+    moves_sd: float = 0.0
+    moved: str = ""
 
 
 def missing_effects(
@@ -80,6 +92,7 @@ def missing_effects(
     start = Reference(p, stage_p, result.heading_rad)
     done = run_pass(task, start, first=False, progress=progress)
     covariance = done.root @ done.root.T
+    known_places = np.arange(known)
     found = []
     for extension in candidates:
         new = [block for block in extension.blocks if block.name not in result.layout]
@@ -90,10 +103,38 @@ def missing_effects(
         )
         shown = bool(chi2.sf(value, len(index)) < SIGNIFICANCE)
         hint = _hint(extension.name, done.p[index], covariance[np.ix_(index, index)], recording)
-        found.append(
-            Effect(extension.name, extension.label, value, len(index), shown, hint if shown else "")
-        )
+        kept = np.concatenate([known_places, index])
+        step, own = without_others(done.p - p, covariance, kept)
+        alone = float(step[known:] @ np.linalg.solve(own[known:, known:], step[known:]))
+        moved, moves_sd = _most_moved(result, step[:known])
+        about = extension.name, extension.label, value, len(index), shown, hint if shown else ""
+        found.append(Effect(*about, alone, moves_sd, moved))
     return tuple(sorted(found, key=lambda e: -e.chi_square / e.states))
+
+
+def without_others(
+    step: FloatArray, covariance: FloatArray, kept: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Estimate and covariance of the states `kept` where all others are known to be zero.
+
+    `step`, shape (n,), is the estimate about a reference at which the others are zero.
+    """
+    others = np.setdiff1d(np.arange(len(step)), kept)
+    if len(others) == 0:
+        return step[kept], covariance[np.ix_(kept, kept)]
+    gain = np.linalg.solve(covariance[np.ix_(others, others)], covariance[np.ix_(others, kept)]).T
+    left = covariance[np.ix_(kept, kept)] - gain @ covariance[np.ix_(others, kept)]
+    return step[kept] - gain @ step[others], left
+
+
+def _most_moved(result: DynamicResult, step: FloatArray) -> tuple[str, float]:
+    """The constant of the C that a step moves most, and by how many standard deviations."""
+    layout = result.layout
+    delivered = [b.name for b in layout.blocks if b.name in IN_MODEL]
+    places = np.concatenate([np.arange(len(layout))[layout.place(name)] for name in delivered])
+    moved = np.abs(step[places]) / result.sd[places]
+    worst = int(np.argmax(moved))
+    return layout.states[int(places[worst])].name, float(moved[worst])
 
 
 def _hint(name: str, p: FloatArray, covariance: FloatArray, recording: ImuRecording) -> str:

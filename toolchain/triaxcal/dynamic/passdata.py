@@ -3,24 +3,46 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from triaxcal.dynamic.noise import DataSheet
+from triaxcal.dynamic.preintegrate import BlockEquations
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.survey import Survey
 from triaxcal.dynamic.wander import Wander
 from triaxcal.dynamic.window import Frame
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
+
+
+class Watch(Protocol):
+    """What looks at the equations of a pass beside the filter."""
+
+    def level(self, time_s: FloatArray) -> BoolArray:
+        """Whether the attitude may be levelled by the forces at these times."""
+
+    def segment(self, time_s: FloatArray, made: BlockEquations) -> None:
+        """Take the equations of consecutive blocks; `time_s`, shape (b + 1,), are their ends."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """What all of a pass is about."""
+    """What all of a pass is about.
+
+    Attributes
+    ----------
+    cuts_s : tuple of float
+        Rising times at which the filter forgets the attitude: what lies before and after shares
+        the constants alone.
+    watch : Watch or None
+    """
 
     recording: ImuRecording
     survey: Survey
     frame: Frame
     noise: DataSheet
     wander: Wander
+    cuts_s: tuple[float, ...] = ()
+    watch: Watch | None = None
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from triaxcal.base.progress import Progress
@@ -10,6 +10,7 @@ from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.missing import Effect, missing_effects
 from triaxcal.dynamic.observability import Observability, observability
+from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.several import read_recordings
 from triaxcal.dynamic.temperatures import recorded_temperatures, refuse_beyond
 
@@ -31,6 +32,8 @@ class DynamicUnit:
         Working temperatures: those of [device], else of the recording; None where it has none.
     recorded_degc : tuple of two floats, or None
         Lowest and highest temperature that was recorded.
+    recording : ImuRecording or None
+        None for a plan.
     """
 
     unit: DynamicDescription
@@ -40,6 +43,7 @@ class DynamicUnit:
     findings: tuple[str, ...]
     range_degc: tuple[float, float] | None = None
     recorded_degc: tuple[float, float] | None = None
+    recording: ImuRecording | None = field(default=None, repr=False)
 
 
 def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUnit:
@@ -78,4 +82,4 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     recorded = None if temperatures is None else temperatures.ends_degc
     range_degc = recorded if unit.device is None else unit.device.range_degc
     findings = (*recording.findings, *unknown)
-    return DynamicUnit(unit, result, seen, off, findings, range_degc, recorded)
+    return DynamicUnit(unit, result, seen, off, findings, range_degc, recorded, recording)

@@ -11,12 +11,14 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.base.jsontext import json_bytes
+from triaxcal.base.plaindata import plain
 from triaxcal.delivery.fittedimu import firmware_document
 from triaxcal.delivery.imu import ImuDelivery
+from triaxcal.delivery.imuverdict import ImuVerdict
 from triaxcal.dynamic.calibrate import DynamicResult
-from triaxcal.dynamic.consistency import verdict
 from triaxcal.dynamic.observability import Observability
 from triaxcal.dynamic.unit import DynamicUnit
+from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.dynamicpage import digits, dynamic_page, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
 from triaxcal.report.stated.statements import statements_of
@@ -28,14 +30,15 @@ FORMAT = 1
 def dynamic_files(made: ImuDelivery) -> dict[str, bytes]:
     """Name and content of everything that build/<UNIT>/ receives."""
     return {
-        "calibration.json": json_bytes(calibration_document(made.done, made.inputs_sha256)),
+        "calibration.json": json_bytes(calibration_document(made)),
         "dynamic.html": dynamic_page(made, {}),
         **imu_c_files(made),
     }
 
 
-def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any]:
+def calibration_document(made: ImuDelivery) -> dict[str, Any]:
     """calibration.json of an IMU; the docs have the layout."""
+    done, verdict = made.done, made.verdict
     unit, result, seen = done.unit, done.result, done.seen
     layout, last = result.layout, result.passes[-1]
     return {
@@ -44,7 +47,7 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
         "triaxcal": __version__,
         "unit": unit.name,
         "serial": unit.serial,
-        "inputs_sha256": inputs_sha256,
+        "inputs_sha256": made.inputs_sha256,
         "recording": unit.recording_words,
         "reference_degc": unit.reference_degc,
         "range_degc": done.range_degc and list(done.range_degc),
@@ -64,10 +67,12 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
         "innovations": {
             "chi_square": last.chi_square,
             "freedom": last.freedom,
-            "verdict": verdict(result),
+            "verdict": innovation_words(result),
         },
+        "verdict": {"words": verdict.words, "passed": verdict.passed, **plain(verdict)},
         "switched_off": [
             {"name": e.name, "chi_square": e.chi_square, "states": e.states, "shown": e.shown}
+            | {"chi_square_alone": e.alone, "moves": e.moved, "moves_sd": e.moves_sd}
             | ({"hint": e.hint} if e.hint else {})
             for e in done.off
         ],
@@ -78,7 +83,7 @@ def calibration_document(done: DynamicUnit, inputs_sha256: str) -> dict[str, Any
         ],
         "known_only_together": [list(pair) for pair in seen.together],
         **({"findings": list(done.findings)} if done.findings else {}),
-        **firmware_document(done),
+        **firmware_document(done, verdict),
     }
 
 
@@ -125,7 +130,8 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
     lines += [
         f"filter          {3 + len(layout)} states, {len(result.passes)} passes, "
         f"{last.freedom:_} measurements".replace("_", " "),
-        f"                {verdict(result)}",
+        f"                {innovation_words(result)}",
+        *_verdict_lines(made.verdict),
         "",
     ]
     for block in layout.blocks:
@@ -163,6 +169,14 @@ def plan_summary(done: DynamicUnit) -> str:
             sd = result.sd[i] / state.per_unit
             lines.append(f"  {state.name:9s} {digits(sd, sd):>10s} {state.unit}")
     return "\n".join([*lines, *_seen_lines(done.seen)])
+
+
+def _verdict_lines(verdict: ImuVerdict) -> list[str]:
+    """The verdict, and what was held against each limit."""
+    lines = [f"verdict         {verdict.words}"]
+    for check in verdict.checks:
+        lines.append(f"  {check.name}: {check.words}")
+    return lines + [f"  {note}" for note in verdict.notes]
 
 
 def _seen_lines(seen: Observability) -> list[str]:

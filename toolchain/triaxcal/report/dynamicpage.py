@@ -11,9 +11,11 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.delivery.imu import ImuDelivery
+from triaxcal.delivery.imuverdict import ON_RECORDING
+from triaxcal.delivery.verdict import NOT_CHECKED, NOT_SHOWN, PASSED, REFUSED
 from triaxcal.dynamic.calibrate import DynamicResult
-from triaxcal.dynamic.consistency import consistent, verdict
 from triaxcal.dynamic.observability import Weak
+from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.imuc import NO_C, imu_verification
 from triaxcal.report.stated.statements import statements_of
 from triaxcal.report.stated.words import label, value_words
@@ -63,6 +65,8 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
         "badge": _badge(made),
         "facts": _facts(made),
         "warnings": _warnings(made),
+        "checks": [(c.name, c.words, c.held) for c in made.verdict.checks],
+        "notes": made.verdict.notes,
         "stages": [
             {
                 "axis": "xyz"[s.axis],
@@ -112,15 +116,19 @@ def _for_people(weak: Weak, labels: Mapping[str, str]) -> Weak:
     return replace(weak, names=tuple(names))
 
 
+_BADGES = {
+    PASSED: "PASSED",
+    ON_RECORDING: "PASSED ON THE RECORDING",
+    NOT_SHOWN: "NOT SHOWN",
+    NOT_CHECKED: "NOT CHECKED",
+    REFUSED: "REFUSED",
+}
+
+
 def _badge(made: ImuDelivery) -> tuple[bool, str, str]:
-    """Whether the result is consistent, and the words for it."""
-    last = made.done.result.passes[-1]
-    words = f"innovations {math.sqrt(last.chi_square / last.freedom):.2f} times the stated noise"
-    if not consistent(made.done.result):
-        return False, "NOT CONSISTENT", words
-    if any(effect.shown for effect in made.done.off):
-        return False, "AN EFFECT IS MISSING", "significant and switched off, see below"
-    return True, "CONSISTENT", words
+    """Whether the IMU has passed, and the words for it."""
+    verdict = made.verdict
+    return verdict.passed, _BADGES[verdict.result], innovation_words(made.done.result)
 
 
 def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
@@ -154,12 +162,15 @@ def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
 
 def _warnings(made: ImuDelivery) -> list[str]:
     """What must be seen before the constants are used."""
-    found = [] if consistent(made.done.result) else [f"The {verdict(made.done.result)}."]
+    verdict = made.verdict
+    words = [] if verdict.passed else [verdict.words]
+    found = [f"{text[0].upper()}{text[1:]}." for text in (*words, *verdict.not_tested)]
     for effect in made.done.off:
         if effect.shown:
             found.append(
-                f"The recording shows an effect that is switched off, {effect.title}: switch on "
-                f'"{effect.name}" in [dynamic] blocks.'
+                f"The recording shows an effect that is switched off, {effect.title}: it would "
+                f"move no constant by more than {effect.moves_sd:.2g} standard deviations. Switch "
+                f'on "{effect.name}" in [dynamic] blocks.'
             )
     return found
 

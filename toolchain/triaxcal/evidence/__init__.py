@@ -1,0 +1,1 @@
+"""What a recording says against or for the constants that were found from it."""

@@ -1,0 +1,113 @@
+"""All tests of a calibration against its recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from triaxcal.base.progress import Progress
+from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.imumodel import IN_MODEL
+from triaxcal.dynamic.limits import ImuLimits, demanded
+from triaxcal.dynamic.missing import Effect
+from triaxcal.dynamic.observability import Observability
+from triaxcal.dynamic.unit import DynamicUnit
+from triaxcal.evidence.case import Case
+from triaxcal.evidence.causes import causes_of
+from triaxcal.evidence.chance import (
+    earth,
+    effects_off,
+    held_out_checks,
+    innovations,
+    less_noise,
+)
+from triaxcal.evidence.check import Check, Evidence
+from triaxcal.evidence.heldout import HeldOut, held_out
+
+
+def examine(done: DynamicUnit, report: Progress) -> Evidence:
+    """Test a calibrated unit against its recording."""
+    assert done.recording is not None
+    case = Case(done.recording, done.result.noise, done.result)
+    return examine_case(case, done.unit.limits, done.seen, done.off, report)
+
+
+def examine_case(
+    case: Case, limits: ImuLimits, seen: Observability, off: Sequence[Effect], report: Progress
+) -> Evidence:
+    """Test a result against its recording; `off` are the effects that are switched off."""
+    result = case.result
+    held = held_out(case, lambda part: report("held out", part))
+    checks = [
+        innovations(result),
+        *(() if held is None else held_out_checks(held, limits)),
+        *earth(result),
+        *effects_off(off),
+        *sd_checks(limits, result),
+        *_unseen_of_the_base(result, seen),
+    ]
+    found = Evidence(
+        tuple(checks),
+        tuple(_not_tested(held, limits, result, seen)),
+        less_noise(result),
+        _notes(held),
+    )
+    if not found.failed:
+        return found
+    return causes_of(found, case, off, held, report)
+
+
+def sd_checks(limits: ImuLimits, result: DynamicResult) -> Iterator[Check]:
+    """Standard deviations of the constants against what is demanded."""
+    states = result.layout.states
+    for demand, limit, index in demanded(limits, result.layout):
+        sd = {i: float(result.sd[i]) / states[i].per_unit for i in index}
+        worst = max(sd, key=lambda i: sd[i])
+        yield Check(
+            f"[limits] {demand.key}", sd[worst] <= limit,
+            f"{states[worst].name} has {sd[worst]:.3g} {demand.unit} (limit {limit:g})",
+            sd[worst], limit, demand.unit, len(index),
+        )  # fmt: skip
+
+
+def _unseen(result: DynamicResult, seen: Observability) -> list[tuple[tuple[str, ...], bool]]:
+    """Directions that the motion did not show, with a state of the C; whether one is basic."""
+    layout = result.layout
+    of = {state.name: block for block in layout.blocks for state in block.states}
+    found = []
+    for names in seen.unseen:
+        blocks = [of[name] for name in names]
+        if any(block.name in IN_MODEL for block in blocks):
+            found.append((names, any(block in BASE for block in blocks)))
+    return found
+
+
+def _unseen_of_the_base(result: DynamicResult, seen: Observability) -> Iterator[Check]:
+    basic = [" with ".join(names) for names, is_basic in _unseen(result, seen) if is_basic]
+    words = f"the motion did not show {', '.join(basic)}" if basic else "every basic constant"
+    count = sum(len(block.states) for block in BASE)
+    yield Check("observability", not basic, words, float(len(basic)), 0.0, "", count)
+
+
+def _not_tested(
+    held: HeldOut | None, limits: ImuLimits, result: DynamicResult, seen: Observability
+) -> Iterator[str]:
+    if held is None:
+        yield "nothing was held out: the recording has too few rests to spare one"
+    for names, is_basic in _unseen(result, seen):
+        if not is_basic:
+            yield f"{' with '.join(names)} not observable: the value is that of the prior"
+    if limits.g_drift_sd_deg_per_h_per_g is not None and "g-drift" not in result.layout:
+        yield "[limits] g_drift_sd_deg_per_h_per_g not tested: the block g-drift is off"
+
+
+def _notes(held: HeldOut | None) -> tuple[str, ...]:
+    if held is None:
+        return ()
+    rests = len(held.stretches)
+    words = (
+        f"held out: every {held.every}th rest and the turns before and after it, {rests} rests "
+        f"and {2 * rests} turns, predicted by the rest of the recording; the delivered constants "
+        "are those of the whole recording"
+    )
+    return (words,)

@@ -1,0 +1,113 @@
+"""A part of the recording that the solution has not used, and how well it predicts it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from triaxcal.dynamic.calibrate import DynamicResult
+from triaxcal.dynamic.filterpass import Progress, run_pass
+from triaxcal.dynamic.layout import Layout
+from triaxcal.dynamic.passdata import Reference, Task
+from triaxcal.dynamic.wander import wander_of
+from triaxcal.evidence.case import Case
+from triaxcal.evidence.prediction import Predicted, StretchWatch
+from triaxcal.evidence.stretches import EVERY, stretches_of, without
+from triaxcal.model.types import FloatArray
+
+SPARSER = (EVERY, 2 * EVERY + 1, 4 * EVERY + 3)
+"""Every so many rests; the first with which the rest of the recording still determines the
+constants."""
+KEPT_SD = 2.0
+"""It does where no standard deviation of the base model grows by more than this factor."""
+PASSES_MAX = 3
+AGAIN_SD = 5.0
+"""Constants that a part of the recording moves by chance move by less; its square is what one
+linear pass leaves out."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """The solution without the held-out part, and its predictions.
+
+    Attributes
+    ----------
+    every : int
+        Every so many rests are held out.
+    layout : Layout
+    step : array, shape (n,)
+        Constants without the held-out part, less those about which the pass was linear, SI.
+    covariance : array, shape (n, n)
+    stretches : tuple of Predicted
+        About the constants without the held-out part.
+    """
+
+    every: int
+    layout: Layout
+    step: FloatArray
+    covariance: FloatArray
+    stretches: tuple[Predicted, ...]
+
+
+def held_out(case: Case, progress: Progress | None = None) -> HeldOut | None:
+    """Predict a part of the recording from the rest of it.
+
+    None where no part can be spared: the remainder would not determine the constants.
+    """
+    result = case.result
+    for every in SPARSER:
+        found = held_out_every(case, every, progress=progress)
+        if found is None:
+            continue
+        base = len(result.layout)
+        sd = np.sqrt(np.diag(found.covariance)[:base])
+        if (sd <= KEPT_SD * result.sd).all():
+            return found
+    return None
+
+
+def held_out_every(
+    case: Case, every: int, *, layout: Layout | None = None, progress: Progress | None = None
+) -> HeldOut | None:
+    """As `held_out`, with every so many rests held out, however little that leaves.
+
+    `layout` may have further blocks after those of the result; the pass is linear about zero in
+    their states.
+    """
+    recording, noise, result = case.recording, case.noise, case.result
+    layout = layout or result.layout
+    start = extended(result, layout)
+    stretches = stretches_of(result.survey, every)
+    wander = wander_of(layout, noise, result.survey.duration_s)
+    frame = replace(result.frame, layout=wander.layout)
+    found = without(result.survey, stretches)
+    cuts = tuple(stretch.after.start_s for stretch in stretches)
+    for _ in range(PASSES_MAX if layout is result.layout else 1):
+        watch = StretchWatch(stretches, frame, noise, wander, _end_s(result))
+        task = Task(recording, found, frame, noise, wander, cuts, watch)
+        done = run_pass(task, start, first=False, progress=progress)
+        predicted = watch.end()
+        if not predicted:
+            return None
+        step = done.p - start.p
+        sd = np.sqrt((done.root**2).sum(axis=1))
+        if float(np.abs(step / sd).max()) < AGAIN_SD:
+            break
+        start = Reference(done.p, done.stage_p, start.heading_rad)
+    about = tuple(replace(s, y=s.y - s.J @ step) for s in predicted)
+    return HeldOut(every, layout, step, done.root @ done.root.T, about)
+
+
+def _end_s(result: DynamicResult) -> float:
+    windows = result.survey.windows
+    return float(windows.start_s[-1] + windows.duration_s[-1])
+
+
+def extended(result: DynamicResult, layout: Layout) -> Reference:
+    """The result as the reference of a pass with further blocks, whose states are zero."""
+    p = np.concatenate([result.p, np.zeros(len(layout) - len(result.layout))])
+    resets = layout.reset_columns()
+    stage_p = np.zeros((max(1, len(result.survey.stages)), len(resets)))
+    stage_p[:, np.isin(resets, result.layout.reset_columns())] = result.stage_p
+    return Reference(p, stage_p, result.heading_rad)

@@ -1,0 +1,84 @@
+"""Which rests and turns of a recording are held out.
+
+A stretch is a turn, the rest after it, and the next turn: from the end of one rest to the start of
+the next but one. Every `EVERY`-th rest is the middle of one. The choice looks at no measured value
+but where the unit rests, so that it cannot favour a result.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from triaxcal.dynamic.survey import Survey
+from triaxcal.model.types import BoolArray, FloatArray
+
+EVERY = 5
+"""A stretch holds two turns: two fifths of the turns and a fifth of the rests are held out."""
+REST_MIN_S = 0.8
+"""A shorter rest gives no direction: the unit may still swing."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Consecutive windows at rest: from `start_s` to `end_s`."""
+
+    start_s: float
+    end_s: float
+
+    def holds(self, time_s: FloatArray) -> BoolArray:
+        """Whether times lie in it."""
+        return (time_s >= self.start_s) & (time_s <= self.end_s)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Three rests that follow each other; the middle one and both turns are held out."""
+
+    before: Rest
+    middle: Rest
+    after: Rest
+
+    @property
+    def rests(self) -> tuple[Rest, Rest, Rest]:
+        """In their order."""
+        return self.before, self.middle, self.after
+
+
+def rests_of(found: Survey) -> tuple[tuple[Rest, ...], ...]:
+    """Rests of each section without a gap that last `REST_MIN_S` and are used."""
+    windows, marked = found.windows, found.still & found.use
+    sections = []
+    for number in range(len(found.sections)):
+        inside = np.flatnonzero(windows.section == number)
+        runs = np.split(inside, np.flatnonzero(np.diff(marked[inside].astype(int))) + 1)
+        rests = []
+        for run in runs:
+            if len(run) and marked[run[0]]:
+                end_s = float(windows.start_s[run[-1]] + windows.duration_s[run[-1]])
+                rests.append(Rest(float(windows.start_s[run[0]]), end_s))
+        sections.append(tuple(r for r in rests if r.end_s - r.start_s >= REST_MIN_S))
+    return tuple(sections)
+
+
+def stretches_of(found: Survey, every: int = EVERY) -> tuple[Stretch, ...]:
+    """Stretches about every `every`-th rest of a recording, counted through its sections."""
+    chosen = []
+    number = every // 2
+    for rests in rests_of(found):
+        for before, middle, after in zip(rests, rests[1:], rests[2:], strict=False):
+            number += 1
+            if number % every == 0:
+                chosen.append(Stretch(before, middle, after))
+    return tuple(chosen)
+
+
+def without(found: Survey, stretches: tuple[Stretch, ...]) -> Survey:
+    """The survey with nothing measured in the stretches."""
+    start = found.windows.start_s
+    end = start + found.windows.duration_s
+    use = found.use.copy()
+    for stretch in stretches:
+        use &= ~((end > stretch.before.end_s) & (start < stretch.after.start_s))
+    return replace(found, use=use)

@@ -1,0 +1,285 @@
+"""Causes other than effects that are off: what is tried, and how.
+
+A new one is a class with `name` and `of`, and its line in `TRIALS`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.dynamic.blocks import north
+from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.calibrate import calibrate_dynamic
+from triaxcal.dynamic.filterpass import run_pass
+from triaxcal.dynamic.noise import DataSheet
+from triaxcal.dynamic.passdata import Task
+from triaxcal.dynamic.recording import ImuSamples
+from triaxcal.dynamic.survey import Survey
+from triaxcal.dynamic.wander import wander_of
+from triaxcal.dynamic.windows import WINDOW_S
+from triaxcal.evidence.case import Case
+from triaxcal.evidence.heldout import HeldOut, extended, held_out_every
+from triaxcal.evidence.stretches import rests_of
+from triaxcal.model.types import BoolArray, FloatArray
+
+NOISIER = 1.1
+"""Times the stated noise, at rest: noise figures are stated to about 5 %."""
+MEDIAN = 0.4549
+"""Of chi-square with one degree of freedom: where a rest begins or ends takes no part in it."""
+UNEVEN = 1e-3
+"""Of an interval: stamps that scatter by less are printed so."""
+CLIPPED_SAMPLES = 3
+"""A noisy gyro reads its largest value once, or by rounding twice; a clipped one more often."""
+JUMP_SD = 6.0
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A cause as if it were allowed for.
+
+    Attributes
+    ----------
+    words, remedy : str
+    innovations : tuple of float and int
+        Their chi-square and its degrees of freedom.
+    held : HeldOut or None
+        Held-out rests and turns.
+    direct : bool
+        Whether the recording shows the cause itself, and the trial leaves a part of it out or
+        changes its noise: its chi-square is none of the same data.
+    """
+
+    words: str
+    remedy: str
+    innovations: tuple[float, int]
+    held: HeldOut | None
+    direct: bool = False
+
+
+class Trial(Protocol):
+    """One cause."""
+
+    name: str
+
+    def of(self, case: Case, held: HeldOut | None, /) -> Suspect | None:
+        """The cause allowed for; None where nothing of the recording speaks for it."""
+
+
+def _again(words: str, remedy: str, case: Case, held: HeldOut | None) -> Suspect:
+    """One more pass about the result, and one without the held-out part."""
+    out = None if held is None else held_out_every(case, held.every)
+    return Suspect(words, remedy, _innovations(case), out)
+
+
+def _innovations(
+    case: Case, found: Survey | None = None, cuts_s: tuple[float, ...] = ()
+) -> tuple[float, int]:
+    """Chi-square and degrees of freedom of one more pass about the result."""
+    result = case.result
+    wander = wander_of(result.layout, case.noise, result.survey.duration_s)
+    frame = replace(result.frame, layout=wander.layout)
+    task = Task(case.recording, found or result.survey, frame, case.noise, wander, cuts_s)
+    done = run_pass(task, extended(result, result.layout), first=False)
+    return done.chi_square, done.freedom
+
+
+class Noise:
+    """More noise than stated, by the scatter at rest, where no constant matters."""
+
+    name = "noise"
+
+    def of(self, case: Case, held: HeldOut | None, /) -> Suspect | None:
+        """The noise as the rests scatter."""
+        noise = case.noise
+        rate, force = noise_at_rest(case)
+        if max(rate, force) <= NOISIER:
+            return None
+        rate, force = max(rate, 1.0), max(force, 1.0)
+        more = replace(
+            noise,
+            gyro_arw_deg_per_sqrt_h=rate * noise.gyro_arw_deg_per_sqrt_h,
+            accel_vrw_ug_per_sqrt_hz=force * noise.accel_vrw_ug_per_sqrt_hz,
+        )
+        words = (
+            f"more noise than stated: at rest the gyros scatter by {rate:.3g} times what [noise] "
+            f"states, the accelerometers by {force:.3g} times"
+        )
+        remedy = (
+            f"state gyro_arw_deg_per_sqrt_h = {more.gyro_arw_deg_per_sqrt_h:.3g} and "
+            f"accel_vrw_ug_per_sqrt_hz = {more.accel_vrw_ug_per_sqrt_hz:.4g}, or keep the unit "
+            "from shaking"
+        )
+        more_noise = replace(case, noise=more)
+        return replace(_again(words, remedy, more_noise, held), direct=True)
+
+
+def noise_at_rest(case: Case) -> tuple[float, float]:
+    """Scatter of window means at rest over what [noise] states, of gyros and accelerometers.
+
+    By differences of windows that follow each other: slow changes take no part in them.
+    """
+    found, recording, noise = case.result.survey, case.recording, case.noise
+    windows, still = found.windows, found.still & found.use
+    both = still[1:] & still[:-1] & (np.diff(windows.section) == 0)
+    samples = max(1, round(WINDOW_S * recording.rate_hz))
+    duration_s = samples / recording.rate_hz
+    stated = (
+        noise.rate_density**2 / duration_s,
+        noise.mean_force_variance(duration_s, samples, recording.force_convention),
+    )
+    if both.sum() < 10:
+        return 1.0, 1.0
+    rate, force = (
+        math.sqrt(float(np.median(np.diff(values, axis=0)[both] ** 2)) / MEDIAN / 2 / variance)
+        for values, variance in zip((windows.rate, windows.force), stated, strict=True)
+    )
+    return rate, force
+
+
+class Stamps:
+    """Time stamps that scatter about an even sampling."""
+
+    name = "time stamps"
+
+    def of(self, case: Case, held: HeldOut | None, /) -> Suspect | None:
+        """The same samples at even times in each section."""
+        recording = case.recording
+        samples = recording.all()
+        step = np.diff(samples.time_s)
+        interval = 1 / recording.rate_hz
+        inside = step[step < 1.5 * interval]
+        scatter = float(inside.std()) / interval if len(inside) else 0.0
+        if scatter < UNEVEN:
+            return None
+        time_s = samples.time_s.copy()
+        for section in case.result.survey.sections:
+            first, last = section.first, section.last
+            ends = float(time_s[first]), float(time_s[last])
+            time_s[first : last + 1] = np.linspace(*ends, last + 1 - first)
+        even = replace(samples, time_s=time_s)
+        words = f"time stamps that scatter by {scatter:.2g} of an interval: even times fit"
+        remedy = "state rate_hz in place of time_column, or record with the sensor's own clock"
+        changed = replace(case, recording=replace(recording, pieces=lambda: (even,)))
+        return _again(words, remedy, changed, held)
+
+
+class Clipping:
+    """A gyro that reads exactly its largest value again and again."""
+
+    name = "saturation"
+
+    def of(self, case: Case, _held: HeldOut | None, /) -> Suspect | None:
+        """Without the motions in which a gyro is clipped."""
+        samples, survey = case.recording.all(), case.result.survey
+        clipped, words = _clipped(samples, survey)
+        if not words:
+            return None
+        left = _innovations(case, *_without_motions(survey, samples.time_s[clipped]))
+        remedy = "turn more slowly, or set a wider range"
+        return Suspect(words, remedy, left, None, direct=True)
+
+
+def _clipped(samples: ImuSamples, found: Survey) -> tuple[BoolArray, str]:
+    """Samples at which a gyro is clipped, and words for it."""
+    marked, words = np.zeros(len(samples), dtype=bool), []
+    at_rest = np.array([s.rate for s in found.sections]).mean(axis=0)
+    for axis in range(3):
+        rate = samples.rate[:, axis]
+        fastest = np.abs(rate - at_rest[axis]).max()
+        ends = [e for e in (rate.max(), rate.min()) if abs(e - at_rest[axis]) > fastest / 2]
+        own = np.isin(rate, [e for e in ends if (rate == e).sum() >= CLIPPED_SAMPLES])
+        if own.any():
+            marked |= own
+            words.append(f"gyro {'xyz'[axis]} reads exactly its largest value {own.sum()} times")
+    return marked, f"saturation: {', '.join(words)}" if words else ""
+
+
+def _without_motions(found: Survey, times_s: FloatArray) -> tuple[Survey, tuple[float, ...]]:
+    """Nothing measured, and the attitude forgotten, in the motions that hold the times."""
+    start = found.windows.start_s
+    use, cuts = found.use.copy(), []
+    for rests in rests_of(found):
+        for before, after in pairwise(rests):
+            if ((times_s > before.end_s) & (times_s < after.start_s)).any():
+                use &= ~((start > before.end_s - WINDOW_S) & (start < after.start_s))
+                cuts.append(after.start_s)
+    return replace(found, use=use), tuple(cuts)
+
+
+class Change:
+    """Constants that change at one moment: two units, a restart, another mounting of a sensor."""
+
+    name = "a change of the constants"
+
+    def of(self, case: Case, _held: HeldOut | None, /) -> Suspect | None:
+        """Both parts as recordings of their own, at the largest jump of the gyros at rest."""
+        recording, result = case.recording, case.result
+        at_s, jump = largest_jump(result.survey, case.noise)
+        if at_s is None:
+            return None
+        samples = recording.all()
+        cut = int((samples.time_s < at_s).sum())
+        blocks = tuple(b for b in result.layout.blocks if b not in (*BASE, north.BLOCK))
+        value, freedom = 0.0, 0
+        degc = result.frame.reference_degc
+        try:
+            for own in (samples[:cut], samples[cut:]):
+                part = replace(recording, pieces=partial(_one, own))
+                done = calibrate_dynamic(part, case.noise, blocks, reference_degc=degc)
+                value += done.passes[-1].chi_square
+                freedom += done.passes[-1].freedom
+        except RefusedError:
+            return None
+        words = (
+            f"constants that change at {at_s:.1f} s, where the gyros at rest jump by "
+            f"{np.degrees(np.abs(jump).max()):.3g} deg/s: two units, a restart or another "
+            "temperature"
+        )
+        return Suspect(
+            words, "calibrate both parts each for itself", (value, freedom), None, direct=True
+        )
+
+
+def _one(samples: ImuSamples) -> tuple[ImuSamples, ...]:
+    return (samples,)
+
+
+def largest_jump(found: Survey, noise: DataSheet) -> tuple[float | None, FloatArray]:
+    """Time at which the gyros' means at rest change most, and the change (3,), rad/s.
+
+    None where they change by less than `JUMP_SD` of their noise.
+    """
+    windows = found.windows
+    rests = [r for rests in rests_of(found) for r in rests]
+    means, variances = [], []
+    for rest in rests:
+        inside = (windows.start_s >= rest.start_s) & (windows.start_s < rest.end_s)
+        means.append(windows.rate[inside].mean(axis=0))
+        variances.append(noise.rate_density**2 / (rest.end_s - rest.start_s))
+    mean, weight = np.array(means), 1 / np.array(variances)[:, None]
+    best, at_s, jump = JUMP_SD**2, None, np.zeros(3)
+    for k in range(2, len(rests) - 1):
+        (a, of_a), (b, of_b) = (
+            _weighted(mean[p], weight[p]) for p in (slice(0, k), slice(k, None))
+        )
+        size = float(((b - a) ** 2).sum() / (of_a + of_b))
+        if size > best:
+            best, at_s, jump = size, rests[k].start_s, b - a
+    return at_s, jump
+
+
+def _weighted(values: FloatArray, weight: FloatArray) -> tuple[FloatArray, float]:
+    """Weighted mean over the first axis, and its variance."""
+    total = float(weight.sum())
+    mean: FloatArray = (values * weight).sum(axis=0) / total
+    return mean, 1 / total
+
+
+TRIALS: tuple[Trial, ...] = (Noise(), Stamps(), Clipping(), Change())
