@@ -151,7 +151,8 @@ def test_the_description_that_was_read_is_fitted(tmp_path: Path) -> None:
     """Not the one that lies in the folder by now."""
     imu = triaxcal.read_imu(SIM)
     absent = tmp_path / "absent.csv"
-    changed = triaxcal.Imu(replace(imu.description, recording=absent), SIM)
+    recordings = (replace(imu.description.recordings[0], file=str(absent)),)
+    changed = triaxcal.Imu(replace(imu.description, recordings=recordings), SIM)
     for fit in (triaxcal.fit_imu, lambda i: deliver_described(i.description)):
         with pytest.raises(triaxcal.RefusedError, match=r"absent\.csv"):
             fit(changed)

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from triaxcal.api.unit import Unit, read_unit
     from triaxcal.api.verification import Verification, certify, verify_unit
     from triaxcal.base.errors import RefusedError, UsageError
+    from triaxcal.delivery.imuverdict import ImuVerdict
     from triaxcal.delivery.verdict import LimitCheck, Verdict
     from triaxcal.report.dcc.signed import Signature
     from triaxcal.report.installation import Installation, InstalledPart
@@ -70,9 +71,9 @@ __version__ = "0.2.0.dev0"
 __all__ = [
     "Budget", "Calibration", "CalibrationImage", "CompiledFirmware", "Delivered", "Diagnosis",
     "ExampleUnit", "ExportedFiles", "FieldCheck", "FieldUpdate", "Firmware", "Imu",
-    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "Installation", "InstalledPart",
-    "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "ReportedTests", "SeriesResult",
-    "Signature", "Study", "TableGrid", "Unit", "UsageError", "Verdict", "Verification",
+    "ImuCalibration", "ImuConstants", "ImuFirmware", "ImuState", "ImuVerdict",
+    "Installation", "InstalledPart", "LimitCheck", "LivePair", "MeasurementPlan", "RefusedError", "ReportedTests",
+    "SeriesResult", "Signature", "Study", "TableGrid", "Unit", "UsageError", "Verdict", "Verification",
     "__version__", "calibrate_series", "certify", "check_certificate", "compare_history",
     "copy_example", "cross_coupling", "deliver", "delivered_firmware", "diagnose", "examples",
     "export", "find_poses", "firmware", "firmware_imu", "fit", "fit_imu", "installation",
@@ -113,6 +114,7 @@ _MODULES = {
     "triaxcal.api.unit": ("Unit", "read_unit"),
     "triaxcal.api.verification": ("Verification", "certify", "verify_unit"),
     "triaxcal.base.errors": ("RefusedError", "UsageError"),
+    "triaxcal.delivery.imuverdict": ("ImuVerdict",),
     "triaxcal.delivery.verdict": ("LimitCheck", "Verdict"),
     "triaxcal.report.dcc.signed": ("Signature",),
     "triaxcal.uncertainty.budget": ("Budget",),

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from triaxcal.delivery.imu import ImuDelivery, deliver_imu
-from triaxcal.delivery.verdict import NOT_SHOWN, PASSED
-from triaxcal.dynamic.consistency import consistent, verdict
 from triaxcal.report.dynamic import dynamic_files
 
 IMU = "IMU"
@@ -29,7 +27,7 @@ def imu_files_and_record(folder: Path) -> tuple[dict[str, bytes], dict[str, Any]
 def imu_record(made: ImuDelivery) -> dict[str, Any]:
     """What the series needs of one IMU; plain JSON."""
     unit, result = made.done.unit, made.done.result
-    outcome, words = _verdict(made)
+    verdict = made.verdict
     last = result.passes[-1]
     return {
         "unit": unit.name,
@@ -37,8 +35,8 @@ def imu_record(made: ImuDelivery) -> dict[str, Any]:
         "kind": IMU,
         "rig": unit.measured.rig,
         "date": unit.measured.date.isoformat() if unit.measured.date else None,
-        "result": outcome,
-        "verdict": words,
+        "result": verdict.result,
+        "verdict": verdict.words,
         "reference_degc": unit.reference_degc,
         "range_degc": made.done.range_degc and list(made.done.range_degc),
         "blocks": list(unit.blocks),
@@ -56,14 +54,3 @@ def imu_record(made: ImuDelivery) -> dict[str, Any]:
             for i, state in enumerate(block.states, result.layout.place(block.name).start)
         ],
     }
-
-
-def _verdict(made: ImuDelivery) -> tuple[str, str]:
-    """Result, and why in words."""
-    done = made.done
-    shown = [effect.name for effect in done.off if effect.shown]
-    if not consistent(done.result):
-        return NOT_SHOWN, verdict(done.result)
-    if shown:
-        return NOT_SHOWN, f"significant and switched off: {', '.join(shown)}"
-    return PASSED, verdict(done.result)
