@@ -1,23 +1,19 @@
-"""[dynamic] of unit.toml: the recording of an IMU, and its columns in SI units."""
+"""[dynamic] of unit.toml: the recording of an IMU, and its columns."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import TableKeys, Values, setting
 from triaxcal.base.kinds import TEXT, Kind, listed, number, word
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
-from triaxcal.dynamic.noise import MICRO_G
-from triaxcal.dynamic.recording import CONVENTIONS, INCREMENT
+from triaxcal.dynamic.recording import CONVENTIONS
+from triaxcal.dynamic.scales import ANGLE_UNITS, FORCE_UNITS, RATE_UNITS, UPWARD, VELOCITY_UNITS
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
-from triaxcal.readings.table import Quantity, signed
-from triaxcal.readings.units import to_degc
 from triaxcal.unit.recordingfile import (
     COLUMN,
+    FILE,
     SIGNED_COLUMNS,
     STAMPS,
     TEMPERATURE_UNITS,
@@ -26,11 +22,6 @@ from triaxcal.unit.recordingfile import (
     SignedColumn,
     WrittenFile,
 )
-
-_RATE_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180, "deg/h": math.pi / 648000}
-_ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "arcsec": math.pi / 648000}
-_FORCE_UNITS = {"m/s^2": 1.0, "g": 1e6 * MICRO_G, "mg": 1e3 * MICRO_G}
-_VELOCITY_UNITS = {"m/s": 1.0, "mm/s": 1e-3}
 
 
 @dataclass(frozen=True)
@@ -114,7 +105,11 @@ class DynamicTable(WrittenFile, _Recorded):
     rate_columns
         Gyros x, y, z; "-gy" turns a sign.
     rate_unit
-        Unit of the gyros: of instants the first three, of increments the others.
+        Unit of the gyros: of instants the first four, of increments the others. "count" are raw
+        counts of the nominal size `rate_counts_per_deg_per_s`; counts about half of their range
+        are taken from there.
+    rate_counts_per_deg_per_s
+        Nominal size of "count": the data sheet's sensitivity.
     rate_samples
         What a reading is: of the instant of its stamp, or over the interval that ends there.
     rate_max
@@ -122,10 +117,18 @@ class DynamicTable(WrittenFile, _Recorded):
     force_columns
         Accelerometers x, y, z, on the axes of the gyros.
     force_unit
-        Unit of the accelerometers (g of 9.80665 m/s^2): of instants the first three, of
-        increments the others.
+        Unit of the accelerometers (g of 9.80665 m/s^2): of instants the first four, of
+        increments the others. "count" as of the gyros.
+    force_counts_per_g
+        Nominal size of "count".
     force_samples
         As `rate_samples`.
+    force_recording
+        File of the accelerometers, where they have one of their own.
+    force_time_column
+        Time of the accelerometers, where they have a column of their own.
+    up_at_start
+        Axis that points up at the first rest, as "+z": forces of reversed sign are turned.
     force2_columns
         A second accelerometer triad, in the same unit.
     temp_column
@@ -144,12 +147,17 @@ class DynamicTable(WrittenFile, _Recorded):
     time_unit: tuple[str, ...] = setting(STAMPS, ("s",), words='`"s"`', example='"s"')
     rate_hz: float | None = setting(number(1.0, 1e5), None, "Hz", example="200")
     rate_columns: tuple[SignedColumn, ...] = setting(SIGNED_COLUMNS, example='["gx", "gy", "gz"]')
-    rate_unit: str = setting(word((*_RATE_UNITS, *_ANGLE_UNITS)), example='"deg/s"')
+    rate_unit: str = setting(word((*RATE_UNITS, *ANGLE_UNITS)), example='"deg/s"')
+    rate_counts_per_deg_per_s: float | None = setting(number(1e-6, 1e9), None, example="131")
     rate_samples: str = setting(word(CONVENTIONS), example='"instant"')
     rate_max: float | None = setting(number(1e-3, 1e5), None, "deg/s", example="300")
     force_columns: tuple[SignedColumn, ...] = setting(SIGNED_COLUMNS, example='["ax", "ay", "az"]')
-    force_unit: str = setting(word((*_FORCE_UNITS, *_VELOCITY_UNITS)), example='"m/s^2"')
+    force_unit: str = setting(word((*FORCE_UNITS, *VELOCITY_UNITS)), example='"m/s^2"')
+    force_counts_per_g: float | None = setting(number(1e-6, 1e9), None, example="16384")
     force_samples: str = setting(word(CONVENTIONS), example='"instant"')
+    force_recording: str | None = setting(FILE, None, words="`recording`", example='"acc.csv"')
+    force_time_column: tuple[Column, ...] = setting(TIMES, (), words="`time_column`")
+    up_at_start: str | None = setting(word(UPWARD), None, words="not checked", example='"+z"')
     force2_columns: tuple[SignedColumn, ...] | None = setting(SIGNED_COLUMNS, None)
     temp_column: Column | None = setting(COLUMN, None)
     temperature_unit: str = setting(word(TEMPERATURE_UNITS[:3]), TEMPERATURE_UNITS[0])
@@ -167,35 +175,6 @@ def dynamic_table() -> TableKeys:
         word(names), range(100), f"names out of {', '.join(names)}, each once", different=True
     )
     return TableKeys.of(DynamicTable).but(blocks={"kind": blocks, "doc": EXTENSIONS.explained})
-
-
-def quantities_of(values: Values, found: DynamicTable) -> tuple[Quantity, ...]:
-    """Columns by the names of `ImuSamples`, and their conversion to SI units.
-
-    Raises
-    ------
-    RefusedError
-        For a unit of increments where instants are read, and the other way round.
-    """
-    rate_units = _ANGLE_UNITS if found.rate_samples == INCREMENT else _RATE_UNITS
-    force_units = _VELOCITY_UNITS if found.force_samples == INCREMENT else _FORCE_UNITS
-    for name, units in (("rate_unit", rate_units), ("force_unit", force_units)):
-        if values.given[name] not in units:
-            raise values.refuse(name, word(tuple(units)).expected)
-    force_scale = force_units[found.force_unit]
-    quantities = [
-        signed("rate", "rate_columns", found.rate_columns, rate_units[found.rate_unit]),
-        signed("force", "force_columns", found.force_columns, force_scale),
-    ]
-    if found.force2_columns is not None:
-        quantities.append(signed("force2", "force2_columns", found.force2_columns, force_scale))
-    if found.temp_column is not None:
-        degc = to_degc(found.temperature_unit)
-        quantities.append(Quantity("temp_degc", "temp_column", (found.temp_column,), degc))
-    if found.table_angle_column is not None:
-        column = (found.table_angle_column,)
-        quantities.append(Quantity("table_angle_rad", "table_angle_column", column, np.radians))
-    return tuple(replace(quantity, apart=True) for quantity in quantities)
 
 
 def refuse_two_temperatures(values: Values, found: DynamicTable) -> None:
@@ -218,13 +197,6 @@ def refuse_two_temperatures(values: Values, found: DynamicTable) -> None:
             f"temp_degc of {sum(stated)} of {len(stated)} recordings",
             expected="temp_degc of each recording, or of none",
         )
-
-
-def names_of(found: DynamicTable) -> list[Column]:
-    """Columns, single or in triads."""
-    triads = (*found.rate_columns, *found.force_columns, *(found.force2_columns or ()))
-    single = (found.temp_column, found.table_angle_column)
-    return [*found.time_column, *(c.column for c in triads), *(c for c in single if c is not None)]
 
 
 _COLUMN_OF = {

@@ -19,13 +19,12 @@ from triaxcal.dynamic.columns import (
     RecordedFile,
     blocks_of,
     dynamic_table,
-    names_of,
-    quantities_of,
     refuse_two_temperatures,
 )
 from triaxcal.dynamic.device import DEVICE, Device, device_of
 from triaxcal.dynamic.limits import IMU_LIMITS, ImuLimits
 from triaxcal.dynamic.noise import DataSheet
+from triaxcal.dynamic.quantities import ForcesApart, forces_apart, names_of, quantities_of
 from triaxcal.dynamic.recording import Turntable
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.table import Quantity
@@ -59,6 +58,10 @@ class DynamicDescription:
         When and where the recording was made.
     limits : ImuLimits
         What is demanded of the constants.
+    forces : ForcesApart or None
+        Where the accelerometers have a file or times of their own.
+    up_at_start : str or None
+        Axis that points up at the first rest, as "+z".
     """
 
     name: str
@@ -80,6 +83,8 @@ class DynamicDescription:
     device: Device | None = None
     measured: Measured = field(default_factory=Measured)
     limits: ImuLimits = field(default_factory=ImuLimits)
+    forces: ForcesApart | None = None
+    up_at_start: str | None = None
 
     @property
     def recording(self) -> Path:
@@ -94,7 +99,9 @@ class DynamicDescription:
     @property
     def inputs(self) -> tuple[Path, ...]:
         """Files that the result is made of: unit.toml, recordings, description of their bus."""
-        recordings = (recorded.file for recorded in self.recordings)
+        recordings = [recorded.file for recorded in self.recordings]
+        if self.forces is not None and self.forces.file is not None:
+            recordings.append(self.forces.file)
         bus = (name for name in (self.file.dbc, self.file.rig) if name is not None)
         return self.path, *(self.path.parent / name for name in (*recordings, *bus))
 
@@ -192,6 +199,15 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         raise RefusedError(where, "both given", expected=expected)
     check_units(dynamic, found.time_column, found.time_unit)
     refuse_two_temperatures(dynamic, found)
+    clock = ClockLayout(
+        found.time_column, found.time_unit, found.rate_hz, from_first=False, absent=absent
+    )
+    if found.force_recording is not None and len(found.recording) > 1:
+        raise RefusedError(
+            dynamic.where("force_recording"),
+            f"one file of the accelerometers, and {len(found.recording)} recordings",
+            expected="one recording, or both triads in each file",
+        )
     return DynamicDescription(
         name=folder.absolute().name,
         serial=tables[""][SERIAL],
@@ -200,9 +216,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         latitude_deg=site.latitude_deg,
         gravity_m_per_s2=site.local_gravity_m_per_s2,
         file=found.layout("dynamic", names_of(found)),
-        clock=ClockLayout(
-            found.time_column, found.time_unit, found.rate_hz, from_first=False, absent=absent
-        ),
+        clock=clock,
         quantities=quantities_of(dynamic, found),
         rate_max=None if found.rate_max is None else math.radians(found.rate_max),
         rate_convention=found.rate_samples,
@@ -214,6 +228,8 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         device=device_of(tables["device"]),
         measured=tables["measured"].record(Measured),
         limits=tables["limits"].record(ImuLimits),
+        forces=forces_apart(found, clock),
+        up_at_start=found.up_at_start,
     )
 
 

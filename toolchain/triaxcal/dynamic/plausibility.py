@@ -40,14 +40,18 @@ def refuse_wrong_units(recording: ImuRecording, windows: Windows) -> None:
     """
     start = windows.start_s < windows.start_s[0] + START_S
     _refuse_force(recording, windows.force[start].mean(axis=0))
-    _refuse_rate(recording.name, windows, np.median(windows.rate[start], axis=0))
+    _refuse_rate(recording, windows, np.median(windows.rate[start], axis=0))
 
 
 def _refuse_force(recording: ImuRecording, force: FloatArray) -> None:
     g = recording.gravity_m_per_s2
     size = float(np.linalg.norm(force))
     if abs(size / g - 1) > GRAVITY_TOLERANCE:
-        hints = {9.80665: " (g taken for m/s^2?)", 1 / 9.80665: " (m/s^2 taken for g?)"}
+        hints = {
+            9.80665: " (g taken for m/s^2?)",
+            1 / 9.80665: " (m/s^2 taken for g?)",
+            **_other_samples(recording.rate_hz),
+        }
         hint = next((h for k, h in hints.items() if abs(size * k / g - 1) < 0.2), "")
         raise RefusedError(
             recording.name,
@@ -95,7 +99,16 @@ def _refuse_gyros_that_miss_the_turn(name: str, windows: Windows, turned: FloatA
         )
 
 
-def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
+def _other_samples(rate_hz: float) -> dict[float, str]:
+    """Hints by the factor that is missing, where a log mixes samples and increments."""
+    return {
+        rate_hz: " (increments taken for instants?)",
+        1 / rate_hz: " (instants taken for increments?)",
+    }
+
+
+def _refuse_rate(recording: ImuRecording, windows: Windows, bias: FloatArray) -> None:
+    name = recording.name
     matrix, turned = rate_matrix(windows, bias)
     if turned.max() < LEAST_TURN_RAD:
         _refuse_gyros_that_miss_the_turn(name, windows, turned)
@@ -126,8 +139,12 @@ def _refuse_rate(name: str, windows: Windows, bias: FloatArray) -> None:
             math.pi / 180: " (degrees taken for radians?)",
             180 / math.pi: " (radians taken for degrees?)",
             1e-3: " (milliseconds taken for seconds?)",
+            1e-6: " (microseconds taken for seconds?)",
+            1e3: " (seconds taken for milliseconds?)",
+            **_other_samples(recording.rate_hz),
         }
-        hint = next((h for k, h in hints.items() if abs(math.log(size / k)) < 0.5), "")
+        nearest = min(hints, key=lambda k: abs(math.log(size / k)))
+        hint = hints[nearest] if abs(math.log(size / nearest)) < 0.5 else ""
         raise RefusedError(
             name,
             f"gravity turns in the unit {size:.3g} times as fast as the gyros measure{hint}",

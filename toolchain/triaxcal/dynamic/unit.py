@@ -13,6 +13,7 @@ from triaxcal.dynamic.observability import Observability, observability
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.several import read_recordings
 from triaxcal.dynamic.temperatures import recorded_temperatures, refuse_beyond
+from triaxcal.dynamic.upright import upright
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
         range is beyond the temperatures that were recorded.
     """
     report = progress or (lambda _step, _part: None)
-    recording = read_recordings(unit)
+    unit, recording = upright(unit, read_recordings(unit))
     temperatures = recorded_temperatures(recording)
     unknown = refuse_beyond(unit, temperatures)
     result = calibrate_dynamic(

@@ -157,7 +157,8 @@ def read_table(
         kept = order.kept(rows, last=not len(rows)) if ordered else rows
         if len(kept):
             spool.append(kept)
-            low, high = np.minimum(low, kept.min(axis=0)), np.maximum(high, kept.max(axis=0))
+            low = np.fmin(low, np.fmin.reduce(kept, axis=0))
+            high = np.fmax(high, np.fmax.reduce(kept, axis=0))
     findings = (*file.source.findings, *reading.findings(), *order.findings())
     if not len(spool):
         raise RefusedError(str(path), "no row has all readings", expected="rows of numbers")
