@@ -94,16 +94,13 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
 {
     const int64_t sum_x = times(state->row[0][0], ux) + times(state->row[0][1], uy) +
             times(state->row[0][2], uz);
+    accel[0] = asr32_3(high_word(sum_x) + state->row[0][3]);
     const int64_t sum_y = times(state->row[1][0], ux) + times(state->row[1][1], uy) +
             times(state->row[1][2], uz);
+    accel[1] = asr32_3(high_word(sum_y) + state->row[1][3]);
     const int64_t sum_z = times(state->row[2][0], ux) + times(state->row[2][1], uy) +
             times(state->row[2][2], uz);
-    const int32_t x = asr32_3(high_word(sum_x) + state->row[0][3]);
-    const int32_t y = asr32_3(high_word(sum_y) + state->row[1][3]);
-    const int32_t z = asr32_3(high_word(sum_z) + state->row[2][3]);
-    accel[0] = x;
-    accel[1] = y;
-    accel[2] = z;
+    accel[2] = asr32_3(high_word(sum_z) + state->row[2][3]);
 }
 
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3])

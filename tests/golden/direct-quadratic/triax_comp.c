@@ -162,8 +162,8 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
     int32_t uz = raw_code[2];
 
     /* The range is 2^n codes: one test sees a code outside it on any axis. */
-    if (((((uint32_t)ux - (uint32_t)TRIAX_RAW_MIN) | ((uint32_t)uy - (uint32_t)TRIAX_RAW_MIN)) |
-         ((uint32_t)uz - (uint32_t)TRIAX_RAW_MIN)) > 16777215u) {
+    if ((((((uint32_t)ux - (uint32_t)TRIAX_RAW_MIN) | ((uint32_t)uy - (uint32_t)TRIAX_RAW_MIN)) |
+          ((uint32_t)uz - (uint32_t)TRIAX_RAW_MIN)) >> 24u) != 0u) {
         ux = clamp_raw(ux);
         uy = clamp_raw(uy);
         uz = clamp_raw(uz);
