@@ -17,7 +17,7 @@ from triaxcal.dynamic.repair import repaired
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.evenclock import step_of
 from triaxcal.readings.format import PIECE
-from triaxcal.readings.held import HELD_MIN
+from triaxcal.readings.held import stuck
 from triaxcal.readings.opened import RecordingFile
 from triaxcal.readings.table import TIME, Quantity, ReadTable, read_table
 from triaxcal.unit.recordingfile import ClockLayout, FileLayout
@@ -141,17 +141,16 @@ def even_step(table: ReadTable) -> float | None:
     """
     time_s = table.spool.rows(0, PIECE)[:, 0]
     step_s = float(np.median(np.diff(time_s)))
-    last_s, repeats, rows = float(time_s[0]) - step_s, np.zeros(len(table.columns)), 0
+    last_s = float(time_s[0]) - step_s
     triads = [part for part in table.columns.values() if part.stop - part.start == len("xyz")]
     for _, piece in table.spool.pieces():
         step = np.diff(piece[:, 0], prepend=last_s)
         last_s = float(piece[-1, 0])
         if np.abs(step - step_s).max() > UNEVEN * step_s or not np.isfinite(piece).all():
             return None
-        rows += len(piece)
-        for k, part in enumerate(triads):
-            repeats[k] += (piece[1:, part] == piece[:-1, part]).all(axis=1).sum()
-    return None if (repeats > HELD_MIN * rows).any() else step_s
+        if any(stuck(piece[:, part]).any() for part in triads):
+            return None
+    return step_s
 
 
 def _log_of(

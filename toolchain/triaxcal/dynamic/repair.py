@@ -18,7 +18,7 @@ from triaxcal.dynamic.recording import ImuSamples
 from triaxcal.dynamic.series import at_times, held_series, series_of
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 from triaxcal.readings.evenclock import EvenClock, taken_at_stamps
-from triaxcal.readings.held import changed, held_share
+from triaxcal.readings.held import changed, held_share, stuck
 from triaxcal.readings.sequence import sequence
 
 TOGETHER = 0.75
@@ -175,6 +175,13 @@ def _unheld(
     shares = {name: held_share(values[:, place]) for name, place in places.items()}
     if log.increments or not any(shares.values()):
         known = np.ones(len(values), dtype=bool)
+        if not log.increments:
+            known = ~np.logical_or.reduce([stuck(values[:, place]) for place in places.values()])
+        if not known.all():
+            words.append(
+                f"{rows_told(int((~known).sum()))} with the readings of the row before while the "
+                "unit moves: taken as lost"
+            )
         return [Part(places, series_of(clock, values, known, _turns(places)))]
     whole = {name: place for name, place in places.items() if shares[name]}
     if len(whole) > 1 and _change_together([changed(values[:, p]) for p in whole.values()]):

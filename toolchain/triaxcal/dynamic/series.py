@@ -125,7 +125,10 @@ def held_series(time_s: FloatArray, values: FloatArray, step_s: float, turns: sl
     tell = spans[in_motion[:-1] & in_motion[1:]]
     clock = even_clock(time_s[new], float(tell[tell < 3 * np.median(tell)].mean()))
     late = time_s[new] - clock.time_s
-    early_s = float(np.quantile(late, 0.02)) if clock.smoothed else 0.0
+    # Late by anything up to a row: the middle two thirds are 0.68 of it, and the clock is in its
+    # middle.
+    low, high = np.quantile(late, [0.16, 0.84])
+    early_s = -float(high - low) / 1.36 if clock.smoothed else 0.0
     every = np.arange(clock.number[-1] + 1)
     at = np.interp(every, clock.number, clock.time_s) + early_s
     row = np.searchsorted(time_s, at - 0.01 * step_s)

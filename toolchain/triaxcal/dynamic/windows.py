@@ -13,7 +13,7 @@ from triaxcal.dynamic.recording import INCREMENT, ImuRecording
 from triaxcal.model.types import FloatArray, IntArray
 
 WINDOW_S = 0.1
-GAP_INTERVALS = 1.5
+GAP_INTERVALS = 1.75
 """A step of time longer than so many intervals is a gap."""
 SATURATED_S = 0.25
 """A gyro that stays exactly at its largest value for so long has met its full scale."""

@@ -40,6 +40,11 @@ _EXACT_S = 1e-9
 """Stamps have no more digits."""
 _FAR = 4.0
 """Stamps that are later by so many deviations do not count."""
+_RESTART = 0.05
+"""Of a step: a clock that is off by less may as well drift."""
+_SURELY = 10.0
+"""Deviations of a median of `_REACH` stamps that are no chance in millions of rows."""
+_RESTARTS_MAX = 0.05
 _LOOSE = 4.0
 """Mean square of the bins' means about a curve over that of their noise, where it is enough:
 what is less than two deviations of a bin is not worth more bends."""
@@ -162,7 +167,8 @@ def _smoothed(
     """Times of the even clock, and what the stamps are off, of each part without a long pause."""
     time_s, residual = np.empty(len(stamps_s)), np.empty(len(stamps_s))
     pauses = np.flatnonzero(np.diff(number) * step_s > PAUSE_S) + 1
-    for part in np.split(np.arange(len(stamps_s)), pauses):
+    starts = np.union1d(pauses, _restarts(stamps_s, number, step_s))
+    for part in np.split(np.arange(len(stamps_s)), starts):
         beat = (number[part] - number[part[0]]).astype(np.float64)
         since = stamps_s[part] - stamps_s[part[0]]
         own_s = float(since[-1] / beat[-1]) if beat[-1] >= _SPAN else step_s
@@ -171,6 +177,24 @@ def _smoothed(
         time_s[part] = stamps_s[part[0]] + own_s * beat + drift
         residual[part] = late - drift
     return time_s, residual
+
+
+def _restarts(stamps_s: FloatArray, number: IntArray, step_s: float) -> IntArray:
+    """Rows (m,) from which on the stamps stay off by a part of a step: the clock started anew."""
+    late = stamps_s / step_s - number
+    if len(late) < 4 * _REACH:
+        return np.zeros(0, dtype=np.int64)
+    middle = median_filter(late, 2 * _REACH + 1, mode="nearest")
+    stays = np.zeros(len(late))
+    stays[_REACH + 1 : -_REACH] = middle[2 * _REACH + 1 :] - middle[: -2 * _REACH - 1]
+    low, high = np.quantile(late - middle, [0.16, 0.84])
+    limit = max(_RESTART, _SURELY * (high - low) / 2 / np.sqrt(_REACH))
+    rows = np.flatnonzero(np.abs(stays) > limit)
+    if len(rows) > _RESTARTS_MAX * len(late):
+        return np.zeros(0, dtype=np.int64)  # it drifts all the time
+    step = np.abs(np.diff(late, prepend=late[0]))
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []
+    return np.array([run[int(np.argmax(step[run]))] for run in runs], dtype=np.int64)
 
 
 def _curve(beat: FloatArray, late: FloatArray) -> FloatArray:

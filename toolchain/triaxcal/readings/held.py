@@ -12,7 +12,7 @@ import numpy as np
 from triaxcal.model.types import BoolArray, FloatArray
 
 HELD_MIN = 0.05
-"""Of the rows in motion: fewer repeats are lost samples that the logger filled."""
+"""Of the rows in motion: fewer repeats are samples that were lost, and that the logger filled."""
 _NEAR = 4
 _COUNTS = 25.0
 """Over `2 _NEAR` rows a moving triad changes by so many of its smallest steps: three a row."""
@@ -38,6 +38,12 @@ def moving(values: FloatArray) -> BoolArray:
     way = np.abs(values[2 * _NEAR :] - values[: -2 * _NEAR])
     found[_NEAR:-_NEAR] = (way > _COUNTS * np.array(least)).any(axis=1)
     return found
+
+
+def stuck(values: FloatArray) -> BoolArray:
+    """Rows (n,) in motion whose readings (n, 3) are those of the row before."""
+    repeats = ~changed(values)
+    return repeats & moving(values) if repeats.any() else repeats
 
 
 def held_share(values: FloatArray) -> float:
