@@ -100,6 +100,22 @@ def held_twice(rows: Rows) -> Rows:
     return np.column_stack([time, np.repeat(rows[:, 1:], 2, axis=0)])
 
 
+def stuck(rows: Rows) -> Rows:
+    """Now and then a reading that did not arrive is the last one again."""
+    spoiled = rows.copy()
+    for k in (np.flatnonzero(RNG(9).random(len(rows) - 1) < 0.02) + 1).tolist():
+        spoiled[k, 1:] = spoiled[k - 1, 1:]
+    return spoiled
+
+
+def restarted(rows: Rows) -> Rows:
+    """The logger starts the sensor anew twice: its samples are then 4 ms later than before."""
+    spoiled = rows.copy()
+    for part in (2, 3):
+        spoiled[len(rows) * part // 4 :, 0] += 0.004
+    return spoiled
+
+
 def held_at_250_hz(rows: Rows) -> Rows:
     """The logger asks at times of its own and gets the newest sample."""
     time = np.arange(0.0113, rows[-1, 0], 0.004)

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from dynamic_cases import held, short_motion
 from dynamic_judge import data_sheet, true_constants
 from recordings import FOLDER
-from spoiled_logs import LOST, NOTHING_LOST, RATE_HZ, SLOW_FORCES, Spoil, mended
+from spoiled_logs import LOST, NOTHING_LOST, RATE_HZ, SLOW_FORCES, Spoil, mended, stuck
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.reading import read_recording
@@ -39,17 +39,14 @@ def spoiled(spoil: Spoil) -> DynamicResult:
     truth, recording, _ = whole()
     samples = recording.all()
     found = mended(spoil(np.column_stack([samples.time_s, samples.rate, samples.force])))
-    sheet = data_sheet(truth.noise)
-    # A sample of the slower sensor has the noise of one of the simulated ones.
-    slower = np.sqrt(RATE_HZ / found.force_hz)
-    sheet = replace(sheet, accel_vrw_ug_per_sqrt_hz=sheet.accel_vrw_ug_per_sqrt_hz * slower)
     made = replace(
         recording,
         pieces=lambda: (found.samples,),
         rate_hz=found.rate_hz,
         force_hz=found.force_hz,
+        seen_density=found.seen_density,
     )
-    return calibrate_dynamic(made, sheet)
+    return calibrate_dynamic(made, data_sheet(truth.noise))
 
 
 def nees(result: DynamicResult, true: dict[str, float]) -> float:
@@ -60,7 +57,7 @@ def nees(result: DynamicResult, true: dict[str, float]) -> float:
     return float(error @ np.linalg.solve(result.covariance[np.ix_(known, known)], error))
 
 
-@pytest.mark.parametrize("spoil", [*NOTHING_LOST, *LOST, *SLOW_FORCES])
+@pytest.mark.parametrize("spoil", [*NOTHING_LOST, *LOST, *SLOW_FORCES, stuck])
 def test_errors_are_covered(spoil: Spoil) -> None:
     truth, _, plain = whole()
     result = spoiled(spoil)

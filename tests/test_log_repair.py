@@ -11,10 +11,12 @@ from spoiled_logs import (
     RATE_HZ,
     SLOW_FORCES,
     Spoil,
+    forces_empty,
     holes_of_50_ms,
     jitter,
     log_of,
     mended,
+    restarted,
 )
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.repair import repaired
@@ -122,6 +124,27 @@ def test_a_drifting_rate_is_followed() -> None:
     assert clock.lost == 0
     off = clock.time_s - exact
     assert np.abs(off).max() < 2e-4  # a polynomial of order 5 has some 2.4/sqrt(n/36) at its ends
+
+
+def test_a_clock_that_starts_anew_is_not_smoothed_over() -> None:
+    """Nor is one of samples that are held: 4 ms are 0.1 of a step of the slow accelerometers."""
+    whole = rows()
+    found = mended(restarted(jitter(whole)))
+    at = restarted(whole)[:, 0]
+    off = found.samples.time_s - at
+    # Three lines through 1000 and 2000 stamps of 1 ms: 2/sqrt(n) at their ends; three of them. The
+    # jitter may hide which of some rows is the first of the new clock.
+    assert np.median(np.abs(off)) < 1e-4
+    assert (np.abs(off) > 2e-4).sum() <= 2 * 3
+    assert np.abs(off).max() < 4.5e-3
+
+
+def test_a_sensor_asked_less_often_than_it_samples_is_noisier() -> None:
+    found = mended(forces_empty(rows()))
+    # 0.003 m/s^2 a sample, at 25 Hz; about 1000 samples at rest and in turns say it to 4 %.
+    assert found.seen_density["force"] == pytest.approx(SD_FORCE / 5, rel=0.12)
+    assert "rate" not in found.seen_density
+    assert any("white noise of 6" in finding for finding in found.findings)
 
 
 def test_increments_are_not_made_up() -> None:

@@ -17,6 +17,7 @@ from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.passdata import PassResult, Reference, Task
+from triaxcal.dynamic.polled import at_least_seen
 from triaxcal.dynamic.preintegrate import NODES
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.survey import Survey, survey
@@ -86,6 +87,7 @@ def calibrate_dynamic(
         As `survey`; when the passes do not settle.
     """
     found = survey(recording)
+    noise = at_least_seen(recording, noise)
     wanted = Layout((*BASE, *blocks))
     searching = Layout((*wanted.blocks, north.BLOCK))
     size = _block_size(recording, found)

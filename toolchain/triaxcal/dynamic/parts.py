@@ -45,10 +45,11 @@ class Log:
 
 @dataclass(frozen=True)
 class Part:
-    """Triads of one clock, and their columns in its values."""
+    """Triads of one clock, and their columns in its values; `held` where a log repeats them."""
 
     places: Mapping[str, slice]
     series: Series
+    held: bool = False
 
     @property
     def words(self) -> str:

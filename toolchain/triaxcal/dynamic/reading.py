@@ -79,6 +79,7 @@ def read_recording(unit: DynamicDescription) -> ImuRecording:
         rate_hz=found.rate_hz,
         findings=(*findings, *found.findings),
         force_hz=found.force_hz,
+        seen_density=found.seen_density,
     )
 
 

@@ -13,8 +13,8 @@ Conventions
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -59,10 +59,10 @@ class ImuSamples:
 
     def __post_init__(self) -> None:
         n = len(self.time_s)
-        for field, shape in _SHAPES.items():
-            value = getattr(self, field)
+        for name, shape in _SHAPES.items():
+            value = getattr(self, name)
             if value is not None and value.shape != (n, *shape):
-                raise ValueError(f"{field} has shape {value.shape}, not {(n, *shape)}")
+                raise ValueError(f"{name} has shape {value.shape}, not {(n, *shape)}")
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -152,6 +152,9 @@ class ImuRecording:
         When the second and every further one begins, where it is several recordings.
     force_hz : float or None
         At which the accelerometers were sampled, where that is slower than the samples.
+    seen_density : mapping
+        Random walk of "rate", rad/sqrt(s), and "force", m/s^2 sqrt(s), as the samples show it, of
+        triads that the log has at a lower rate than its rows.
     """
 
     name: str
@@ -165,6 +168,7 @@ class ImuRecording:
     findings: tuple[str, ...] = ()
     starts_s: tuple[float, ...] = ()
     force_hz: float | None = None
+    seen_density: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for convention in (self.rate_convention, self.force_convention):

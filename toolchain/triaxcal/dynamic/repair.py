@@ -14,6 +14,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.parts import NAMES, Log, Part, between, holes_told, rows_told
+from triaxcal.dynamic.polled import told, white_density
 from triaxcal.dynamic.recording import ImuSamples
 from triaxcal.dynamic.series import at_times, held_series, series_of
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
@@ -23,6 +24,8 @@ from triaxcal.readings.sequence import sequence
 
 TOGETHER = 0.75
 """Of the rows of either triad: where more have both, the triads have one clock."""
+SLOWER = 1.2
+"""Of the step of the other triad: a slower one may have been left out in part."""
 ALIKE = 0.9
 """Of the changes of two held triads: where more are in one row, they are sampled together."""
 _LEAST = 3
@@ -40,12 +43,15 @@ class Repaired:
     force_hz : float
         At which the accelerometers were sampled.
     findings : tuple of str
+    seen_density : mapping
+        As of `ImuRecording`.
     """
 
     samples: ImuSamples
     rate_hz: float
     force_hz: float
     findings: tuple[str, ...]
+    seen_density: Mapping[str, float]
 
 
 def repaired(logs: Sequence[Log]) -> Repaired:
@@ -71,7 +77,12 @@ def repaired(logs: Sequence[Log]) -> Repaired:
     columns: dict[str, FloatArray] = {}
     spread: dict[str, FloatArray] = {}
     inside = np.ones(len(time_s), dtype=bool)
+    seen: dict[str, float] = {}
     for part in parts:
+        if part.held or part.series.step_s > SLOWER * step_s:
+            own = {n: white_density(part.series, p) for n, p in part.places.items()}
+            seen |= own
+            findings += [f"{NAMES[n]}: {told(n, density)}" for n, density in own.items()]
         values, variance = part.series.values, part.series.variance
         findings += holes_told(part)
         if part is not base:
@@ -103,7 +114,7 @@ def repaired(logs: Sequence[Log]) -> Repaired:
         whole |= {name: np.ascontiguousarray(values[inside]) for name, values in doubts.items()}
     force_hz = min(1 / part.series.step_s for part in parts if "force" in part.places)
     samples = ImuSamples(time_s=np.ascontiguousarray(time_s[inside]), **whole)
-    return Repaired(samples, 1 / step_s, min(force_hz, 1 / step_s), tuple(findings))
+    return Repaired(samples, 1 / step_s, min(force_hz, 1 / step_s), tuple(findings), seen)
 
 
 def _groups(log: Log) -> list[tuple[str, ...]]:
@@ -194,7 +205,7 @@ def _unheld(
         put = {name: slice(3 * k, 3 * k + 3) for k, name in enumerate(group)}
         if next(iter(group)) in whole:
             series = held_series(clock.time_s, own, clock.step_s, _turns(put))
-            part = Part(put, series)
+            part = Part(put, series, held=True)
             words.append(
                 f"{part.words} repeat their values: sampled at {1 / series.step_s:.5g} Hz in a log "
                 f"of {1 / clock.step_s:.5g} Hz, the repeats are left out"
