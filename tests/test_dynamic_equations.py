@@ -20,7 +20,8 @@ from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuRecording, Turntab
 from triaxcal.dynamic.window import About, Frame, Window
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import GRADES, draw_truth
-from triaxcal.simulation.imu_motion import PRECISE_TABLE, WARMING
+from triaxcal.simulation.imu_motion import PRECISE_TABLE
+from triaxcal.simulation.imu_temperature import WARMING
 from triaxcal.simulation.imu_truth import ImuNoise, ImuTruth
 
 RATE_HZ, BLOCK = 100.0, 20

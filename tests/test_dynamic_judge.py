@@ -16,9 +16,9 @@ from triaxcal.simulation.imu_motion import (
     PRECISE_TABLE,
     ImuMotion,
     RoughTable,
-    TemperatureDrift,
     three_axes,
 )
+from triaxcal.simulation.imu_temperature import TemperatureDrift
 from triaxcal.simulation.imu_truth import ARCSEC, DEG_PER_H, PPM, ImuTruth
 
 CENTRES = ((30.0, -40.0, 50.0), (-20.0, 35.0, 60.0), (45.0, 10.0, -25.0))

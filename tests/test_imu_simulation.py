@@ -20,7 +20,6 @@ from triaxcal.simulation.imu_grades import AVIATION, EFFECTS, GRADES, MEMS, draw
 from triaxcal.simulation.imu_kinematics import EARTH_RATE_RAD_PER_S, BodyMotion, body_motion
 from triaxcal.simulation.imu_motion import (
     PRECISE_TABLE,
-    WARMING,
     ImuMotion,
     Mounting,
     Move,
@@ -28,6 +27,7 @@ from triaxcal.simulation.imu_motion import (
     three_axes,
 )
 from triaxcal.simulation.imu_sensors import Moments, accel_readings, gyro_readings
+from triaxcal.simulation.imu_temperature import WARMING
 from triaxcal.simulation.imu_truth import ARCSEC, DEG_PER_H, ImuNoise, ImuTruth, SecondTriad
 
 ROOM = Path(__file__).parent.parent / "toolchain" / "triaxcal" / "simulation"

@@ -13,7 +13,8 @@ from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.reading import read_recording
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
-from triaxcal.simulation.imu_motion import SWEPT, three_axes
+from triaxcal.simulation.imu_motion import three_axes
+from triaxcal.simulation.imu_temperature import SWEPT
 from triaxcal.simulation.unit import write_simulated_unit
 
 REPO = Path(__file__).parent.parent
@@ -83,7 +84,7 @@ def test_a_wrong_effect_is_refused(unit: Path) -> None:
         "IMU-SIM/imu_truth.toml, [unit] effects: found 'drift' "
         '(did you mean "g-drift"?); expected a list of '
         "names out of g-drift, delay, accel-positions, mount-elasticity, gyro-elasticity, "
-        "second-triad, accel-temperature, gyro-temperature"
+        "second-triad, accel-temperature, gyro-temperature, cubic-temperature"
     )
 
 

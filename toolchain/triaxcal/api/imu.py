@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,11 +18,13 @@ from triaxcal.base.publish import renew
 from triaxcal.delivery.fittedimu import FittedImu, read_saved_for_c
 from triaxcal.delivery.imu import ImuC, ImuDelivery, fit_described, imu_c
 from triaxcal.delivery.imuverdict import UNKNOWN, ImuVerdict
+from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.imumodel import model_of_states
 from triaxcal.dynamic.layout import Layout
+from triaxcal.model.curves import ThermalModel
 from triaxcal.model.methods.imu import ImuModel
 from triaxcal.model.metrological import force_from_voltage, unpack_constants
 from triaxcal.model.types import FloatArray
@@ -132,13 +134,23 @@ class ImuCalibration:
     def layout(self) -> Layout:
         """Blocks of states that were on."""
         blocks = (b for name in self.document["blocks"] for b in EXTENSIONS[name].blocks)
-        return Layout((*BASE, *blocks))
+        searched = self.document.get("heading_rad", ()) is None
+        return Layout((*BASE, *blocks, *((north.BLOCK,) if searched else ())))
 
     @cached_property
     def _model(self) -> ImuModel:
         gravity = float(self.document["local_gravity_m_per_s2"])
         anywhere = (self.reference_degc - 1.0, self.reference_degc + 1.0)
-        return model_of_states(self.layout, self._p, self.reference_degc, gravity, anywhere)
+        model = model_of_states(self.layout, self._p, self.reference_degc, gravity, anywhere)
+        return self._with_curves(model)
+
+    def _with_curves(self, model: ImuModel) -> ImuModel:
+        """The model with the curves over temperature that the file has, where it has some."""
+        over = self.document.get("over_temperature")
+        if over is None:
+            return model
+        accel, gyro = (rebuilt(ThermalModel, over[triad]) for triad in ("accel", "gyro"))
+        return replace(model, accel=accel, gyro=gyro)
 
     @cached_property
     def verdict(self) -> ImuVerdict:
@@ -223,6 +235,7 @@ class ImuCalibration:
         saved = read_saved_for_c(self.source, document)
         frame = self.reference_degc, float(document["local_gravity_m_per_s2"])
         model = model_of_states(self.layout, self._p, *frame, saved.device.range_degc)
+        model = self._with_curves(model)
         inputs, name = str(document["inputs_sha256"]), str(document["unit"])
         return FittedImu(name, self.serial, inputs, self.source, self.layout, model, saved)
 

@@ -96,7 +96,7 @@ def fitted_imu(done: DynamicUnit, verdict: ImuVerdict, inputs_sha256: str) -> Fi
     """What the C of a dynamic calibration with [device] is made of."""
     unit, layout, device = done.unit, done.result.layout, done.unit.device
     assert device is not None
-    model = imu_model(done.result, device.range_degc)
+    model = imu_model(done.result, device.range_degc, done.over)
     saved = saved_for_c(done, device, verdict)
     return FittedImu(unit.name, unit.serial, inputs_sha256, str(unit.path), layout, model, saved)
 

@@ -26,12 +26,14 @@ from triaxcal.dynamic.limits import IMU_LIMITS, ImuLimits
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.quantities import ForcesApart, forces_apart, names_of, quantities_of
 from triaxcal.dynamic.recording import Turntable
+from triaxcal.model.thermal.registry import thermal_keys
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.table import Quantity
 from triaxcal.unit.folder import SERIAL, TOP, UNIT_FILE, find_unit
 from triaxcal.unit.measured import MEASURED, Measured
 from triaxcal.unit.recordingfile import ClockLayout, FileLayout, check_units
 from triaxcal.unit.site import TURNING_SITE, TurningSite
+from triaxcal.unit.thermal import ThermalChoice, thermal_choice
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class DynamicDescription:
         Where the accelerometers have a file or times of their own.
     up_at_start : str or None
         Axis that points up at the first rest, as "+z".
+    thermal : ThermalChoice, or None
+        Which functions the constants follow over temperature.
     """
 
     name: str
@@ -85,6 +89,7 @@ class DynamicDescription:
     limits: ImuLimits = field(default_factory=ImuLimits)
     forces: ForcesApart | None = None
     up_at_start: str | None = None
+    thermal: ThermalChoice | None = None
 
     @property
     def recording(self) -> Path:
@@ -154,6 +159,15 @@ class _TablePapers:
     )
 
 
+THERMAL = TableKeys(
+    "thermal",
+    "Which functions the constants of both triads follow over temperature. With several recordings "
+    "at different temperatures they are chosen where the table is absent as well.",
+    thermal_keys(),
+    optional=True,
+)
+
+
 def imu_file() -> FileKeys:
     """Keys of the unit.toml of an IMU."""
     return FileKeys(
@@ -166,6 +180,7 @@ def imu_file() -> FileKeys:
             TableKeys.of(DataSheet),
             TableKeys.of(_TablePapers, optional=True),
             IMU_LIMITS,
+            THERMAL,
             DEVICE,
             MEASURED,
         ),
@@ -230,7 +245,23 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         limits=tables["limits"].record(ImuLimits),
         forces=forces_apart(found, clock),
         up_at_start=found.up_at_start,
+        thermal=_thermal(path, tables["thermal"], found.blocks),
     )
+
+
+def _thermal(path: Path, values: Values, blocks: tuple[str, ...]) -> ThermalChoice | None:
+    """[thermal], or None if there is none."""
+    if not has_table(path, "thermal"):
+        return None
+    both = [n for n in blocks if any(b.needs == "temp_degc" for b in EXTENSIONS[n].blocks)]
+    if both:
+        raise RefusedError(
+            f"{path}, [thermal]",
+            f'given besides "{both[0]}" in [dynamic] blocks',
+            expected="one of them: functions over temperature, or linear coefficients",
+            remedy="remove the block: the functions hold straight lines as well",
+        )
+    return thermal_choice(values)
 
 
 def _table(values: Values) -> Turntable | None:

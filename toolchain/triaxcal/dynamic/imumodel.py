@@ -7,10 +7,13 @@ as slopes. D of (13) acts on the raw rate, so that G = K^-1 D is left in the com
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.layout import Layout
+from triaxcal.dynamic.overtemperature import OverTemperature
 from triaxcal.dynamic.window import gamma_matrix
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel
 from triaxcal.model.methods.imu import ImuModel, constants_from_errors
@@ -34,10 +37,14 @@ def left_out(layout: Layout) -> tuple[str, ...]:
     return tuple(b.title for b in layout.blocks if b.name not in IN_MODEL)
 
 
-def imu_model(result: DynamicResult, range_degc: tuple[float, float]) -> ImuModel:
-    """Model of both triads of a result, over `range_degc`."""
+def imu_model(
+    result: DynamicResult, range_degc: tuple[float, float], over: OverTemperature | None = None
+) -> ImuModel:
+    """Model of both triads of a result, over `range_degc`; by the curves where there are some."""
     frame = result.frame
-    return model_of_states(result.layout, result.p, frame.reference_degc, frame.gravity, range_degc)
+    about = frame.reference_degc, frame.gravity, range_degc
+    model = model_of_states(result.layout, result.p, *about)
+    return model if over is None else replace(model, accel=over.accel, gyro=over.gyro)
 
 
 def model_of_states(

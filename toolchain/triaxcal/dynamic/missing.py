@@ -167,5 +167,7 @@ def _possible(extension: Extension, recording: ImuRecording, result: DynamicResu
     needed = {block.needs for block in extension.blocks} - {""}
     ready = all(getattr(first, name, None) is not None for name in needed)
     on = all(block.name in result.layout for block in extension.blocks)
+    # Functions over temperature have linear coefficients in them.
+    held = any(not block.shown for block in result.layout.blocks) and "temp_degc" in needed
     # A second triad or a table that is recorded is no effect: its states are its own.
-    return ready and not on and not needed & {"force2", "table_angle_rad", "table"}
+    return ready and not on and not held and not needed & {"force2", "table_angle_rad", "table"}

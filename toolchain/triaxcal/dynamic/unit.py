@@ -5,15 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.missing import Effect, missing_effects
 from triaxcal.dynamic.observability import Observability, observability
+from triaxcal.dynamic.overtemperature import (
+    OverTemperature,
+    Solved,
+    Temperatures,
+    solve_over_temperature,
+)
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.several import read_recordings
-from triaxcal.dynamic.temperatures import recorded_temperatures, refuse_beyond
+from triaxcal.dynamic.temperatures import Recorded, recorded_temperatures, refuse_beyond
+from triaxcal.dynamic.thermalnodes import nodes_of
 from triaxcal.dynamic.upright import upright
+from triaxcal.model.thermal.registry import AUTO
+from triaxcal.unit.thermal import ThermalChoice
 
 
 @dataclass(frozen=True)
@@ -35,6 +45,10 @@ class DynamicUnit:
         Lowest and highest temperature that was recorded.
     recording : ImuRecording or None
         None for a plan.
+    over : OverTemperature, or None
+        The curves of the constants, where they follow the temperature.
+    terms : DynamicResult, or None
+        The filter's result then: `result` has the constants at the reference temperature.
     """
 
     unit: DynamicDescription
@@ -45,6 +59,13 @@ class DynamicUnit:
     range_degc: tuple[float, float] | None = None
     recorded_degc: tuple[float, float] | None = None
     recording: ImuRecording | None = field(default=None, repr=False)
+    over: OverTemperature | None = None
+    terms: DynamicResult | None = field(default=None, repr=False)
+
+    @property
+    def filtered(self) -> DynamicResult:
+        """The filter's own result: with its terms over temperature, where it has some."""
+        return self.result if self.terms is None else self.terms
 
 
 def calibrate_unit(folder: Path, progress: Progress | None = None) -> DynamicUnit:
@@ -71,6 +92,29 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     unit, recording = upright(unit, read_recordings(unit))
     temperatures = recorded_temperatures(recording)
     unknown = refuse_beyond(unit, temperatures)
+    full, over = _solve(unit, recording, temperatures, report)
+    result = full if over is None else over.shown
+    off = missing_effects(recording, full, lambda part: report("effects off", part))
+    seen = observability(result.layout, result.covariance)
+    recorded = None if temperatures is None else temperatures.ends_degc
+    range_degc = recorded if unit.device is None else unit.device.range_degc
+    findings = (*recording.findings, *unknown)
+    about = unit, result, seen, off, findings, range_degc, recorded, recording
+    return DynamicUnit(*about) if over is None else DynamicUnit(*about, over.over, full)
+
+
+def _solve(
+    unit: DynamicDescription,
+    recording: ImuRecording,
+    recorded: Recorded | None,
+    report: Progress,
+) -> tuple[DynamicResult, Solved | None]:
+    """The solution with all its states, and its curves where constants follow the temperature."""
+    stated = thermal_choice_of(unit, recorded)
+    if stated is not None and recorded is not None:
+        at = Temperatures(recorded, stated, unit.reference_degc, str(unit.path))
+        solved = solve_over_temperature(recording, unit.noise, unit.state_blocks(), at, report)
+        return solved.full, solved
     result = calibrate_dynamic(
         recording,
         unit.noise,
@@ -78,9 +122,27 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
         reference_degc=unit.reference_degc,
         progress=lambda number, part: report(f"pass {number + 1}", part),
     )
-    off = missing_effects(recording, result, lambda part: report("effects off", part))
-    seen = observability(result.layout, result.covariance)
-    recorded = None if temperatures is None else temperatures.ends_degc
-    range_degc = recorded if unit.device is None else unit.device.range_degc
-    findings = (*recording.findings, *unknown)
-    return DynamicUnit(unit, result, seen, off, findings, range_degc, recorded, recording)
+    return result, None
+
+
+def thermal_choice_of(unit: DynamicDescription, recorded: Recorded | None) -> ThermalChoice | None:
+    """What unit.toml states of functions over temperature, or that they are to be chosen.
+
+    Raises
+    ------
+    RefusedError
+        When functions are stated and no temperature was recorded.
+    """
+    if unit.thermal is not None:
+        if recorded is None:
+            raise RefusedError(
+                f"{unit.path}, [thermal]",
+                "given, and no temperature is recorded",
+                expected="temp_column in [dynamic], or temp_degc of each [[dynamic.recording]]",
+            )
+        return unit.thermal
+    linear = any(b.needs == "temp_degc" for b in unit.state_blocks())
+    if recorded is None or len(unit.recordings) == 1 or linear:
+        return None
+    several = len(nodes_of(recorded, unit.reference_degc).degc) > 1
+    return ThermalChoice(AUTO) if several else None

@@ -28,7 +28,7 @@ from triaxcal.evidence.heldout import HeldOut, held_out
 def examine(done: DynamicUnit, report: Progress) -> Evidence:
     """Test a calibrated unit against its recording."""
     assert done.recording is not None
-    case = Case(done.recording, done.result.noise, done.result)
+    case = Case(done.recording, done.result.noise, done.filtered)
     return examine_case(case, done.unit.limits, done.seen, done.off, report)
 
 

@@ -6,8 +6,10 @@ at T0, is discontinuous; here each segment has its own origin, so neighbours mee
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import comb
 
 import numpy as np
 
@@ -82,6 +84,41 @@ class ThermalModel:
     def constants_at(self, temp_degc: FloatArray | float) -> FloatArray:
         """Twelve constants, shape (..., 12), at temperatures of shape (...)."""
         return self.curves(temp_degc)
+
+
+def on_common_breaks(
+    parts: Sequence[PiecewisePolynomial], t0_degc: float
+) -> tuple[tuple[float, ...], tuple[float, ...], list[FloatArray]]:
+    """The same functions on the breaks of all: breaks, origins, coefficients of each.
+
+    T0 is the origin of segments that touch it, the lower break that of others.
+    """
+    inner = sorted({b for part in parts for b in part.breaks_degc[1:-1]})
+    low = min(part.breaks_degc[0] for part in parts)
+    high = max(part.breaks_degc[-1] for part in parts)
+    breaks = (low, *(b for b in inner if low < b < high), high)
+    order = max(part.order for part in parts)
+    origins = tuple(
+        t0_degc if len(breaks) == 2 or a <= t0_degc <= b else a for a, b in pairwise(breaks)
+    )
+    found = []
+    for part in parts:
+        rows = []
+        for (a, b), origin in zip(pairwise(breaks), origins, strict=True):
+            segment = int(part.segment_index(np.array((a + b) / 2)))
+            own = part.coefficients[segment]
+            rows.append(_shifted(own, origin - part.origins_degc[segment], order))
+        found.append(np.stack(rows))
+    return breaks, origins, found
+
+
+def _shifted(coefficients: FloatArray, by: float, order: int) -> FloatArray:
+    """Coefficients (functions, order + 1) of f(x + by), for those of f(x)."""
+    shifted = np.zeros((len(coefficients), order + 1))
+    for n in range(coefficients.shape[1]):
+        for k in range(n + 1):
+            shifted[:, k] += comb(n, k) * by ** (n - k) * coefficients[:, n]
+    return shifted
 
 
 def relative_coefficients(model: ThermalModel) -> FloatArray:

@@ -21,6 +21,7 @@ from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.dynamicpage import digits, dynamic_page, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
+from triaxcal.report.overtemperature import over_document, over_lines
 from triaxcal.report.stated.statements import statements_of
 from triaxcal.unit.measured import MEASURED
 
@@ -49,7 +50,7 @@ def calibration_document(made: ImuDelivery) -> dict[str, Any]:
         "serial": unit.serial,
         "inputs_sha256": made.inputs_sha256,
         "recording": unit.recording_words,
-        "reference_degc": unit.reference_degc,
+        "reference_degc": result.frame.reference_degc,
         "range_degc": done.range_degc and list(done.range_degc),
         "local_gravity_m_per_s2": unit.gravity_m_per_s2,
         "latitude_deg": unit.latitude_deg,
@@ -83,6 +84,7 @@ def calibration_document(made: ImuDelivery) -> dict[str, Any]:
         ],
         "known_only_together": [list(pair) for pair in seen.together],
         **({"findings": list(done.findings)} if done.findings else {}),
+        **({} if done.over is None else {"over_temperature": over_document(done.over)}),
         **firmware_document(done, verdict),
     }
 
@@ -141,6 +143,8 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
             value, sd = result.p[i] / state.per_unit, result.sd[i] / state.per_unit
             found_sd = f"{digits(sd, sd):<10s} {state.unit}"
             lines.append(f"  {state.name:9s} {digits(value, sd):>14s} sd {found_sd}")
+    if done.over is not None:
+        lines += over_lines(done.over)
     if done.off:
         lines += ["", "effects switched off, chi-square of their states in this recording:"]
         for effect in done.off:

@@ -17,6 +17,7 @@ from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Weak
 from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.imuc import NO_C, imu_verification
+from triaxcal.report.overtemperature import over_context
 from triaxcal.report.stated.statements import statements_of
 from triaxcal.report.stated.words import label, value_words
 from triaxcal.report.texts.html import page
@@ -83,6 +84,7 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
             }
             for block in layout.blocks
         ],
+        "over": over_context(done.over),
         "innovations": _innovations(result),
         "minutes": f"{(time[-1] - time[0]) / 60:.0f}",
         "off": [

@@ -10,7 +10,7 @@ import numpy as np
 
 from triaxcal.dynamic.recording import INCREMENT, INSTANT
 from triaxcal.model.types import FloatArray
-from triaxcal.simulation.imu_truth import ImuNoise, ImuTruth, SecondTriad
+from triaxcal.simulation.imu_truth import Curved, ImuNoise, ImuTruth, SecondTriad
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,10 @@ _SD = {
     "accel_scale_ppm_per_k": (10.0, 50.0),
     "gyro_bias_deg_per_h_per_k": (0.005, 10.0),
     "gyro_scale_ppm_per_k": (1.0, 50.0),
+    "curved_accel_bias_mm_per_s2": (2.0, 20.0),
+    "curved_gyro_bias_deg_per_h": (0.2, 300.0),
+    "curved_accel_ppm": (300.0, 1500.0),
+    "curved_gyro_ppm": (30.0, 1500.0),
     "second_bias_mm_per_s2": (10.0, 50.0),
     "second_scale_ppm": (500.0, 5000.0),
 }
@@ -93,6 +97,7 @@ EFFECTS: dict[str, tuple[str, ...]] = {
     "second-triad": ("second",),
     "accel-temperature": ("accel_bias_mm_per_s2_per_k", "accel_scale_ppm_per_k"),
     "gyro-temperature": ("gyro_bias_deg_per_h_per_k", "gyro_scale_ppm_per_k"),
+    "cubic-temperature": ("curved",),
 }
 """Effects of the unit beyond the base model, and the attributes of `ImuTruth` that hold them."""
 
@@ -133,11 +138,30 @@ def _drawn(grade: Grade, name: str, seed: int) -> Any:
             misalignment_arcsec=_tuple(sd["gyro_misalignment_arcsec"] * rng.standard_normal(6)),
             delay_ms=sd["accel_delay_ms"] * float(rng.standard_normal()),
         )
+    if name == "curved":
+        return _curved(sd, rng)
     shape = np.shape(getattr(ImuTruth(), name))
     values = sd[name] * rng.standard_normal(shape)
     if name == "accel_position_mm":
         values[0] = 0.0
     return _tuple(values)
+
+
+_POWERS = np.array([[1.0], [0.5], [0.25]])
+"""Deviations of the coefficients of x, x^2 and x^3, of those in the grade."""
+_TURNS = 0.2
+"""Deviations of the elements beside the diagonal, of those on it."""
+
+
+def _curved(sd: Mapping[str, float], rng: np.random.Generator) -> Curved:
+    matrix = _POWERS * np.where(np.eye(3).ravel() > 0, 1.0, _TURNS)
+    lower = np.tril(np.ones((3, 3))).ravel()
+    return Curved(
+        _tuple(sd["curved_accel_bias_mm_per_s2"] * _POWERS * rng.standard_normal((3, 3))),
+        _tuple(sd["curved_gyro_bias_deg_per_h"] * _POWERS * rng.standard_normal((3, 3))),
+        _tuple(sd["curved_accel_ppm"] * lower * matrix * rng.standard_normal((3, 9))),
+        _tuple(sd["curved_gyro_ppm"] * matrix * rng.standard_normal((3, 9))),
+    )
 
 
 def _tuple(values: FloatArray) -> Any:  # nested tuples of floats, or one float; shape known above

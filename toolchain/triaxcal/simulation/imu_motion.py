@@ -18,8 +18,8 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.recording import Turntable
-from triaxcal.model.types import FloatArray
 from triaxcal.simulation.imu_polynomials import Pieces, PiecewiseMotion, smooth_move, smooth_step
+from triaxcal.simulation.imu_temperature import CONSTANT, TemperatureDrift, TemperatureRamp
 from triaxcal.simulation.imu_truth import Three
 
 _TO_NEXT_AXIS = -2.0 * math.pi / 3.0
@@ -100,36 +100,6 @@ PRECISE_TABLE = RoughTable(wobble_arcsec=0.0, ripple_deg=0.0, reads_angle=True)
 
 
 @dataclass(frozen=True)
-class TemperatureDrift:
-    """Inside the unit: start + (end - start)(1 - exp(-t/tau)) + wave sin(2 pi t/period).
-
-    Attributes
-    ----------
-    start_degc, end_degc, tau_s, wave_degc, period_s : float
-    """
-
-    start_degc: float = 20.0
-    end_degc: float = 20.0
-    tau_s: float = 2400.0
-    wave_degc: float = 0.0
-    period_s: float = 1700.0
-
-    def at(self, time_s: FloatArray) -> FloatArray:
-        """Temperature in degC, same shape as the times."""
-        drift = (self.end_degc - self.start_degc) * -np.expm1(-time_s / self.tau_s)
-        wave = self.wave_degc * np.sin(2.0 * math.pi / self.period_s * time_s)
-        result: FloatArray = self.start_degc + drift + wave
-        return result
-
-
-WARMING = TemperatureDrift(start_degc=20.0, end_degc=45.0, wave_degc=3.0)
-"""Switched on cold, beside an air conditioner."""
-
-SWEPT = TemperatureDrift(start_degc=22.5, end_degc=22.5, wave_degc=62.5, period_s=240.0)
-"""-40 to 85 degC and back, again and again: faster than any chamber."""
-
-
-@dataclass(frozen=True)
 class ImuMotion:
     """A whole recording on a table.
 
@@ -138,7 +108,7 @@ class ImuMotion:
     mountings : tuple of one to three Mounting
         Instrument axis 1, 2, 3 along the table's axis in turn.
     table : RoughTable
-    temperature : TemperatureDrift
+    temperature : TemperatureDrift or TemperatureRamp
     latitude_deg, gravity_m_per_s2 : float
         Gravity is that of a plumb line: with the centrifugal part.
     remount_s, lift_m : float
@@ -147,7 +117,7 @@ class ImuMotion:
 
     mountings: tuple[Mounting, ...]
     table: RoughTable = RoughTable()
-    temperature: TemperatureDrift = TemperatureDrift()
+    temperature: TemperatureDrift | TemperatureRamp = CONSTANT
     latitude_deg: float = 50.0
     gravity_m_per_s2: float = 9.8107
     remount_s: float = 20.0
@@ -287,7 +257,7 @@ def three_axes(
     *,
     still_s: float = 120.0,
     table: RoughTable | None = None,
-    temperature: TemperatureDrift | None = None,
+    temperature: TemperatureDrift | TemperatureRamp | None = None,
     moves: tuple[Move, ...] | None = None,
     centre_mm: tuple[Three, Three, Three] = ((0.0, 0.0, 0.0),) * 3,
     placement_deg: tuple[Three, Three, Three] = (
@@ -308,5 +278,5 @@ def three_axes(
             for placement, centre in zip(placement_deg, centre_mm, strict=True)
         ),
         table=table,
-        temperature=temperature or TemperatureDrift(),
+        temperature=temperature or CONSTANT,
     )

@@ -63,6 +63,9 @@ def gyro_readings(truth: ImuTruth, at: Moments) -> FloatArray:
     drift_per_g = DEG_PER_H * np.array(truth.gyro_g_deg_per_h_per_g)
     kappa = truth.gyro_elasticity_rad()
     readings: FloatArray = truth.gyro_matrix() @ rate + scale * rate + bias
+    if truth.curved is not None:
+        shift, matrix = truth.curved.gyro(warm)
+        readings = readings + shift + np.einsum("ijn,jn->in", matrix, rate)
     if not (drift_per_g.any() or kappa.any()):
         return readings + rate
     force_g = at.force(np.zeros(3)) / at.motion.gravity_m_per_s2
@@ -92,7 +95,11 @@ def accel_readings(truth: ImuTruth, at: Moments) -> FloatArray:
     bias = 1e-3 * _column(truth.accel_bias_mm_per_s2)
     bias = bias + 1e-3 * _column(truth.accel_bias_mm_per_s2_per_k) * warm
     scale = PPM * _column(truth.accel_scale_ppm_per_k) * warm
-    return bias + _triad(truth.accel_matrix(), scale, truth.accel_position_mm, at)
+    matrix = truth.accel_matrix()
+    if truth.curved is not None:
+        shift, change = truth.curved.accel(warm)
+        bias, matrix = bias + shift, matrix[:, :, None] + change
+    return bias + _triad(matrix, scale, truth.accel_position_mm, at)
 
 
 def second_readings(second: SecondTriad, at: Moments) -> FloatArray:
@@ -104,13 +111,17 @@ def second_readings(second: SecondTriad, at: Moments) -> FloatArray:
 def _triad(
     matrix: FloatArray, warm_scale: FloatArray, position_mm: tuple[Three, Three, Three], at: Moments
 ) -> FloatArray:
-    """Three accelerometers without bias: each row of the matrix takes the force at its own mass."""
+    """Three accelerometers without bias: each row of the matrix takes the force at its own mass.
+
+    The matrix is (3, 3), or (3, 3, n) where it changes.
+    """
     places = 1e-3 * np.array(position_mm)
     shared = None if places.any() else at.force(places[0])
     rows = []
     for i in range(3):
         force = at.force(places[i]) if shared is None else shared
-        rows.append(force[i] * (1.0 + warm_scale[i]) + matrix[i] @ force)
+        felt = matrix[i] @ force if matrix.ndim == 2 else (matrix[i] * force).sum(axis=0)
+        rows.append(force[i] * (1.0 + warm_scale[i]) + felt)
     return np.stack(rows)
 
 

@@ -93,6 +93,49 @@ class SecondTriad:
         return _matrix(self.scale_ppm, self.misalignment_arcsec, _OFF_DIAGONAL)
 
 
+Nine = tuple[float, float, float, float, float, float, float, float, float]
+SPAN_K = 60.0
+
+
+@dataclass(frozen=True)
+class Curved:
+    """How the constants follow the temperature besides (23), (24).
+
+    A constant gains c_1 x + c_2 x^2 + c_3 x^3, x the temperature above the reference over `SPAN_K`.
+
+    Attributes
+    ----------
+    accel_bias_mm_per_s2, gyro_bias_deg_per_h : three triples
+        c_1, c_2, c_3 of each axis.
+    accel_matrix_ppm, gyro_matrix_ppm : three tuples of nine
+        c_1, c_2, c_3 of the elements 11, 12, 13, 21, ... of Gamma and Theta.
+    """
+
+    accel_bias_mm_per_s2: tuple[Three, Three, Three]
+    gyro_bias_deg_per_h: tuple[Three, Three, Three]
+    accel_matrix_ppm: tuple[Nine, Nine, Nine]
+    gyro_matrix_ppm: tuple[Nine, Nine, Nine]
+
+    def accel(self, warmer_k: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Change of bias (3, n), m/s^2, and of Gamma (3, 3, n), at n temperatures."""
+        return _powers(self.accel_bias_mm_per_s2, self.accel_matrix_ppm, 1e-3, warmer_k)
+
+    def gyro(self, warmer_k: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Change of bias (3, n), rad/s, and of Theta (3, 3, n), at n temperatures."""
+        return _powers(self.gyro_bias_deg_per_h, self.gyro_matrix_ppm, DEG_PER_H, warmer_k)
+
+
+def _powers(
+    bias: tuple[Three, Three, Three],
+    matrix: tuple[Nine, Nine, Nine],
+    unit: float,
+    warmer_k: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    x = (warmer_k / SPAN_K) ** np.arange(1, 4)[:, None]
+    change = PPM * np.array(matrix).T @ x
+    return unit * np.array(bias).T @ x, change.reshape(3, 3, -1)
+
+
 @dataclass(frozen=True)
 class ImuTruth:
     """Exact properties of a simulated IMU; what is not stated is absent.
@@ -127,6 +170,8 @@ class ImuTruth:
     noise : ImuNoise
     rate_convention, force_convention : str
         As in `triaxcal.dynamic.recording`.
+    curved : Curved, or None
+        Further change with temperature.
     """
 
     gyro_bias_deg_per_h: Three = _NONE3
@@ -149,6 +194,7 @@ class ImuTruth:
     noise: ImuNoise = ImuNoise()
     rate_convention: str = INCREMENT
     force_convention: str = INCREMENT
+    curved: Curved | None = None
 
     def gyro_matrix(self) -> FloatArray:
         """Theta of (2), shape (3, 3)."""

@@ -17,14 +17,12 @@ from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import EFFECTS, GRADES, Grade, draw_truth
 from triaxcal.simulation.imu_motion import (
     PRECISE_TABLE,
-    SWEPT,
-    WARMING,
     ImuMotion,
     Move,
     RoughTable,
-    TemperatureDrift,
     three_axes,
 )
+from triaxcal.simulation.imu_temperature import SWEPT, WARMING, TemperatureDrift
 from triaxcal.simulation.imu_truth import ARCSEC
 from triaxcal.simulation.truth import SEED, check_seed
 from triaxcal.unit.folder import find_unit

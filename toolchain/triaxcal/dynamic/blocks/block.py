@@ -117,6 +117,8 @@ class StateBlock:
         table's axis in unit.toml; or "".
     weak : str
         For readers: what it is that a usual motion shows badly, and what would show it; or "".
+    shown : bool
+        Whether its states are for readers; those of others are terms of a calculation.
     """
 
     name: str
@@ -134,6 +136,7 @@ class StateBlock:
     reset: bool = False
     needs: str = ""
     weak: str = ""
+    shown: bool = True
 
 
 @dataclass(frozen=True)

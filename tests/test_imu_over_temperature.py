@@ -1,0 +1,160 @@
+"""A whole IMU over -40 to 85 degC, from recordings at some temperatures to the compiled C."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import triaxcal
+from dynamic_cases import UNIT_TOML, table_of, write_unit
+from thermal_cases import POINTS, at_point, true_at, truth_of
+from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
+from triaxcal.delivery.imu import ImuDelivery, deliver_imu
+from triaxcal.dynamic.blocks.base import LOWER
+from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.report.dynamic import dynamic_files, dynamic_summary
+from triaxcal.simulation.imu_truth import ImuTruth
+
+G = 9.80665
+DEVICE = """\
+[device]
+accel_bits = 21
+accel_full_scale_g = 10.48576
+gyro_bits = 20
+gyro_full_scale_deg_per_s = 500
+degc_per_code = 0.125
+range_degc = [-40, 85]
+"""
+BETWEEN = (-25.0, 5.0, 35.0, 70.0)
+"""Temperatures at which nothing was recorded at rest."""
+
+
+def toml_of(files: list[str], device: str = DEVICE, more: str = "") -> str:
+    recordings = "".join(f'[[dynamic.recording]]\nfile = "{name}"\n' for name in files)
+    toml = UNIT_TOML.replace('recording = "recording.csv"\n', "").replace(
+        "[noise]", f'temp_column = "temp_degc"\n{recordings}[noise]'
+    )
+    return toml + device + more
+
+
+def folder_of(
+    base: Path, recordings: list[ImuRecording], device: str = DEVICE, more: str = ""
+) -> Path:
+    files = ["recording.csv", *(f"{k}.csv" for k in range(1, len(recordings)))]
+    unit = write_unit(base / "IMU", table_of(recordings[0]), toml_of(files, device, more))
+    for k, recording in enumerate(recordings[1:], start=1):
+        other = write_unit(base / f"other{k}", table_of(recording))
+        (other / "recording.csv").rename(unit / f"{k}.csv")
+    return unit
+
+
+@dataclass(frozen=True)
+class Ran:
+    truth: ImuTruth
+    unit: Path
+    made: ImuDelivery
+    generated: GeneratedImu
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
+    base = tmp_path_factory.mktemp("over")
+    truth = truth_of(3)
+    unit = folder_of(base, [at_point(truth, t, 300 + k) for k, t in enumerate(POINTS)])
+    made = deliver_imu(unit)
+    assert made.c is not None
+    for name, content in made.c.build.files.items():
+        (base / name).write_bytes(content)
+    return Ran(truth, unit, made, GeneratedImu(start_generated_imu(base, base).load()))
+
+
+def codes(ran: Ran, degc: float, force_g: np.ndarray, rate: np.ndarray) -> list[np.ndarray]:
+    """Raw codes of both triads of the true unit at a temperature."""
+    constants = true_at(ran.truth, np.array([degc]))[0]
+    gamma = np.zeros((3, 3))
+    for value, place in zip(constants[3:9], LOWER, strict=True):
+        gamma[place] = value
+    assert ran.made.c is not None
+    device = ran.made.c.device
+    accel = force_g + force_g @ gamma.T + constants[:3] / G
+    gyro = rate + rate @ constants[12:].reshape(3, 3).T + constants[9:12]
+    return [
+        np.rint(reading / adc.volts_per_code).astype(np.int32)
+        for reading, adc in ((accel, device.accel_adc), (gyro, device.gyro_adc))
+    ]
+
+
+@pytest.mark.parametrize("degc", [*POINTS, *BETWEEN])
+def test_the_compiled_c_gives_the_true_force_and_rate(ran: Ran, degc: float) -> None:
+    """At rest within 5 sd, half a code and the proven bound, at any of the temperatures."""
+    assert ran.made.c is not None
+    c, known = ran.made.c, ran.made.done.over
+    assert known is not None
+    force = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 2, axis=0)
+    rate = np.zeros_like(force)
+    accel, gyro = codes(ran, degc, force, rate)
+    temp = np.full(len(force), c.device.temperature_sensor.code(degc), np.int32)
+    _, (found, turned, status) = ran.generated.run(None, temp, accel, gyro)
+    assert not status.any()
+    temps = known.known.temps_degc
+    accel_sd = np.interp(degc, temps, known.known.accel_sd_g)
+    gyro_sd = np.interp(degc, temps, known.known.gyro_sd_rad_per_s)
+    # |K^-1| rows sum to less than 1.1; the thermometer's code is half of 0.125 degC off, over
+    # which a bias of 3 coefficients changes by 0.0625/60 of some 60 mm/s^2 and 900 deg/h.
+    near = 0.0625 / 60
+    most = 5 * accel_sd + 0.55 * c.device.accel_adc.volts_per_code + c.accel_error_g
+    assert np.abs(found * 2.0**-c.device.accel_q - force).max() < most + near * 0.06 / G
+    rate_found = np.deg2rad(turned * 2.0**-c.device.gyro_rate_q)
+    most = 5 * gyro_sd + 0.55 * c.device.gyro_adc.volts_per_code
+    most += np.deg2rad((c.gyro_error_deg_per_h + near * 900) / 3600)
+    assert np.abs(rate_found).max() < most
+
+
+def test_constants_of_one_temperature_would_be_far_off(ran: Ran) -> None:
+    """Of the reference temperature, at the ends: by more than ten standard deviations."""
+    over = ran.made.done.over
+    assert over is not None
+    true = true_at(ran.truth, np.array([-40.0, 20.0]))
+    assert (np.abs(true[0] - true[1]) / over.known.sd[0]).max() > 30
+
+
+def test_a_new_fit_from_the_file_has_the_same_curves(ran: Ran) -> None:
+    files = dynamic_files(ran.made)
+    path = ran.unit / "calibration.json"
+    path.write_bytes(files["calibration.json"])
+    cal = triaxcal.load_imu(path)
+    constants = cal.constants([-30.0, 20.0, 80.0])
+    assert ran.made.c is not None
+    model = ran.made.c.model
+    for k, degc in enumerate((-30.0, 20.0, 80.0)):
+        exact = model.accel.constants_at(degc)
+        assert np.allclose(constants.accel_matrix[k].ravel(), exact[:9], rtol=0, atol=1e-12)
+    assert cal.range_degc == (-40.0, 85.0)
+    document = json.loads(files["calibration.json"])
+    over = document["over_temperature"]
+    assert over["held_out_degc"] == pytest.approx([-10.1, 20.0, 49.9], abs=0.1)
+    assert len(over["constants"]) == 21
+    assert len(document["states"]) < 30  # the terms of the calculation are not among them
+    assert cal.c.build.files.keys() == ran.made.c.build.files.keys()
+
+
+def test_summary_and_page_state_the_uncertainty_over_temperature(ran: Ran) -> None:
+    text = dynamic_summary(ran.made, ["a"], "build")
+    assert "over temperature, constants above at 20 degC:" in text
+    assert "chosen by what was read at -10, 20, 50 degC, each held out in turn" in text
+    assert "~" not in text.partition("effects switched off")[0]
+    page = dynamic_files(ran.made)["dynamic.html"].decode()
+    assert "Standard deviations over temperature" in page
+    assert "~" not in page.partition("<h2>Over temperature")[0].partition("</style>")[2]
+
+
+def test_a_range_beyond_the_points_is_refused(tmp_path: Path) -> None:
+    truth = truth_of(3)
+    unit = folder_of(tmp_path, [at_point(truth, t, 300 + k) for k, t in enumerate((20.0, 50.0))])
+    with pytest.raises(RefusedError, match=r"the temperatures recorded are 19\.7 to 50\.0 degC"):
+        deliver_imu(unit)

@@ -1,0 +1,107 @@
+"""Temperatures at which a unit was seen, points or steps of a ramp, and the samples of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from triaxcal.dynamic.survey import Section, Survey
+from triaxcal.dynamic.temperatures import Recorded
+from triaxcal.dynamic.windows import WINDOW_S
+from triaxcal.model.thermal.shape import GROUP_GAP_DEGC
+from triaxcal.model.types import FloatArray, IntArray
+
+POINT_DEGC = 4.0
+"""Temperatures that lie nearer together than this, without a gap, are one point."""
+STEPS = 5
+"""Of a ramp: what a cubic and a held-out step need."""
+REST_S = 1.0
+"""A section of its own may begin with a rest of this length."""
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Temperatures at which a unit was seen.
+
+    Attributes
+    ----------
+    degc : array, shape (G,)
+        Rising.
+    t0_degc : float
+        The reference temperature: one of them.
+    """
+
+    degc: FloatArray
+    t0_degc: float
+
+    def nearest(self, degc: FloatArray | float) -> IntArray:
+        """Number of the nearest node, same shape as the temperatures."""
+        away = np.abs(np.asarray(degc)[..., None] - self.degc)
+        return np.asarray(np.argmin(away, axis=-1))
+
+
+def nodes_of(recorded: Recorded, reference_degc: float) -> Nodes:
+    """Nodes of the recorded temperatures; T0 is the one that is nearest to the reference."""
+    degc = np.sort(recorded.degc)
+    clusters = np.split(degc, np.flatnonzero(np.diff(degc) > GROUP_GAP_DEGC) + 1)
+    wide = sum(c[-1] - c[0] > POINT_DEGC for c in clusters)
+    found: list[float] = []
+    for cluster in clusters:
+        low, high = float(cluster[0]), float(cluster[-1])
+        if high - low <= POINT_DEGC:
+            found.append(float(cluster.mean()))
+            continue
+        steps = STEPS if wide == 1 else max(2, STEPS // 2)
+        width = (high - low) / steps
+        middles = low + width * (np.arange(steps) + 0.5)
+        if low <= reference_degc <= high:
+            middles[int(np.argmin(np.abs(middles - reference_degc)))] = reference_degc
+        found += [float(m) for m in middles]
+    nodes = np.array(found)
+    k = int(np.argmin(np.abs(nodes - reference_degc)))
+    if abs(nodes[k] - reference_degc) <= GROUP_GAP_DEGC:
+        nodes[k] = reference_degc
+    return Nodes(nodes, float(nodes[k]))
+
+
+def cut_at_nodes(found: Survey, recorded: Recorded, nodes: Nodes) -> tuple[Survey, IntArray]:
+    """The same survey with sections that end where the temperature comes to another node.
+
+    A section can begin at a rest only. Returns the node of each section as well.
+    """
+    sections, numbers = [], []
+    for number, section in enumerate(found.sections):
+        for part in _parts(found, number, section, recorded, nodes):
+            begin, end = (found.windows.first.searchsorted(k) for k in (part.first, part.last))
+            start_s = found.windows.start_s[begin : max(end, begin + 1)]
+            degc = np.interp(start_s, recorded.start_s, recorded.degc)
+            sections.append(part)
+            numbers.append(int(nodes.nearest(float(np.median(degc)))))
+    return replace(found, sections=tuple(sections)), np.array(numbers)
+
+
+def _parts(
+    found: Survey, number: int, section: Section, recorded: Recorded, nodes: Nodes
+) -> Iterator[Section]:
+    windows = found.windows
+    own = (windows.section == number) & (windows.first >= section.first)
+    still = np.flatnonzero(own & found.still & found.use)
+    runs = np.split(still, np.flatnonzero(np.diff(still) > 1) + 1)
+    start = section
+    at = int(nodes.nearest(float(np.interp(section.start_s, recorded.start_s, recorded.degc))))
+    for run in runs:
+        if len(run) < round(REST_S / WINDOW_S):
+            continue
+        begin_s = float(windows.start_s[run[0]])
+        node = int(nodes.nearest(float(np.interp(begin_s, recorded.start_s, recorded.degc))))
+        if node == at or windows.first[run[0]] <= start.first:
+            continue
+        first = int(windows.first[run[0]])
+        yield replace(start, last=first - 1)
+        rate, force = windows.rate[run].mean(axis=0), windows.force[run].mean(axis=0)
+        still_s = float(windows.duration_s[run].sum())
+        start = Section(first, section.last, begin_s, still_s, rate, force)
+        at = node
+    yield start
