@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.filterpass import Progress, run_pass
 from triaxcal.dynamic.layout import Layout
@@ -78,6 +80,8 @@ def held_out_every(
     recording, noise, result = case.recording, case.noise, case.result
     layout = layout or result.layout
     start = extended(result, layout)
+    if north_of_each(result):
+        start.p[layout.place(north.BLOCK.name)] = 0.0
     stretches = stretches_of(result.survey, every)
     wander = wander_of(layout, noise, result.survey.duration_s)
     frame = replace(result.frame, layout=wander.layout)
@@ -95,8 +99,31 @@ def held_out_every(
         if float(np.abs(step / sd).max()) < AGAIN_SD:
             break
         start = Reference(done.p, done.stage_p, start.heading_rad)
-    about = tuple(replace(s, y=s.y - s.J @ step) for s in predicted)
+    about = tuple(replace(s, y=s.y - s.J @ step) for s in map(unseen_north(result), predicted))
     return HeldOut(every, layout, step, done.root @ done.root.T, about)
+
+
+def north_of_each(result: DynamicResult) -> bool:
+    """Whether each of several sections has a horizontal rate of the Earth of its own."""
+    return north.BLOCK.name in result.layout and len(result.survey.sections) > 1
+
+
+def unseen_north(result: DynamicResult) -> Callable[[Predicted], Predicted]:
+    """Take the Earth's horizontal rate of a stretch's section as unknown, where each has its own.
+
+    What the filter knows at its end is that of the last section.
+    """
+    if not north_of_each(result):
+        return lambda predicted: predicted
+    place = result.layout.place(north.BLOCK.name)
+    sd = result.layout.prior_sd[place]
+
+    def spread(predicted: Predicted) -> Predicted:
+        J = predicted.J.copy()
+        own, J[:, place] = J[:, place] * sd, 0.0
+        return replace(predicted, J=J, noise=predicted.noise + own @ own.T)
+
+    return spread
 
 
 def _end_s(result: DynamicResult) -> float:
