@@ -12,6 +12,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 
 import click
@@ -32,8 +33,10 @@ from triaxcal.rig.description.protection import PROTECTIONS
 from triaxcal.rig.hands.instrument import DRIVERS
 from triaxcal.rig.logs.logfile import LOG_FORMATS
 from triaxcal.rig.sources.source import SOURCES
+from triaxcal.targets.shapes import unit_case
 
 DOCS = Path(__file__).parent.parent
+UNITS = DOCS.parent / "units"
 _REGION = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -130,7 +133,30 @@ def _up(value: Fraction | float, decimals: int) -> float:
     return math.ceil(value * 10**decimals) / 10**decimals
 
 
+@cache
+def delivered_c() -> str:
+    """triax_comp.c of AT-CHERNIAK without the comments for provers."""
+    text = unit_case(UNITS / "AT-CHERNIAK").files["triax_comp.c"]
+    text = re.sub(r"[ \t]*/\*@.*?\*/\n?", "", text, flags=re.DOTALL)
+    return re.sub(r"[ \t]*//@.*\n", "\n", text)
+
+
+def functions_of(text: str) -> dict[str, str]:
+    """Functions of a C file by name, each from its first line to its closing brace."""
+    found = re.findall(
+        r"^((?:static )?\w+ (\w+)\([^;{]*\)\n\{\n.*?^\})", text, re.DOTALL | re.MULTILINE
+    )
+    return {name: body for body, name in found}
+
+
+def _function(*names: str) -> str:
+    """Functions of the delivered C as they stand in it."""
+    functions = functions_of(delivered_c())
+    return "```c\n" + "\n\n".join(functions[name] for name in names) + "\n```"
+
+
 TABLES: dict[str, Callable[..., str]] = {
+    "function": _function,
     "keys": _keys,
     "formats": _formats,
     "blocks": _blocks,
