@@ -18,6 +18,7 @@ import numpy as np
 
 from triaxcal.dynamic.blocks.attitude import level, rotation_of
 from triaxcal.dynamic.channels import Moments, extra_rows, steady
+from triaxcal.dynamic.evidence import Tape
 from triaxcal.dynamic.noise import ARCSEC
 from triaxcal.dynamic.passdata import History, PassResult, Reference, Task
 from triaxcal.dynamic.preintegrate import BlockEquations, equations
@@ -52,11 +53,19 @@ def run_pass(
     task: Task, start: Reference, *, first: bool, progress: Progress | None = None
 ) -> PassResult:
     """Run the filter once through a recording; the first time in short segments."""
-    return _Pass(task, start, first).run(progress)
+    return _Pass(task, start, first, RootFilter).run(progress)
+
+
+def taped_pass(task: Task, start: Reference) -> Tape:
+    """Run the filter once, and remember what was done to it."""
+    made = _Pass(task, start, False, Tape)
+    made.run(None)
+    assert isinstance(made.filter, Tape)
+    return made.filter
 
 
 class _Pass:
-    def __init__(self, task: Task, start: Reference, first: bool) -> None:
+    def __init__(self, task: Task, start: Reference, first: bool, kind: type[RootFilter]) -> None:
         self.recording, self.found = task.recording, task.survey
         self.frame, self.noise, self.start = task.frame, task.noise, start
         self.p = np.zeros(len(self.frame.layout))
@@ -70,7 +79,7 @@ class _Pass:
         self.stage_p = start.stage_p.copy()
         if len(self.stage_p):
             self.p[self.reset] = self.stage_p[0]
-        self.filter = RootFilter.of_prior(self.frame.layout.prior_sd, -self.p)
+        self.filter = kind.of_prior(self.frame.layout.prior_sd, -self.p)
         self.steps = Steps(self.filter, task.wander, self.found.sections[0].start_s)
         self.history = History()
         self.north = np.zeros((len(self.found.sections), 2, 2))

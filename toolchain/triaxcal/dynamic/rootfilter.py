@@ -73,6 +73,9 @@ class RootFilter:
 
     def restart_attitude(self, sd_rad: FloatArray) -> None:
         """Forget beta: a new alignment, error zero with standard deviations `sd_rad` (3,)."""
+        if self.R_bb.any():
+            self.log_root += float(np.log(np.abs(np.diag(self.R_bb))).sum())
+        self.log_root += float(np.log(sd_rad).sum())
         self.R_bb = np.diag(1 / sd_rad)
         self.R_bp = np.zeros_like(self.R_bp)
         self.z_b = np.zeros(3)

@@ -78,14 +78,20 @@ class Wander:
         return factor, self.sd * np.sqrt(growth)
 
 
-def wander_of(constants: Layout, noise: DataSheet, duration_s: float) -> Wander:
-    """What moves beside and among the constants of a layout, in a recording of a length."""
+def wander_of(
+    constants: Layout, noise: DataSheet, duration_s: float, shortest_s: float = SHORTEST_S
+) -> Wander:
+    """What moves beside and among the constants of a layout, in a recording of a length.
+
+    No time constant is below `shortest_s`.
+    """
     gyro = (noise.gyro_bias_instability_deg_per_h or 0.0) * DEG_PER_H / FLOOR
     accel = (noise.accel_bias_instability_ug or 0.0) * MICRO_G / FLOOR
-    made = _of_triad("rate", gyro, noise.rate_density, duration_s)
-    made += _of_triad("force", accel, noise.force_density(), duration_s)
+    times_s = max(shortest_s, SHORTEST_S), LONGEST * duration_s
+    made = _of_triad("rate", gyro, noise.rate_density, times_s)
+    made += _of_triad("force", accel, noise.force_density(), times_s)
     if "second-bias" in constants:
-        made += _of_triad("force2", accel, noise.force_density(second=True), duration_s)
+        made += _of_triad("force2", accel, noise.force_density(second=True), times_s)
     layout = Layout((*constants.blocks, *(block for block, _ in made)))
     moving = [(block.name, memory_s, block.states[0].prior_sd) for block, memory_s in made]
     root_hour = 60.0  # root seconds
@@ -114,12 +120,12 @@ def wander_of(constants: Layout, noise: DataSheet, duration_s: float) -> Wander:
 
 
 def _of_triad(
-    kind: str, instability: float, density: float, duration_s: float
+    kind: str, instability: float, density: float, times_s: tuple[float, float]
 ) -> list[tuple[StateBlock, float]]:
     """Gauss-Markov states of one triad, axes x, y, z for each time constant, and those."""
-    longest = LONGEST * duration_s
+    least, longest = times_s
     shortest = CORNER_PART * (density / instability) ** 2 if instability else math.inf
-    shortest = max(shortest, SHORTEST_S)
+    shortest = max(shortest, least)
     if shortest >= longest:
         return []
     steps = math.ceil(math.log(longest / shortest) / math.log(RATIO_MAX))

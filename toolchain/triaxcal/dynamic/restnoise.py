@@ -1,0 +1,87 @@
+"""White noise of both triads from the rests of a recording.
+
+Means over windows of 0.1 s lie beside each other in a rest. Half of the mean squared difference of
+means over twice that time is the Allan variance N^2 / t. Of each rest it is one number; their
+median is taken where there are enough, so that a rest that was none does no harm.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from triaxcal.base.errors import RefusedError
+from triaxcal.dynamic.survey import Survey
+from triaxcal.dynamic.windows import WINDOW_S
+from triaxcal.model.types import FloatArray
+
+TOGETHER = 2
+"""Windows whose mean is one of the values."""
+PAIRS_MIN = 4
+"""Differences in a rest that counts."""
+RESTS_MIN = 5
+"""For a median."""
+
+
+def rest_noise(name: str, found: Survey) -> tuple[float, float]:
+    """N of gyros (rad/sqrt(s)) and accelerometers (m/s^2 sqrt(s)), a mean of the three axes.
+
+    With the noise of counting.
+
+    Raises
+    ------
+    RefusedError
+        Where the rests are too short, or show none.
+    """
+    rests = _rests(found)
+    if not rests:
+        raise RefusedError(
+            f"{name}, rests",
+            f"none longer than {(PAIRS_MIN + 1) * TOGETHER * WINDOW_S:g} s: they do not show the "
+            "noise",
+            expected="longer rests, or [noise] in unit.toml",
+            remedy="state the figures of the data sheet in [noise]",
+        )
+    windows = found.windows
+    duration_s = TOGETHER * float(np.median(windows.duration_s))
+    made = []
+    for values, triad in ((windows.rate, "gyros"), (windows.force, "accelerometers")):
+        density = math.sqrt(_allan_variance([values[rest] for rest in rests]) * duration_s)
+        if density == 0.0:
+            raise RefusedError(
+                f"{name}, rests",
+                f"the {triad} read the same value throughout: their counts are coarser than their "
+                "noise",
+                expected="noise of a count at least, or [noise] in unit.toml",
+                remedy="state the figures of the data sheet in [noise]",
+            )
+        made.append(density)
+    return made[0], made[1]
+
+
+def _rests(found: Survey) -> list[FloatArray]:
+    """Numbers of the windows of each rest that is long enough."""
+    windows = found.windows
+    rest = found.still & found.use
+    full = np.abs(windows.duration_s - np.median(windows.duration_s)) < 1e-9
+    places = np.flatnonzero(rest & full)
+    cut = (np.diff(places) > 1) | (np.diff(windows.section[places]) != 0)
+    runs = np.split(places, np.flatnonzero(cut) + 1)
+    return [run for run in runs if len(run) >= (PAIRS_MIN + 1) * TOGETHER]
+
+
+def _allan_variance(rests: list[FloatArray]) -> float:
+    """Of means over `TOGETHER` windows (n, 3), mean of the axes."""
+    each, count = [], []
+    for values in rests:
+        n = len(values) // TOGETHER
+        means = values[: n * TOGETHER].reshape(n, TOGETHER, 3).mean(axis=1)
+        each.append(float((np.diff(means, axis=0) ** 2).mean()) / 2)
+        count.append(n - 1)
+    if len(each) < RESTS_MIN:
+        return float(np.average(each, weights=count))
+    # The median of chi-square with k degrees of freedom is k (1 - 2/(9 k))^3 (Wilson, Hilferty);
+    # differences that share a mean are worth 2/3 of as many of their own.
+    freedom = 3 * (2 / 3) * float(np.median(count))
+    return float(np.median(each)) / (1 - 2 / (9 * freedom)) ** 3
