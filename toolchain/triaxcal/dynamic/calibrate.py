@@ -13,13 +13,15 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.block import StateBlock
-from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
+from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass, taped_pass
+from triaxcal.dynamic.instability import expected, usual
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.passdata import PassResult, Reference, Task
 from triaxcal.dynamic.polled import at_least_seen
 from triaxcal.dynamic.preintegrate import NODES
 from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.restnoise import with_rests
 from triaxcal.dynamic.survey import Survey, survey
 from triaxcal.dynamic.wander import wander_of
 from triaxcal.dynamic.window import Frame
@@ -35,6 +37,8 @@ SETTLED_SD = 0.05
 DAMPED = 0.5
 """Part of a step that is taken once steps turn back on themselves: where the heading is known to
 some ten degrees only, whole ones may swing wider and wider about the minimum."""
+MOVES = 100
+"""Of the fastest wandering states, in a recording whose bias instability is still looked for."""
 
 Progress = Callable[[int, float], None]
 """Number of the pass and the part of it that is done."""
@@ -93,11 +97,13 @@ def calibrate_dynamic(
     size = _block_size(recording, found)
     duration_s = found.duration_s
     start = _first_reference(searching, recording, found)
+    stated, noise = noise, usual(with_rests(recording.name, found, noise))
+    decided = noise == stated
     passes: list[PassResult] = []
     part_of_step, step = 1.0, np.zeros(0)
     for number in range(PASSES_MAX):
         layout = searching if start.heading_rad is None else wanted
-        wander = wander_of(layout, noise, duration_s)
+        wander = wander_of(layout, noise, duration_s, 0.0 if decided else duration_s / MOVES)
         frame = _frame(wander.layout, recording, size, reference_degc)
         report = partial(progress, number) if progress is not None else _no_report
         task = Task(recording, found, frame, noise, wander)
@@ -112,7 +118,11 @@ def calibrate_dynamic(
             part_of_step = DAMPED
         start = _next_reference(start, done, n, recording, part_of_step)
         same_kind = (before is None) == (start.heading_rad is None)
-        if number >= 2 and moved < SETTLED_SD and same_kind:
+        settled = number >= 2 and moved < SETTLED_SD and same_kind
+        if settled and not decided:
+            noise = expected(stated, noise, taped_pass(task, start), wander)
+            decided = True
+        elif settled:
             covariance = done.root @ done.root.T
             shown = (done.p, sd, covariance, done.stage_p, start.heading_rad)
             return DynamicResult(layout, *shown, found, noise, frame, tuple(passes))

@@ -177,7 +177,7 @@ def imu_file() -> FileKeys:
             TOP,
             TURNING_SITE,
             dynamic_table(),
-            TableKeys.of(DataSheet),
+            TableKeys.of(DataSheet, optional=True),
             TableKeys.of(_TablePapers, optional=True),
             IMU_LIMITS,
             THERMAL,

@@ -2,16 +2,19 @@
 
 Poses of some seconds do not show it by themselves: a mean over 3 s scatters by white noise several
 times as much. All of them together do. The likelihood of a recording's innovations (`evidence`)
-says how much biases wander within it, and the most likely figure is taken, for each triad.
+says how much biases wander within it. With what is known of a sensor beforehand it gives a
+distribution of B, for each triad, and the root of the expected B^2 is used: the variance that the
+filter adds is then the expected one. Where the recording speaks against such a sensor, and for one
+without any flicker, at odds of `AGAINST`, there is none. Where it cannot tell, B is that of a usual
+sensor.
 
-A recording that cannot tell leaves the likelihood flat. Then the figure is that of a usual sensor:
-white noise and flicker have equal Allan deviations at `USUAL_S`,
+Beforehand ln B is normal with the standard deviation 1. In its middle white noise and flicker have
+equal Allan deviations at `USUAL_S`,
 
     N / sqrt(USUAL_S) = 0.664 B.
 
-Data sheets of MEMS sensors have this time between 2 and 50 s, so 10 s is within a factor of 2.3 of
-all of them in B. So much is a sensor known beforehand, and a figure far from the usual costs as
-much as one deviation of a normal distribution, but no more.
+Data sheets of MEMS sensors have that time between 2 and 50 s: 10 s is within a factor of 2.3 of all
+of them in B.
 """
 
 from __future__ import annotations
@@ -25,12 +28,18 @@ import numpy as np
 from triaxcal.dynamic.evidence import Tape
 from triaxcal.dynamic.noise import DEG_PER_H, MICRO_G, DataSheet
 from triaxcal.dynamic.wander import Wander
+from triaxcal.model.types import FloatArray
 
 USUAL_S = 10.0
-SMALLEST, LARGEST = 1 / 16, 16.0
-"""Of the usual figure: what is looked for; below the smallest there is none."""
-ROUNDS = 6
-"""Each takes 0.62 of what was left of the interval."""
+PRIOR_LOG_SD = 1.0
+OCTAVES = -4, 3
+"""Of the usual figure: what is looked for."""
+HALVINGS = 2
+NONE = 2.0**-8
+"""Of the usual figure: no flicker, for the filter."""
+AGAINST = 3.0
+"""Odds at which a recording speaks for no flicker at all (R. E. Kass, A. E. Raftery, Bayes factors,
+10.1080/01621459.1995.10476572: positive evidence)."""
 
 
 def usual(noise: DataSheet) -> DataSheet:
@@ -48,8 +57,8 @@ def usual(noise: DataSheet) -> DataSheet:
     )
 
 
-def most_likely(stated: DataSheet, tried: DataSheet, tape: Tape, wander: Wander) -> DataSheet:
-    """Figures that [noise] does not state, from a pass with those `tried`, rounded to 2 digits."""
+def expected(stated: DataSheet, tried: DataSheet, tape: Tape, wander: Wander) -> DataSheet:
+    """Figures that [noise] does not state, from a pass with those `tried`; two digits."""
     names = [state.name for state in wander.layout.states]
     rate = np.array([name.startswith("rate") for name in names])
     force = np.array([name.startswith("force") for name in names])
@@ -58,10 +67,10 @@ def most_likely(stated: DataSheet, tried: DataSheet, tape: Tape, wander: Wander)
     assert accel is not None
     factor = np.ones(len(names))
     if stated.gyro_bias_instability_deg_per_h is None and rate.any():
-        best = _lowest(lambda s: tape.deviance(np.where(rate, s, factor)))
-        factor[rate], gyro = max(best, SMALLEST), gyro * best
+        best = _expected(lambda s: tape.deviance(np.where(rate, s, factor)))
+        factor[rate], gyro = max(best, NONE), gyro * best
     if stated.accel_bias_instability_ug is None and force.any():
-        accel *= _lowest(lambda s: tape.deviance(np.where(force, s, factor)))
+        accel *= _expected(lambda s: tape.deviance(np.where(force, s, factor)))
     return replace(
         tried,
         gyro_bias_instability_deg_per_h=float(f"{gyro:.2g}"),
@@ -69,30 +78,32 @@ def most_likely(stated: DataSheet, tried: DataSheet, tape: Tape, wander: Wander)
     )
 
 
-def _lowest(deviance: Callable[[float], float]) -> float:
-    """Factor of the usual figure with the lowest deviance; 0 where that is the smallest."""
+def _expected(deviance: Callable[[float], float]) -> float:
+    """Root of the expected square of the factor of the usual figure; 0 where there is no flicker.
 
-    def cost(log: float) -> float:
-        return deviance(math.exp(log)) + min(log**2, 1.0)
-
-    coarse = np.linspace(math.log(SMALLEST), math.log(LARGEST), 7)
-    values = [cost(float(log)) for log in coarse[:5]]
-    while len(values) < len(coarse) and values[-1] <= min(values):
-        values.append(cost(float(coarse[len(values)])))
-    k = int(np.argmin(values))
-    if k == 0:
+    By trapezia over a grid of octaves that is halved where the factor is most likely.
+    """
+    none = deviance(2.0 ** OCTAVES[0] / 8)
+    found = {o: deviance(2.0**o) for o in np.arange(OCTAVES[0], OCTAVES[1] + 1.0).tolist()}
+    step = 1.0
+    for _ in range(HALVINGS):
+        step /= 2
+        best = min(found, key=lambda octave: found[octave] + _surprise(octave))
+        found |= {o: deviance(2.0**o) for o in (best - step, best + step)}
+    x = np.array(sorted(found))
+    prior = np.exp(-_surprise(x) / 2)
+    likely = prior * np.exp(-(np.array([found[o] for o in x]) - min(found.values())) / 2)
+    odds = _integral(likely, x) / _integral(prior, x) * math.exp((none - min(found.values())) / 2)
+    if odds < 1 / AGAINST:
         return 0.0
-    low, high = float(coarse[k - 1]), float(coarse[min(k + 1, len(coarse) - 1)])
-    golden = (math.sqrt(5) - 1) / 2
-    inner = [high - golden * (high - low), low + golden * (high - low)]
-    costs = [cost(x) for x in inner]
-    for _ in range(ROUNDS):
-        if costs[0] < costs[1]:
-            high, inner, costs = inner[1], [0.0, inner[0]], [0.0, costs[0]]
-            inner[0] = high - golden * (high - low)
-            costs[0] = cost(inner[0])
-        else:
-            low, inner, costs = inner[0], [inner[1], 0.0], [costs[1], 0.0]
-            inner[1] = low + golden * (high - low)
-            costs[1] = cost(inner[1])
-    return math.exp(inner[int(np.argmin(costs))])
+    return math.sqrt(_integral(likely * 4.0**x, x) / _integral(likely, x))
+
+
+def _surprise(octave: FloatArray) -> FloatArray:
+    """-2 ln of the distribution known beforehand, but for a constant."""
+    result: FloatArray = (np.asarray(octave) * math.log(2) / PRIOR_LOG_SD) ** 2
+    return result
+
+
+def _integral(y: FloatArray, x: FloatArray) -> float:
+    return float(((y[1:] + y[:-1]) / 2) @ np.diff(x))

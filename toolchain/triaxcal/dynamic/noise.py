@@ -15,6 +15,10 @@ MICRO_G = 9.80665e-6
 """Of standard gravity, as data sheets mean it; m/s^2."""
 
 
+RESTS = "from the rests"
+LIKELY = "from the recording"
+
+
 @dataclass(frozen=True)
 class DataSheet:
     """[noise]: noise of both triads, as data sheets state it.
@@ -48,9 +52,11 @@ class DataSheet:
         Acceleration random walk K, of both triads.
     """
 
-    gyro_arw_deg_per_sqrt_h: float = setting(number(1e-6, 100.0), unit="deg/sqrt(h)", example="0.3")
-    accel_vrw_ug_per_sqrt_hz: float = setting(
-        number(1e-3, 1e5), unit="micro-g/sqrt(Hz)", example="100"
+    gyro_arw_deg_per_sqrt_h: float | None = setting(
+        number(1e-6, 100.0), None, "deg/sqrt(h)", words=RESTS, example="0.3"
+    )
+    accel_vrw_ug_per_sqrt_hz: float | None = setting(
+        number(1e-3, 1e5), None, "micro-g/sqrt(Hz)", words=RESTS, example="100"
     )
     second_vrw_ug_per_sqrt_hz: float | None = setting(
         number(1e-3, 1e5), None, "micro-g/sqrt(Hz)", words="as the first", example="100"
@@ -59,27 +65,25 @@ class DataSheet:
     table_sd_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec", example="60")
     axis_wobble_arcsec: float | None = setting(number(1e-3, 1e5), None, "arcsec", example="30")
     gyro_bias_instability_deg_per_h: float | None = setting(
-        number(0.0, 1e4), None, "deg/h", words="0", example="2"
+        number(0.0, 1e4), None, "deg/h", words=LIKELY, example="2"
     )
     accel_bias_instability_ug: float | None = setting(
-        number(0.0, 1e5), None, "micro-g", words="0", example="15"
+        number(0.0, 1e5), None, "micro-g", words=LIKELY, example="15"
     )
-    gyro_random_walk_deg_per_h_per_sqrt_h: float | None = setting(
-        number(0.0, 1e4), None, "deg/h/sqrt(h)", words="0", example="1"
-    )
-    accel_random_walk_ug_per_sqrt_h: float | None = setting(
-        number(0.0, 1e5), None, "micro-g/sqrt(h)", words="0", example="5"
-    )
+    gyro_random_walk_deg_per_h_per_sqrt_h: float = setting(number(0.0, 1e4), 0.0, "deg/h/sqrt(h)")
+    accel_random_walk_ug_per_sqrt_h: float = setting(number(0.0, 1e5), 0.0, "micro-g/sqrt(h)")
 
     @property
     def rate_density(self) -> float:
         """Rad per sqrt(s)."""
+        assert self.gyro_arw_deg_per_sqrt_h is not None
         return math.radians(self.gyro_arw_deg_per_sqrt_h) / 60
 
     def force_density(self, second: bool = False) -> float:
         """m/s^2 sqrt(s)."""
         stated = self.second_vrw_ug_per_sqrt_hz
         density = stated if second and stated is not None else self.accel_vrw_ug_per_sqrt_hz
+        assert density is not None
         return density * MICRO_G
 
     def mean_force_variance(

@@ -8,13 +8,15 @@ median is taken where there are enough, so that a rest that was none does no har
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.dynamic.survey import Survey
 from triaxcal.dynamic.windows import WINDOW_S
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import FloatArray, IntArray
 
 TOGETHER = 2
 """Windows whose mean is one of the values."""
@@ -22,6 +24,26 @@ PAIRS_MIN = 4
 """Differences in a rest that counts."""
 RESTS_MIN = 5
 """For a median."""
+
+
+def with_rests(name: str, found: Survey, stated: DataSheet) -> DataSheet:
+    """White noise as it is stated, else that of the rests; the counts of those are in it.
+
+    Raises
+    ------
+    RefusedError
+        As `rest_noise`.
+    """
+    arw, vrw = stated.gyro_arw_deg_per_sqrt_h, stated.accel_vrw_ug_per_sqrt_hz
+    if arw is not None and vrw is not None:
+        return stated
+    rate, force = rest_noise(name, found)
+    if arw is None:
+        stated = replace(stated, gyro_arw_deg_per_sqrt_h=float(f"{math.degrees(rate) * 60:.3g}"))
+    if vrw is None:
+        vrw = float(f"{force / MICRO_G:.3g}")
+        stated = replace(stated, accel_vrw_ug_per_sqrt_hz=vrw, accel_lsb=0.0)
+    return stated
 
 
 def rest_noise(name: str, found: Survey) -> tuple[float, float]:
@@ -60,14 +82,14 @@ def rest_noise(name: str, found: Survey) -> tuple[float, float]:
     return made[0], made[1]
 
 
-def _rests(found: Survey) -> list[FloatArray]:
+def _rests(found: Survey) -> list[IntArray]:
     """Numbers of the windows of each rest that is long enough."""
     windows = found.windows
     rest = found.still & found.use
     full = np.abs(windows.duration_s - np.median(windows.duration_s)) < 1e-9
     places = np.flatnonzero(rest & full)
     cut = (np.diff(places) > 1) | (np.diff(windows.section[places]) != 0)
-    runs = np.split(places, np.flatnonzero(cut) + 1)
+    runs = np.split(places.astype(np.int64), np.flatnonzero(cut) + 1)
     return [run for run in runs if len(run) >= (PAIRS_MIN + 1) * TOGETHER]
 
 

@@ -31,7 +31,7 @@ from triaxcal.model.types import FloatArray, IntArray
 
 FLOOR = math.sqrt(2 * math.log(2) / math.pi)
 """Allan deviation of B = 1, which is what data sheets state."""
-LONGEST = 5.0
+LONGEST = 10.0
 """Of the recording's length: the longest time constant."""
 RATIO_MAX = 10.0
 """Of neighbouring time constants."""
@@ -79,7 +79,7 @@ class Wander:
 
 
 def wander_of(
-    constants: Layout, noise: DataSheet, duration_s: float, shortest_s: float = SHORTEST_S
+    constants: Layout, noise: DataSheet, duration_s: float, shortest_s: float = 0.0
 ) -> Wander:
     """What moves beside and among the constants of a layout, in a recording of a length.
 
@@ -95,8 +95,8 @@ def wander_of(
     layout = Layout((*constants.blocks, *(block for block, _ in made)))
     moving = [(block.name, memory_s, block.states[0].prior_sd) for block, memory_s in made]
     root_hour = 60.0  # root seconds
-    walk = (noise.gyro_random_walk_deg_per_h_per_sqrt_h or 0.0) * DEG_PER_H / root_hour
-    accel_walk = (noise.accel_random_walk_ug_per_sqrt_h or 0.0) * MICRO_G / root_hour
+    walk = noise.gyro_random_walk_deg_per_h_per_sqrt_h * DEG_PER_H / root_hour
+    accel_walk = noise.accel_random_walk_ug_per_sqrt_h * MICRO_G / root_hour
     for name, sd in (
         ("gyro-bias", walk),
         ("accelerometer-bias", accel_walk),
