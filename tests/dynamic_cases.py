@@ -53,6 +53,8 @@ def sheet(truth: ImuTruth) -> DataSheet:
         noise.accel_vrw_ug_per_sqrt_hz,
         accel_lsb=noise.accel_lsb,
         table_sd_arcsec=noise.table_sd_arcsec,
+        gyro_bias_instability_deg_per_h=0.0,
+        accel_bias_instability_ug=0.0,
     )
 
 
@@ -100,6 +102,8 @@ force_samples = "instant"
 gyro_arw_deg_per_sqrt_h = 0.3
 accel_vrw_ug_per_sqrt_hz = 100
 accel_lsb = 10
+gyro_bias_instability_deg_per_h = 0
+accel_bias_instability_ug = 0
 """
 COLUMNS = ("time_s", "gx", "gy", "gz", "ax", "ay", "az", "temp_degc")
 

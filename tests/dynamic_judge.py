@@ -123,4 +123,6 @@ def data_sheet(noise: ImuNoise) -> DataSheet:
         accel_lsb=noise.accel_lsb,
         table_sd_arcsec=noise.table_sd_arcsec,
         axis_wobble_arcsec=120.0,
+        gyro_bias_instability_deg_per_h=0.0,
+        accel_bias_instability_ug=0.0,
     )

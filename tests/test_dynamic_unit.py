@@ -109,7 +109,7 @@ BAD_TOML = {
         "it is saturated; expected rates within its range, 0.05 deg/s",
     ),
     "both rate and times": ("[noise]", "rate_hz = 50\n[noise]", "both given"),
-    "noise absent": ("gyro_arw_deg_per_sqrt_h = 0.3\n", "", "[noise] gyro_arw_deg_per_sqrt_h"),
+    "noise below zero": ("_h = 0.3\n", "_h = -0.3\n", "[noise] gyro_arw_deg_per_sqrt_h"),
 }
 
 

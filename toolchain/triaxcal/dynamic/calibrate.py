@@ -16,7 +16,7 @@ from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass, taped_pass
 from triaxcal.dynamic.instability import expected, usual
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.noise import DataSheet
+from triaxcal.dynamic.noise import DataSheet, differing
 from triaxcal.dynamic.passdata import PassResult, Reference, Task
 from triaxcal.dynamic.polled import at_least_seen
 from triaxcal.dynamic.preintegrate import NODES
@@ -61,6 +61,8 @@ class DynamicResult:
     survey : Survey
     noise : DataSheet
         What the filter used.
+    estimated : tuple of str
+        Keys of it that were not stated: from the recording itself.
     frame : Frame
         Of the last pass; its layout has the wandering biases after the constants.
     passes : tuple of PassResult
@@ -75,6 +77,7 @@ class DynamicResult:
     heading_rad: FloatArray | None
     survey: Survey
     noise: DataSheet
+    estimated: tuple[str, ...]
     frame: Frame
     passes: tuple[PassResult, ...]
 
@@ -124,8 +127,9 @@ def calibrate_dynamic(
             decided = True
         elif settled:
             covariance = done.root @ done.root.T
-            shown = (done.p, sd, covariance, done.stage_p, start.heading_rad)
-            return DynamicResult(layout, *shown, found, noise, frame, tuple(passes))
+            shown = (done.p, sd, covariance, done.stage_p, start.heading_rad, found)
+            used = noise, differing(stated, noise)
+            return DynamicResult(layout, *shown, *used, frame, tuple(passes))
     raise RefusedError(
         recording.name,
         f"after {PASSES_MAX} passes the constants still move by {moved:.1f} standard deviations",

@@ -18,7 +18,6 @@ import numpy as np
 
 from triaxcal.dynamic.blocks.attitude import level, rotation_of
 from triaxcal.dynamic.channels import Moments, extra_rows, steady
-from triaxcal.dynamic.evidence import Tape
 from triaxcal.dynamic.noise import ARCSEC
 from triaxcal.dynamic.passdata import History, PassResult, Reference, Task
 from triaxcal.dynamic.preintegrate import BlockEquations, equations
@@ -26,6 +25,7 @@ from triaxcal.dynamic.recording import ImuRecording, ImuSamples, joined
 from triaxcal.dynamic.rootfilter import RootFilter
 from triaxcal.dynamic.steps import Steps
 from triaxcal.dynamic.survey import Section
+from triaxcal.dynamic.tape import Tape
 from triaxcal.dynamic.whiten import whitened
 from triaxcal.dynamic.window import About, Window, gamma_matrix, inverse_of_one_plus
 from triaxcal.model.types import BoolArray, FloatArray, IntArray

@@ -1,7 +1,7 @@
 """Bias instability from the recording, where [noise] does not state it.
 
 Poses of some seconds do not show it by themselves: a mean over 3 s scatters by white noise several
-times as much. All of them together do. The likelihood of a recording's innovations (`evidence`)
+times as much. All of them together do. The likelihood of a recording's innovations (`tape`)
 says how much biases wander within it. With what is known of a sensor beforehand it gives a
 distribution of B, for each triad, and the root of the expected B^2 is used: the variance that the
 filter adds is then the expected one. Where the recording speaks against such a sensor, and for one
@@ -25,8 +25,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from triaxcal.dynamic.evidence import Tape
 from triaxcal.dynamic.noise import DEG_PER_H, MICRO_G, DataSheet
+from triaxcal.dynamic.tape import Tape
 from triaxcal.dynamic.wander import Wander
 from triaxcal.model.types import FloatArray
 

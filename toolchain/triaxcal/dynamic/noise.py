@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
 
 from triaxcal.base.keys import setting
 from triaxcal.base.kinds import number
@@ -86,6 +87,15 @@ class DataSheet:
         assert density is not None
         return density * MICRO_G
 
+    def noisier(self, rate: float, force: float) -> DataSheet:
+        """The same with so many times the white noise of gyros and of accelerometers."""
+        arw, vrw = self.gyro_arw_deg_per_sqrt_h, self.accel_vrw_ug_per_sqrt_hz
+        assert arw is not None
+        assert vrw is not None
+        return replace(
+            self, gyro_arw_deg_per_sqrt_h=rate * arw, accel_vrw_ug_per_sqrt_hz=force * vrw
+        )
+
     def mean_force_variance(
         self, duration_s: float, samples: float, convention: str, second: bool = False
     ) -> float:
@@ -99,3 +109,14 @@ class DataSheet:
         else:
             counting = (self.accel_lsb * MICRO_G) ** 2 / 12 / samples
         return self.force_density(second) ** 2 / duration_s + counting
+
+
+def differing(stated: DataSheet, used: DataSheet) -> tuple[str, ...]:
+    """Names of the figures that are not those stated, in their order."""
+    names = [f.name for f in fields(DataSheet)]
+    return tuple(name for name in names if getattr(stated, name) != getattr(used, name))
+
+
+def noise_section(noise: DataSheet, names: Iterable[str]) -> list[str]:
+    """Lines of a [noise] with these figures, for unit.toml."""
+    return ["[noise]", *(f"{name} = {getattr(noise, name):g}" for name in names)]

@@ -48,8 +48,8 @@ class RootFilter:
         Sum of squared normalised innovations folded in so far, and their number.
     log_root : float
         Sum of log |R_ii| of all unknowns eliminated so far, less log 1/sd of the noise of states
-        that move. With log |R_ii| of those that are left, and of the prior, it is half of what a
-        wider noise costs in the likelihood.
+        that move and of new alignments. With log |R_ii| of those that are left, and of the prior,
+        it is half of what a wider noise costs in the likelihood.
     """
 
     R_bb: FloatArray

@@ -97,16 +97,11 @@ class Noise:
 
     def of(self, case: Case, held: HeldOut | None, /) -> Suspect | None:
         """The noise as the rests scatter."""
-        noise = case.noise
         rate, force = noise_at_rest(case)
         if max(rate, force) <= NOISIER:
             return None
         rate, force = max(rate, 1.0), max(force, 1.0)
-        more = replace(
-            noise,
-            gyro_arw_deg_per_sqrt_h=rate * noise.gyro_arw_deg_per_sqrt_h,
-            accel_vrw_ug_per_sqrt_hz=force * noise.accel_vrw_ug_per_sqrt_hz,
-        )
+        more = case.noise.noisier(rate, force)
         words = (
             f"more noise than stated: at rest the gyros scatter by {rate:.3g} times what [noise] "
             f"states, the accelerometers by {force:.3g} times"

@@ -21,6 +21,7 @@ from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.dynamicpage import digits, dynamic_page, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
+from triaxcal.report.imunoise import noise_document, noise_lines
 from triaxcal.report.overtemperature import over_document, over_lines
 from triaxcal.report.stated.statements import statements_of
 from triaxcal.unit.measured import MEASURED
@@ -65,6 +66,7 @@ def calibration_document(made: ImuDelivery) -> dict[str, Any]:
         "heading_rad": None if result.heading_rad is None else result.heading_rad.tolist(),
         "stages": [asdict(stage) | {"axis": "xyz"[stage.axis]} for stage in result.survey.stages],
         "passes": len(result.passes),
+        "noise": noise_document(result),
         "innovations": {
             "chi_square": last.chi_square,
             "freedom": last.freedom,
@@ -133,6 +135,7 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
         f"filter          {3 + len(layout)} states, {len(result.passes)} passes, "
         f"{last.freedom:_} measurements".replace("_", " "),
         f"                {innovation_words(result)}",
+        *noise_lines(result),
         *_verdict_lines(made.verdict),
         "",
     ]
@@ -162,10 +165,13 @@ def plan_summary(done: DynamicUnit) -> str:
     result, layout = done.result, done.result.layout
     span = result.survey.windows.start_s[[0, -1]]
     minutes, states = (span[1] - span[0]) / 60, 3 + len(layout)
+    noise = done.unit.noise
+    unknown = None in (noise.gyro_bias_instability_deg_per_h, noise.accel_bias_instability_ug)
     lines = [
         f"plan            {done.unit.name}: {minutes:.1f} min, {states} states",
         "",
         "expected standard deviations from a recording of this motion, if the model is right",
+        *(["without bias instability, which [noise] does not state"] * unknown),
     ]
     for block in layout.blocks:
         lines.append(block.title)

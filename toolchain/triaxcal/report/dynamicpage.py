@@ -17,6 +17,7 @@ from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Weak
 from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.imuc import NO_C, imu_verification
+from triaxcal.report.imunoise import noise_words
 from triaxcal.report.overtemperature import over_context
 from triaxcal.report.stated.statements import statements_of
 from triaxcal.report.stated.words import label, value_words
@@ -145,6 +146,7 @@ def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
         ("Place", signed(f"latitude {unit.latitude_deg:g}°, {unit.gravity_m_per_s2:.6g} m/s²")),
         ("Filter", f"{states} states, {passes} passes, {freedom} measurements"),
         ("Extensions", ", ".join(unit.blocks) or "none"),
+        ("Noise", noise_words(result)),
     ]
     if made.c is not None:
         low, high = made.c.device.range_degc
