@@ -164,3 +164,16 @@ def test_a_clock_that_is_none() -> None:
     with pytest.raises(RefusedError) as refusal:
         mended(whole)
     assert "\n" not in str(refusal.value)
+
+
+def test_steps_that_add_up_are_no_jitter() -> None:
+    """A program that waits 9 to 11 ms for each sample: the stamps wander from any even clock."""
+    whole = rows()
+    step = np.random.default_rng(10).integers(9, 12, len(whole)) * 1e-3
+    time = np.cumsum(step)
+    taken = np.column_stack([time, *(np.interp(time, whole[:, 0], c) for c in whole[:, 1:].T)])
+    taken = taken[time < whole[-1, 0]]
+    found = mended(taken)
+    assert np.array_equal(found.samples.time_s, taken[:, 0])
+    assert "uneven by 0.8" in found.findings[0]
+    assert "taken at their stamps" in found.findings[0]

@@ -13,7 +13,7 @@ from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.parts import Log
 from triaxcal.dynamic.quantities import FORCES, offsets_of, offsets_told
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording, ImuSamples
-from triaxcal.dynamic.repair import repaired
+from triaxcal.dynamic.repair import UNEVEN, repaired
 from triaxcal.model.types import FloatArray
 from triaxcal.readings.evenclock import step_of
 from triaxcal.readings.format import PIECE
@@ -22,8 +22,6 @@ from triaxcal.readings.opened import RecordingFile
 from triaxcal.readings.table import TIME, Quantity, ReadTable, read_table
 from triaxcal.unit.recordingfile import ClockLayout, FileLayout
 
-UNEVEN = 0.01
-"""Of a step: stamps that are nearer to even ones cost nothing."""
 SLOWEST_S = SHORTEST_S = 1.0
 FULL_SCALE = 0.999
 """Of the stated range: scale factors have errors too."""

@@ -22,6 +22,8 @@ from triaxcal.readings.evenclock import EvenClock, taken_at_stamps
 from triaxcal.readings.held import changed, held_share, stuck
 from triaxcal.readings.sequence import sequence
 
+UNEVEN = 0.01
+"""Of a step: stamps that are nearer to even ones cost nothing."""
 TOGETHER = 0.75
 """Of the rows of either triad: where more have both, the triads have one clock."""
 SLOWER = 1.2
@@ -157,6 +159,11 @@ def _parts(log: Log, names: tuple[str, ...]) -> tuple[list[Part], list[str]]:
             words.append(f"samples are uneven by {rms}, and are taken at their stamps")
         else:
             words.append(f"stamps scatter by {rms} about an even clock of {hz}: its times are used")
+    else:
+        uneven = np.std(np.diff(stamps_s) / np.diff(clock.number) - clock.step_s)
+        if uneven > UNEVEN * clock.step_s:
+            rms = f"{1e3 * uneven:.3g} ms rms"
+            words.append(f"samples are uneven by {rms} from row to row: taken at their stamps")
     places = {name: slice(3 * k, 3 * k + 3) for k, name in enumerate(names)}
     return _unheld(log, places, clock, values, words), words
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
@@ -45,6 +45,8 @@ _RESTART = 0.05
 _SURELY = 10.0
 """Deviations of a median of `_REACH` stamps that are no chance in millions of rows."""
 _RESTARTS_MAX = 0.05
+_WANDERS = 2.0
+"""Mean square of stamps about a slow curve, over that of jitter as large from row to row."""
 _LOOSE = 4.0
 """Mean square of the bins' means about a curve over that of their noise, where it is enough:
 what is less than two deviations of a bin is not worth more bends."""
@@ -174,9 +176,30 @@ def _smoothed(
         own_s = float(since[-1] / beat[-1]) if beat[-1] >= _SPAN else step_s
         late = since - own_s * beat
         drift = _curve(beat, late)
+        drift = drift + _wandering(late - drift)
         time_s[part] = stamps_s[part[0]] + own_s * beat + drift
         residual[part] = late - drift
     return time_s, residual
+
+
+def _wandering(left: FloatArray) -> FloatArray:
+    """What of the rest (n,) about a slow curve is no jitter: the samples themselves are uneven.
+
+    Of white jitter of variance r and steps of variance q that add up, the differences have the
+    variance q + 2 r and the covariance -r with the next one.
+    """
+    if len(left) < _SPAN:
+        return np.zeros(len(left))
+    step = np.diff(left)
+    step = np.where(_near(step), step, 0.0)
+    variance, next_to = float(np.mean(step**2)), float(np.mean(step[1:] * step[:-1]))
+    own = left[_near(left)]
+    if float(np.mean((own - own.mean()) ** 2)) <= _WANDERS * variance / 2:
+        return np.zeros(len(left))
+    jitter, wander = max(-next_to, 0.0), max(variance + 2 * next_to, 1e-30)
+    if wander >= jitter / 4:
+        return left
+    return np.asarray(uniform_filter1d(left, 2 * round(np.sqrt(jitter / wander)) + 1))
 
 
 def _restarts(stamps_s: FloatArray, number: IntArray, step_s: float) -> IntArray:
