@@ -29,6 +29,35 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
+class Kind:
+    """A kind of figure, and how its ratio reads.
+
+    Attributes
+    ----------
+    words : str
+        Of the page's head.
+    ratio : callable
+        Of this program's value and the other's.
+    """
+
+    words: str
+    ratio: Callable[[float, float], float]
+
+
+KINDS = {
+    "amount": Kind(
+        "of seconds and bytes, the other's divided by this program's",
+        lambda own, other: other / own,
+    ),
+    "rate": Kind(
+        "of what is done in a minute, this program's divided by the other's",
+        lambda own, other: own / other,
+    ),
+}
+"""In both the other takes more where the ratio is above 1."""
+
+
+@dataclass(frozen=True)
 class Figure:
     """What was measured, and what stands beside it in the same unit.
 
@@ -40,6 +69,8 @@ class Figure:
         What it is compared with, measured in the same run; "" where nothing is.
     other : float
         Its value.
+    kind : str
+        One of `KINDS`.
     """
 
     what: str
@@ -47,11 +78,14 @@ class Figure:
     unit: str
     against: str = ""
     other: float = 0.0
+    kind: str = "amount"
 
     @property
     def ratio(self) -> float | None:
-        """The other's value in units of this one's."""
-        return self.other / self.value if self.against and self.value else None
+        """How many times what this program takes the other takes."""
+        if not (self.against and self.value and self.other):
+            return None
+        return KINDS[self.kind].ratio(self.value, self.other)
 
 
 @dataclass(frozen=True)

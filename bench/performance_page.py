@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping
 
-from measuring import BENCHES, ROOT, Bench, Figure
+from measuring import BENCHES, KINDS, ROOT, Bench, Figure
 
 from triaxcal.batch.local import cores
 from triaxcal.report.words.numbers import scaled, thousands
@@ -17,9 +17,10 @@ _HEAD = """\
 <!-- written by `make bench`; do not edit -->
 
 Every figure on this page is of one run of `make bench`, on {cores} with Python {python}{how}.
-What is compared was measured in turn in that run. *Ratio* is the figure of the other divided by
-this program's: above 1, the other takes more. Times are processor time of all processes, unless a
-row says otherwise. On another machine the seconds differ, and the ratios change little.
+What is compared was measured in turn in that run. *Ratio*: above 1, the other takes more. It is
+{ratios}.
+Times are processor time of all processes, unless a row says otherwise. On another machine the
+seconds differ, and the ratios change little.
 
     make bench                                            # all of them, and this page
     .venv/bin/python bench/run.py series --full
@@ -73,6 +74,7 @@ def page(found: Mapping[str, list[Figure] | str], size: str, load: float = 0.0) 
         cores=f"{count} core{'s' * (count != 1)}",
         python=".".join(platform.python_version_tuple()[:2]),
         how=how,
+        ratios=";\n".join(kind.words for kind in KINDS.values()),
     )
     return "\n".join([head, *(section(b, found[b.name]) for b in BENCHES)]) + _CITED
 

@@ -15,7 +15,7 @@ sys.path.insert(0, str(REPO / "bench"))
 
 pytest.importorskip("can", reason="benchmarks of the bench need python-can")
 
-from measuring import BENCHES, Bench, Figure  # noqa: E402
+from measuring import BENCHES, KINDS, Bench, Figure  # noqa: E402
 from performance_page import PAGE, page, printed, row, section  # noqa: E402
 
 BOUND = re.compile(
@@ -48,10 +48,21 @@ def test_the_page_has_what_the_registry_has() -> None:
     assert "## A toy\n\nWhat it is.\n" in text
     assert "| what it does | 0.250 s | another | 1.00 s | 4.00 |" in text
     assert "| alone | 3.00 MB |  |  |  |" in text
+    for kind in KINDS.values():
+        assert kind.words in text
     assert text.count("*Not measured in this run*: left out.") == len(BENCHES.names)
     for bench in BENCHES:
         assert f"\n## {bench.label}\n" in text
     assert "## A toy" not in page(found, "short")
+
+
+def test_above_1_the_other_takes_more_of_a_rate_too() -> None:
+    """Half as many a minute is twice the time."""
+    assert Figure("", 0.5, "s", "another", 1.0).ratio == 2.0
+    assert Figure("", 100.0, "a minute", "another", 50.0, "rate").ratio == 2.0
+    assert Figure("", 1.0, "s", "another", 0.0).ratio is None
+    named = {figure.kind for figure in (Figure("", 1.0, "s"), Figure("", 1.0, "", kind="rate"))}
+    assert named == set(KINDS)
 
 
 def test_a_busy_machine_is_said() -> None:

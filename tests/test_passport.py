@@ -235,3 +235,16 @@ def test_limits_are_drawn_over_the_marks(passports: dict[str, Passport], name: s
 def test_what_was_held_out_is_counted_in_dwells(passports: dict[str, Passport]) -> None:
     """As the certificate counts it: five temperatures of six positions and 36 check dwells."""
     assert "held-out errors at 66 dwells" in read(passport_html(passports["AT-SIM"])).text
+
+
+def test_json_and_page_name_the_same_as_not_tested(delivered: dict[str, Delivery]) -> None:
+    made = passport(delivered["AT-SIM"], {})
+    said = json.loads(passport_json(made))["not_tested"]
+    assert said == [
+        "the C on a device of this unit",
+        "the C with other tools (triaxcal verify)",
+    ]
+    page = passport_html(made).decode()
+    assert all(f"<li>{words}</li>" in page for words in said)
+    shown = passport(delivered["AT-SIM"], {"gappa": "passed"})
+    assert json.loads(passport_json(shown))["not_tested"] == said[:1]

@@ -163,7 +163,7 @@ def measure(size: str) -> list[Figure]:
         alone = spent(lambda: run(triaxcal("calib", unit), folder))
     found = [
         Figure(_EACH, each, "CPU s", "`triaxcal calib` on one of them", alone),
-        Figure(_RATE, 120.0 / each, "a minute", "asked for", 90.0),
+        Figure(_RATE, 120.0 / each, "a minute", "asked for", 90.0, "rate"),
         Figure(_AGAIN, total(again, "cpu"), "CPU s", f"the first run of {count} units", cpu),
     ]
     if size == "full":

@@ -74,7 +74,7 @@ class ReportedTests:
 
 
 def make_test_report(
-    unit: Unit, standard: str = STANDARDS[0], *, calibration: Calibration | None = None
+    unit: Unit, standard: str = next(iter(STANDARDS)), *, calibration: Calibration | None = None
 ) -> ReportedTests:
     """Report of everything that a unit's folder shows of it, and of what it does not.
 

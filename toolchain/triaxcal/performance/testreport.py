@@ -26,8 +26,8 @@ from triaxcal.performance.vibration import Shake, vibration_chapter
 from triaxcal.uncertainty.history import Repeatability
 from triaxcal.unit.recordedtest import HYSTERESIS, POWER_ON, REST, StatedTest
 
-STANDARDS = ("ieee-1293",)
-"""Whose figures and symbols a report follows."""
+STANDARDS = {"ieee-1293": "Figures and symbols as accelerometer houses report by IEEE Std 1293"}
+"""Whose figures and symbols a report follows, and what its page says of that."""
 T = TypeVar("T")
 
 

@@ -12,10 +12,13 @@ from triaxcal.base.jsontext import json_bytes, sha256_of_files
 from triaxcal.base.plaindata import plain
 from triaxcal.model.metrological import CONSTANT_NAMES
 from triaxcal.report.passport.content import Passport
+from triaxcal.report.passport.head import unshown
 from triaxcal.report.stated.statements import stated_json
 from triaxcal.report.stated.words import caution_words
+from triaxcal.report.texts.speaker import speaker
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.coverage import LEVEL
+from triaxcal.unit.passport import ENGLISH
 
 FORMAT = 1
 
@@ -54,7 +57,8 @@ def _device(p: Passport) -> dict[str, Any] | None:
 
 
 def _judged(p: Passport) -> dict[str, Any]:
-    """The verdict, and the limits that it rests on."""
+    """The verdict, the limits that it rests on, and what was not tested, as on the page."""
+    t = speaker(ENGLISH)
     return {
         "result": p.verdict.result,
         "verdict": p.verdict.words,
@@ -62,7 +66,7 @@ def _judged(p: Passport) -> dict[str, Any]:
             "name": p.delivery.unit.limits.decision_rule,
             "words": p.delivery.unit.limits.rule_words,
         },
-        "not_tested": list(p.verdict.not_tested),
+        "not_tested": [*p.verdict.not_tested, *(t.plain(k, **v) for k, v in unshown(p))],
         "tested": [
             {
                 "where": t.where,

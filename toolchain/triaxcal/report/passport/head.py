@@ -102,18 +102,24 @@ def tested(p: Passport, t: Speaker) -> list[tuple[str, list[str]]]:
         yes.append(t(f"tested.held_out{poses}", count=counts[HELD_OUT]))
     yes.append(t("tested.arithmetic", count=thousands(done.check.total)))
     no: list[str] = [t.say(words) for words in verdict.not_tested]
-    device = p.device
     if p.verified_device is not None:
         yes.append(t("tested.device", serial=_serial(p), date=p.verified_device.date))
-    elif device is not None:
-        no.append(t("tested.other_device", date=device.date))
-    else:
-        no.append(t("tested.no_device"))
     if p.tools:
         yes.append(t("tested.tools", names=", ".join(p.tools)))
-    else:
-        no.append(t("tested.no_tools"))
+    no += [t(key, **values) for key, values in unshown(p)]
     return [(t("tested.yes"), yes), (t("tested.no"), no or [t("tested.everything")])]
+
+
+def unshown(p: Passport) -> list[tuple[str, dict[str, str]]]:
+    """What neither a device nor a tool has shown of the C: keys of texts with their values."""
+    found: list[tuple[str, dict[str, str]]] = []
+    if p.device is None:
+        found.append(("tested.no_device", {}))
+    elif p.verified_device is None:
+        found.append(("tested.other_device", {"date": p.device.date}))
+    if not p.tools:
+        found.append(("tested.no_tools", {}))
+    return found
 
 
 def _serial(p: Passport) -> str:

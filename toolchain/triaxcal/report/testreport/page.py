@@ -10,14 +10,10 @@ from markupsafe import Markup, escape
 
 from triaxcal import __version__
 from triaxcal.performance.figures import Chapter, Drawing, Figure
-from triaxcal.performance.testreport import UnitReport
+from triaxcal.performance.testreport import STANDARDS, UnitReport
 from triaxcal.report.pictures.line_plot import COLOURS, Line, Panel, line_plot
 from triaxcal.report.testreport.words import NOT_MEASURED, on_page, value_words
 from triaxcal.report.texts.html import page
-
-STANDARD_WORDS = {
-    "ieee-1293": "Figures and symbols as accelerometer houses report by IEEE Std 1293"
-}
 
 
 def report_html(report: UnitReport) -> bytes:
@@ -27,7 +23,7 @@ def report_html(report: UnitReport) -> bytes:
     context = {
         "identity": _identity(report),
         "name": report.fitted.unit.name,
-        "standard": STANDARD_WORDS[report.standard],
+        "standard": STANDARDS[report.standard],
         "measured": measured,
         "total": len(figures),
         "verdict": report.verdict,
