@@ -11,7 +11,7 @@ import pytest
 
 import triaxcal
 from dynamic_cases import UNIT_TOML, table_of, write_unit
-from thermal_cases import POINTS, at_point, true_at, truth_of
+from thermal_cases import POINTS, at_point, ramp, true_at, truth_of
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
 from triaxcal.delivery.imu import ImuDelivery, deliver_imu
@@ -158,3 +158,35 @@ def test_a_range_beyond_the_points_is_refused(tmp_path: Path) -> None:
     unit = folder_of(tmp_path, [at_point(truth, t, 300 + k) for k, t in enumerate((20.0, 50.0))])
     with pytest.raises(RefusedError, match=r"the temperatures recorded are 19\.7 to 50\.0 degC"):
         deliver_imu(unit)
+
+
+def test_a_soak_without_turns_gives_the_biases(tmp_path: Path) -> None:
+    """One recording with turns at 20 degC; one that lies still from 20 to 60 degC."""
+    truth = truth_of(4)
+    turned, still = at_point(truth, 20.0, 1), ramp(truth, 0, (20.0, 60.0), 2, rounds=0)
+    unit = folder_of(tmp_path, [turned, still], device="")
+    made = deliver_imu(unit)
+    over = made.done.over
+    assert over is not None
+    known = over.known
+    z = (known.value - true_at(truth, known.temps_degc)) / known.sd
+    # 21 constants, of which 6 change freely over 5 nodes: 45 values beyond 4.5 once in 3000.
+    assert np.abs(z).max() < 4.5
+    hot = known.temps_degc > 40.0
+    drift_sd = np.degrees(known.sd[hot][:, 9:12]) * 3600
+    # The Earth's rate on each axis is unknown, 15 deg/h, but the same as at 20 degC, where turns
+    # show the drift; 300 deg/h a cubic's coefficient is what the unit itself changes by.
+    assert drift_sd.max() < 15.0
+    # Along gravity a scale factor that changes looks like a bias, and no turn shows which it is:
+    # what is unknown of the one, 1 % of g and more, is unknown of the other.
+    assert (known.sd[hot][:, :3].max(axis=1) > 0.01 * 9.8 / 2).all()
+    finding = made.done.findings[-1]
+    assert finding.startswith("the unit turned at 19.7 to 20.0 degC only: that scale factors and ")
+    assert "not shown" in dynamic_summary(made, ["a"], "build")
+
+
+def test_a_soak_alone_determines_nothing_and_is_refused(tmp_path: Path) -> None:
+    truth = truth_of(4)
+    stills = [ramp(truth, 0, ends, 2, rounds=0) for ends in ((20.0, 60.0), (60.0, 20.0))]
+    with pytest.raises(RefusedError, match="turn"):
+        deliver_imu(folder_of(tmp_path, stills, device=""))

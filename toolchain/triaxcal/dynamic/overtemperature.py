@@ -7,25 +7,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.base.progress import Progress
+from triaxcal.dynamic.blocks.base import ACCELEROMETER_BIAS, GYRO_BIAS
 from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.soak import Soak, soak_blocks, soak_information, split_soaks
 from triaxcal.dynamic.survey import Section
-from triaxcal.dynamic.temperatures import Recorded
+from triaxcal.dynamic.temperatures import Recorded, recorded_temperatures
 from triaxcal.dynamic.thermalbasis import GROUPS, Basis, block_over_temperature
 from triaxcal.dynamic.thermalchoice import Choice, Curves, choose, folds_of
 from triaxcal.dynamic.thermalcurves import Known, known_at, thermal_models
 from triaxcal.dynamic.thermalnodes import Nodes, cut_at_nodes, nodes_of
 from triaxcal.dynamic.thermalparts import (
+    Information,
     constants_of,
     information_of,
     information_of_parts,
 )
 from triaxcal.model.curves import ThermalModel
 from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS
-from triaxcal.model.thermal.shape import ThermalShape
+from triaxcal.model.thermal.shape import EDGE_DEGC, ThermalShape
 from triaxcal.model.types import IntArray
 from triaxcal.unit.thermal import ThermalChoice
 
@@ -65,6 +68,8 @@ class OverTemperature:
         On a grid over the recorded range.
     accel, gyro : ThermalModel
         As in `ImuModel`.
+    findings : tuple of str
+        What was not seen over the whole range.
     """
 
     nodes: Nodes
@@ -72,6 +77,7 @@ class OverTemperature:
     known: Known
     accel: ThermalModel
     gyro: ThermalModel
+    findings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -85,11 +91,14 @@ class Solved:
     shown : DynamicResult
         Constants at T0 by the chosen curves; the terms are left out.
     over : OverTemperature
+    recording : ImuRecording
+        What the filter used: the recordings in which the unit turns.
     """
 
     full: DynamicResult
     shown: DynamicResult
     over: OverTemperature
+    recording: ImuRecording
 
 
 def solve_over_temperature(
@@ -109,31 +118,76 @@ def solve_over_temperature(
     """
     recorded = at.recorded
     nodes = nodes_of(recorded, at.reference_degc)
-    shapes = shapes_of(at.stated, nodes, at.where)
-    basis = Basis.spanning(_with_folds(shapes, nodes), nodes.t0_degc, recorded.degc)
+    turning, soaks = split_soaks(recording)
+    moved = recorded if turning is recording else recorded_temperatures(turning)
+    assert moved is not None
+    seen = _seen(nodes, moved)
+    shapes = {name: shapes_of(at.stated, own, at.where) for name, own in seen.items()}
+    spanned = tuple(dict.fromkeys(s for n, own in seen.items() for s in with_folds(shapes[n], own)))
+    basis = Basis.spanning(spanned, nodes.t0_degc, recorded.degc)
     terms = tuple(block_over_temperature(block, basis) for block in GROUPS) if basis.terms else ()
     full = calibrate_dynamic(
-        recording,
+        turning,
         noise,
         (*blocks, *terms),
         reference_degc=nodes.t0_degc,
         progress=lambda number, part: report(f"pass {number + 1}", part),
     )
-    cut, node_of = cut_at_nodes(full.survey, recorded, nodes)
-    present = sorted({int(k) for k in node_of})
-    parts = tuple(_sections(cut.sections, node_of, k) for k in present)
-    by_part = information_of_parts(
-        recording, full, parts, lambda part: report("temperatures held out", part)
-    )
-    by_node = dict(zip(present, by_part, strict=True))
-    curves = Curves(constants_of(full), basis)
-    everything = information_of(full)
+    everything, by_node, layout = _information(turning, full, (moved, nodes), soaks, report)
+    free = tuple(name for name, own in seen.items() if len(own.degc) < len(nodes.degc))
+    curves = Curves(layout, basis, {name: own.degc for name, own in seen.items()}, free)
     choice = choose(curves, everything, folds_of(nodes, by_node), shapes)
     grid = np.linspace(*recorded.ends_degc, GRID)
     known = known_at(curves, everything, choice, grid)
     models = thermal_models(choice.fit, nodes.t0_degc)
-    over = OverTemperature(nodes, choice, known, *models)
-    return Solved(full, _shown(full, curves, choice), over)
+    over = OverTemperature(nodes, choice, known, *models, _findings(recorded, moved))
+    return Solved(full, _shown(full, curves, choice), over, turning)
+
+
+def _seen(nodes: Nodes, moved: Recorded) -> dict[str, Nodes]:
+    """Temperatures at which each group was seen: a matrix only where the unit turned."""
+    degc = nodes.degc[sorted({int(k) for k in nodes.nearest(moved.degc)})]
+    nearest = float(degc[int(np.argmin(np.abs(degc - nodes.t0_degc)))])
+    turned = Nodes(degc, nodes.t0_degc if nodes.t0_degc in degc else nearest)
+    biases = ACCELEROMETER_BIAS.name, GYRO_BIAS.name
+    return {block.name: nodes if block.name in biases else turned for block in GROUPS}
+
+
+def _findings(recorded: Recorded, moved: Recorded) -> tuple[str, ...]:
+    """What was not seen over the whole range."""
+    (low, high), (first, last) = recorded.ends_degc, moved.ends_degc
+    if first - EDGE_DEGC <= low and high <= last + EDGE_DEGC:
+        return ()
+    turned = f"the unit turned at {first:.1f} to {last:.1f} degC only"
+    beyond = f"scale factors and misalignments at {low:.1f} to {high:.1f} degC"
+    return (f"{turned}: that {beyond} follow the same functions is not shown",)
+
+
+def _information(
+    turning: ImuRecording,
+    full: DynamicResult,
+    at: tuple[Recorded, Nodes],
+    soaks: tuple[Soak, ...],
+    report: Progress,
+) -> tuple[Information, dict[int, Information], Layout]:
+    """What everything says, what each node says, and the layout of both."""
+    moved, nodes = at
+    cut, node_of = cut_at_nodes(full.survey, moved, nodes)
+    present = sorted({int(k) for k in node_of})
+    parts = tuple(_sections(cut.sections, node_of, k) for k in present)
+    by_part = information_of_parts(
+        turning, full, parts, lambda part: report("temperatures held out", part)
+    )
+    own = soak_blocks(soaks)
+    layout = Layout((*constants_of(full).blocks, *own))
+    size = len(layout)
+    by_node = {k: found.padded(size) for k, found in zip(present, by_part, strict=True)}
+    total = information_of(full).padded(size)
+    for soak, block in zip(soaks, own, strict=True):
+        for node, found in soak_information(soak, block, layout, full, nodes).items():
+            total = total + found
+            by_node[node] = by_node[node] + found if node in by_node else found
+    return total, dict(sorted(by_node.items())), layout
 
 
 def shapes_of(stated: ThermalChoice, nodes: Nodes, where: str) -> tuple[ThermalShape, ...]:
@@ -155,7 +209,7 @@ def shapes_of(stated: ThermalChoice, nodes: Nodes, where: str) -> tuple[ThermalS
     return shapes
 
 
-def _with_folds(shapes: tuple[ThermalShape, ...], nodes: Nodes) -> tuple[ThermalShape, ...]:
+def with_folds(shapes: tuple[ThermalShape, ...], nodes: Nodes) -> tuple[ThermalShape, ...]:
     """The shapes, and what is left of them where a temperature is held out."""
     fewer = [
         shape.without(np.delete(nodes.degc, k), float(nodes.degc[k]))
@@ -178,9 +232,9 @@ def _shown(full: DynamicResult, curves: Curves, choice: Choice) -> DynamicResult
     p, covariance = full.p.copy(), full.covariance.copy()
     M, _ = curves.map_of(choice.fit.shapes)
     sd = curves.layout.prior_sd
-    n = len(curves.layout)
-    p[:n] = (M @ choice.fit.q) * sd
-    covariance[:n, :n] = M @ choice.fit.covariance @ M.T * np.outer(sd, sd)
+    n = len(constants_of(full))
+    p[:n] = ((M @ choice.fit.q) * sd)[:n]
+    covariance[:n, :n] = (M @ choice.fit.covariance @ M.T * np.outer(sd, sd))[:n, :n]
     last = full.passes[-1]
     history = replace(
         last.history,

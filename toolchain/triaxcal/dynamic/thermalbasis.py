@@ -29,6 +29,10 @@ from triaxcal.model.types import FloatArray
 
 GROUPS = (ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX, GYRO_BIAS, GYRO_MATRIX)
 """Blocks whose states follow the temperature; each has a function of its own."""
+PRIOR = {"ppm": 1e4, "arcsec": 400.0}
+"""Of a term of a matrix: 1 %, 2 mrad. Over temperature a unit changes by less than it is off."""
+PART = 0.2
+"""Of a term of a bias: of the prior of the bias."""
 SMALLEST = 0.03
 EXACT = 1e-7
 
@@ -117,7 +121,7 @@ def _less_t0(shapes: tuple[ThermalShape, ...], t0_degc: float, temp_degc: FloatA
 def block_over_temperature(block: StateBlock, basis: Basis) -> StateBlock:
     """The change of a block's states with temperature: `terms` states for each, in its unit."""
     states = tuple(
-        State(f"{s.name}~{k + 1}", s.unit, s.per_unit, s.prior_sd, f"{s.label}, term {k + 1}")
+        State(f"{s.name}~{k + 1}", s.unit, s.per_unit, prior_of_term(s), f"{s.label}, {k + 1}")
         for s in block.states
         for k in range(basis.terms)
     )
@@ -130,6 +134,11 @@ def block_over_temperature(block: StateBlock, basis: Basis) -> StateBlock:
         needs="temp_degc",
         shown=False,
     )
+
+
+def prior_of_term(state: State) -> float:
+    """Standard deviation of a term of a constant, in its unit: functions have rms 1."""
+    return PRIOR.get(state.unit, PART * state.prior_sd)
 
 
 def over_temperature(name: str) -> str:

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.thermalbasis import GROUPS, Basis, over_temperature
+from triaxcal.dynamic.thermalbasis import GROUPS, Basis, over_temperature, prior_of_term
 from triaxcal.dynamic.thermalnodes import Nodes
 from triaxcal.dynamic.thermalparts import Information
 from triaxcal.model.thermal.shape import ThermalShape
@@ -41,7 +41,6 @@ class Fold:
     """What lies at a held-out temperature, and what lies at all others."""
 
     degc: float
-    remaining_degc: FloatArray
     held_out: Information
     others: Information
 
@@ -67,14 +66,29 @@ class Fit:
 
 
 class Curves:
-    """Fits of any functions to normal equations of all terms."""
+    """Fits of any functions to normal equations of all terms.
 
-    def __init__(self, layout: Layout, basis: Basis) -> None:
-        self.layout, self.basis = layout, basis
+    `seen` are the temperatures at which each group was seen, by the name of its block; groups that
+    were not seen at all of them are `free` to differ from their function by the prior of its terms.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        basis: Basis,
+        seen: Mapping[str, FloatArray],
+        free: tuple[str, ...] = (),
+    ) -> None:
+        self.layout, self.basis, self.seen, self.free = layout, basis, seen, free
         self._maps: dict[ThermalShape, tuple[FloatArray, FloatArray]] = {}
 
-    def map_of(self, shapes: Shapes) -> tuple[FloatArray, dict[str, IntArray]]:
-        """M (n, parameters), in units of the priors, and where each group's parameters stand."""
+    def map_of(
+        self, shapes: Shapes, free: tuple[str, ...] = ()
+    ) -> tuple[FloatArray, dict[str, IntArray]]:
+        """M (n, parameters), in units of the priors, and where each group's parameters stand.
+
+        Terms of groups that are `free` are parameters as well; they stand under `over_temperature`.
+        """
         layout, index = self.layout, np.arange(len(self.layout))
         columns: list[FloatArray] = []
         places: dict[str, IntArray] = {}
@@ -90,26 +104,37 @@ class Curves:
             P = shape.parameters
             part = np.zeros((len(layout), len(base), P))
             part[base, np.arange(len(base))] = value
-            part[terms, np.arange(len(base))[:, None]] = change
+            ratio = np.array([s.prior_sd / prior_of_term(s) for s in block.states])
+            part[terms, np.arange(len(base))[:, None]] = ratio[:, None, None] * change
             used[base] = used[terms.ravel()] = True
             columns.append(part.reshape(len(layout), -1))
             places[block.name] = start + np.arange(len(base) * P).reshape(len(base), P)
             start += len(base) * P
+        for name in map(over_temperature, free):
+            own = index[layout.place(name)]
+            columns.append(np.eye(len(layout))[:, own])
+            places[name] = (start + np.arange(len(own))).reshape(-1, self.basis.terms)
+            start += len(own)
         return np.column_stack([*columns, np.eye(len(layout))[:, ~used]]), places
 
-    def fit(self, known: Information, shapes: Shapes) -> Fit:
+    def fit(self, known: Information, shapes: Shapes, free: tuple[str, ...] = ()) -> Fit:
         """Curves of some functions by least squares with the priors."""
-        M, places = self.map_of(shapes)
+        M, places = self.map_of(shapes, free)
         normal = M.T @ known.matrix @ M + M.T @ M
         covariance: FloatArray = np.linalg.inv(normal).astype(np.float64)
         return Fit(shapes, covariance @ (M.T @ known.vector), covariance, places)
+
+    def without(self, group: str, shape: ThermalShape, fold: Fold) -> ThermalShape:
+        """What is left of a function of a group where a temperature is held out."""
+        seen = self.seen[group]
+        remaining = seen[seen != fold.degc]
+        return shape if len(remaining) == len(seen) else shape.without(remaining, fold.degc)
 
     def score(self, folds: Sequence[Fold], shapes: Shapes) -> float:
         """Minus twice the log density of what was held out, up to a constant."""
         total = 0.0
         for fold in folds:
-            fewer = {n: s.without(fold.remaining_degc, fold.degc) for n, s in shapes.items()}
-            M, _ = self.map_of(fewer)
+            M, _ = self.map_of({n: self.without(n, s, fold) for n, s in shapes.items()})
             before, known = M.T @ fold.others.matrix @ M + M.T @ M, M.T @ fold.others.vector
             after, both = before + M.T @ fold.held_out.matrix @ M, M.T @ fold.held_out.vector
             both = both + known
@@ -153,30 +178,32 @@ def folds_of(nodes: Nodes, by_node: Mapping[int, Information]) -> tuple[Fold, ..
             continue
         first, *others = (found for j, found in by_node.items() if j != k)
         rest = sum(others, start=first)
-        remaining = np.delete(nodes.degc, k)
-        folds.append(Fold(float(nodes.degc[k]), remaining, by_node[k], rest))
+        folds.append(Fold(float(nodes.degc[k]), by_node[k], rest))
     return tuple(folds)
 
 
 def choose(
-    curves: Curves, known: Information, folds: Sequence[Fold], shapes: Sequence[ThermalShape]
+    curves: Curves,
+    known: Information,
+    folds: Sequence[Fold],
+    shapes: Mapping[str, Sequence[ThermalShape]],
 ) -> Choice:
     """Function of each group, by the held-out temperatures; the richest where there are none."""
-    richest = max(shapes, key=lambda s: s.parameters)
-    chosen = {block.name: richest for block in GROUPS}
-    if not folds or len(shapes) == 1:
+    chosen = {name: max(own, key=lambda s: s.parameters) for name, own in shapes.items()}
+    if not folds or all(len(own) == 1 for own in shapes.values()):
         held_out = tuple(fold.degc for fold in folds)
         return Choice(curves.fit(known, chosen), {}, held_out)
     scores: dict[str, list[float]] = {}
     for _ in range(ROUNDS_MAX):
         before = dict(chosen)
         for block in GROUPS:
-            tried = [curves.score(folds, chosen | {block.name: shape}) for shape in shapes]
+            own = shapes[block.name]
+            tried = [curves.score(folds, chosen | {block.name: shape}) for shape in own]
             scores[block.name] = tried
-            chosen[block.name] = shapes[int(np.argmin(tried))]
+            chosen[block.name] = own[int(np.argmin(tried))]
         if chosen == before:
             break
-    found = {name: _weighted(shapes, np.array(tried)) for name, tried in scores.items()}
+    found = {name: _weighted(shapes[name], np.array(s)) for name, s in scores.items()}
     return Choice(curves.fit(known, chosen), found, tuple(fold.degc for fold in folds))
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from triaxcal.dynamic.blocks.base import LOWER
 from triaxcal.dynamic.blocks.block import StateBlock
-from triaxcal.dynamic.thermalbasis import GROUPS
-from triaxcal.dynamic.thermalchoice import Choice, Curves, Fit
+from triaxcal.dynamic.thermalbasis import GROUPS, Basis, over_temperature, prior_of_term
+from triaxcal.dynamic.thermalchoice import Choice, Curves, Fit, Scored
 from triaxcal.dynamic.thermalparts import Information
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel, on_common_breaks
 from triaxcal.model.metrological import pack_constants
@@ -30,13 +30,23 @@ def values_at(fit: Fit, block: StateBlock, temps_degc: FloatArray) -> FloatArray
     return values
 
 
-def covariance_at(fit: Fit, block: StateBlock, temps_degc: FloatArray) -> FloatArray:
-    """Covariance of a block's constants at each temperature, SI, shape (k, states, states)."""
+def covariance_at(fit: Fit, block: StateBlock, temps_degc: FloatArray, basis: Basis) -> FloatArray:
+    """Covariance of a block's constants at each temperature, SI, shape (k, states, states).
+
+    With what a group that is free in the fit may differ from its function.
+    """
     prior = np.array([s.prior_sd * s.per_unit for s in block.states])
-    places = fit.places[block.name]
-    own = fit.covariance[np.ix_(places.ravel(), places.ravel())].reshape(*places.shape * 2)
-    basis = fit.shapes[block.name].basis(temps_degc)
-    found: FloatArray = np.einsum("kp,ipjq,kq->kij", basis, own, basis)
+    places, values = fit.places[block.name], fit.shapes[block.name].basis(temps_degc)
+    rows = [np.broadcast_to(values[:, None], (len(temps_degc), *places.shape))]
+    columns = [places]
+    free = over_temperature(block.name)
+    if free in fit.places:
+        ratio = np.array([prior_of_term(s) / s.prior_sd for s in block.states])
+        rows.append(ratio[:, None] * basis(temps_degc)[:, None])
+        columns.append(fit.places[free])
+    row, column = np.concatenate(rows, axis=2), np.concatenate(columns, axis=1)
+    own = fit.covariance[column[:, :, None, None], column[None, None]]
+    found: FloatArray = np.einsum("kip,ipjq,kjq->kij", row, own, row)
     return found * np.outer(prior, prior)
 
 
@@ -49,15 +59,13 @@ def averaged_covariance(
     """
     chosen = values_at(choice.fit, block, temps_degc)
     rows = [c for c in choice.candidates.get(block.name, ()) if c.weight > _LIKELY]
-    if not rows:
-        return covariance_at(choice.fit, block, temps_degc)
+    rows = rows or [Scored(choice.fit.shapes[block.name], 0.0, 1.0)]
     total = np.zeros((len(temps_degc), len(block.states), len(block.states)))
     for row in rows:
-        fit = choice.fit
-        if row.shape != fit.shapes[block.name]:
-            fit = curves.fit(known, {**fit.shapes, block.name: row.shape})
+        shapes = {**choice.fit.shapes, block.name: row.shape}
+        fit = curves.fit(known, shapes, curves.free)
         off = values_at(fit, block, temps_degc) - chosen
-        own = covariance_at(fit, block, temps_degc)
+        own = covariance_at(fit, block, temps_degc, curves.basis)
         total += row.weight * (own + off[:, :, None] * off[:, None, :])
     return total / sum(row.weight for row in rows)
 

@@ -40,6 +40,11 @@ class Information:
     def __add__(self, other: Information) -> Information:
         return Information(self.matrix + other.matrix, self.vector + other.vector)
 
+    def padded(self, size: int) -> Information:
+        """The same for a layout with further states behind, of which it says nothing."""
+        more = size - len(self.vector)
+        return Information(np.pad(self.matrix, (0, more)), np.pad(self.vector, (0, more)))
+
 
 def constants_of(result: DynamicResult) -> Layout:
     """Layout of a result without what belongs to its sections."""

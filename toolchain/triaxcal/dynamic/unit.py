@@ -93,6 +93,8 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     temperatures = recorded_temperatures(recording)
     unknown = refuse_beyond(unit, temperatures)
     full, over = _solve(unit, recording, temperatures, report)
+    if over is not None:
+        recording, unknown = over.recording, (*unknown, *over.over.findings)
     result = full if over is None else over.shown
     off = missing_effects(recording, full, lambda part: report("effects off", part))
     seen = observability(result.layout, result.covariance)
