@@ -16,7 +16,7 @@ from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass, taped_pass
 from triaxcal.dynamic.instability import expected, usual
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.noise import DataSheet, differing
+from triaxcal.dynamic.noise import DataSheet, not_stated
 from triaxcal.dynamic.passdata import PassResult, Reference, Task
 from triaxcal.dynamic.polled import at_least_seen
 from triaxcal.dynamic.preintegrate import NODES
@@ -94,14 +94,14 @@ def calibrate_dynamic(
         As `survey`; when the passes do not settle.
     """
     found = survey(recording)
-    noise = at_least_seen(recording, noise)
     wanted = Layout((*BASE, *blocks))
     searching = Layout((*wanted.blocks, north.BLOCK))
     size = _block_size(recording, found)
     duration_s = found.duration_s
     start = _first_reference(searching, recording, found)
-    stated, noise = noise, usual(with_rests(recording.name, found, noise))
-    decided = noise == stated
+    stated, noise = noise, at_least_seen(recording, with_rests(recording.name, found, noise))
+    decided = noise == usual(noise)
+    noise = usual(noise)
     passes: list[PassResult] = []
     part_of_step, step = 1.0, np.zeros(0)
     for number in range(PASSES_MAX):
@@ -128,7 +128,7 @@ def calibrate_dynamic(
         elif settled:
             covariance = done.root @ done.root.T
             shown = (done.p, sd, covariance, done.stage_p, start.heading_rad, found)
-            used = noise, differing(stated, noise)
+            used = noise, not_stated(stated, noise)
             return DynamicResult(layout, *shown, *used, frame, tuple(passes))
     raise RefusedError(
         recording.name,

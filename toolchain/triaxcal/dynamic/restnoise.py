@@ -1,8 +1,8 @@
 """White noise of both triads from the rests of a recording.
 
 Means over windows of 0.1 s lie beside each other in a rest. Half of the mean squared difference of
-means over twice that time is the Allan variance N^2 / t. Of each rest it is one number; their
-median is taken where there are enough, so that a rest that was none does no harm.
+neighbours is the Allan variance N^2 / t. A rest with several times that of the others was none; the
+others are taken together.
 """
 
 from __future__ import annotations
@@ -18,12 +18,10 @@ from triaxcal.dynamic.survey import Survey
 from triaxcal.dynamic.windows import WINDOW_S
 from triaxcal.model.types import FloatArray, IntArray
 
-TOGETHER = 2
-"""Windows whose mean is one of the values."""
-PAIRS_MIN = 4
+PAIRS_MIN = 9
 """Differences in a rest that counts."""
-RESTS_MIN = 5
-"""For a median."""
+NOISIER = 3.0
+"""Of the median: a rest of 9 differences in three axes is beyond it once in 10^5."""
 
 
 def with_rests(name: str, found: Survey, stated: DataSheet) -> DataSheet:
@@ -60,13 +58,12 @@ def rest_noise(name: str, found: Survey) -> tuple[float, float]:
     if not rests:
         raise RefusedError(
             f"{name}, rests",
-            f"none longer than {(PAIRS_MIN + 1) * TOGETHER * WINDOW_S:g} s: they do not show the "
-            "noise",
+            f"none longer than {(PAIRS_MIN + 1) * WINDOW_S:g} s: they do not show the noise",
             expected="longer rests, or [noise] in unit.toml",
             remedy="state the figures of the data sheet in [noise]",
         )
     windows = found.windows
-    duration_s = TOGETHER * float(np.median(windows.duration_s))
+    duration_s = float(np.median(windows.duration_s))
     made = []
     for values, triad in ((windows.rate, "gyros"), (windows.force, "accelerometers")):
         density = math.sqrt(_allan_variance([values[rest] for rest in rests]) * duration_s)
@@ -90,20 +87,12 @@ def _rests(found: Survey) -> list[IntArray]:
     places = np.flatnonzero(rest & full)
     cut = (np.diff(places) > 1) | (np.diff(windows.section[places]) != 0)
     runs = np.split(places.astype(np.int64), np.flatnonzero(cut) + 1)
-    return [run for run in runs if len(run) >= (PAIRS_MIN + 1) * TOGETHER]
+    return [run for run in runs if len(run) > PAIRS_MIN]
 
 
 def _allan_variance(rests: list[FloatArray]) -> float:
-    """Of means over `TOGETHER` windows (n, 3), mean of the axes."""
-    each, count = [], []
-    for values in rests:
-        n = len(values) // TOGETHER
-        means = values[: n * TOGETHER].reshape(n, TOGETHER, 3).mean(axis=1)
-        each.append(float((np.diff(means, axis=0) ** 2).mean()) / 2)
-        count.append(n - 1)
-    if len(each) < RESTS_MIN:
-        return float(np.average(each, weights=count))
-    # The median of chi-square with k degrees of freedom is k (1 - 2/(9 k))^3 (Wilson, Hilferty);
-    # differences that share a mean are worth 2/3 of as many of their own.
-    freedom = 3 * (2 / 3) * float(np.median(count))
-    return float(np.median(each)) / (1 - 2 / (9 * freedom)) ** 3
+    """Of the windows (n, 3) of each rest, mean of the axes."""
+    each = np.array([(np.diff(values, axis=0) ** 2).mean() / 2 for values in rests])
+    count = np.array([len(values) - 1 for values in rests])
+    quiet = each <= NOISIER * np.median(each)
+    return float(np.average(each[quiet], weights=count[quiet]))
