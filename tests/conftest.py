@@ -84,6 +84,7 @@ LONG = {
     "test_dynamic_logs.py",
     "test_dynamic_plan.py",
     "test_dynamic_together.py",
+    "test_dynamic_wander.py",
     "test_exact.py",
     "test_exports.py",
     "test_firmware_prefix.py",
