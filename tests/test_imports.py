@@ -52,7 +52,7 @@ MAY_IMPORT = {
     "report": {
         "base", "model", "unit", "readings", "poses", "fitting", "diagnosis", "dynamic",
         "evidence", "fixedpoint", "codegen", "uncertainty", "delivery", "batch", "device",
-        "performance",
+        "performance", "design",
     },
 }  # fmt: skip
 """What each room may import: what lies below it. None but the API imports report, which reads all,

@@ -11,6 +11,7 @@ from triaxcal.api.unit import Unit
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
 from triaxcal.design.imu import plan_unit
+from triaxcal.design.imudemands import plan_demands
 from triaxcal.design.problem import Problem, read_problem
 from triaxcal.design.search import Design, best, usual
 from triaxcal.design.words import comparison, rig_plan
@@ -20,8 +21,8 @@ from triaxcal.poses.poses import find_poses as poses_of
 from triaxcal.poses.poseset import PoseSet
 from triaxcal.readings.samples import Samples, read_samples
 from triaxcal.report import studies
-from triaxcal.report.dynamic import plan_summary
 from triaxcal.report.history import history_text, read_history
+from triaxcal.report.imuplan import plan_summary
 from triaxcal.simulation.series import write_series
 from triaxcal.simulation.unit import write_simulated_unit
 from triaxcal.uncertainty.history import Change, changes, repeatability
@@ -145,15 +146,20 @@ def simulate_series(
 
 
 def plan_motion(folder: str | Path, progress: Progress | None = None) -> Study[DynamicUnit]:
-    """What the motion in imu_truth.toml determines of an IMU, without a recording.
+    """What a planned motion determines of an IMU, and which reaches [limits]; without a recording.
+
+    The motion is that of imu_truth.toml, or where there is none the usual one on a table. With
+    demands in [limits] of unit.toml the summary says how much of it, and of a motion by hand,
+    reaches them, and what limits each.
 
     Raises
     ------
     RefusedError
-        When the folder has no such file, or it breaks a rule.
+        When a file breaks a rule.
     """
-    done = plan_unit(Path(folder), progress or (lambda _step, _part: None))
-    return Study(done, plan_summary(done))
+    report = progress or (lambda _step, _part: None)
+    done = plan_unit(Path(folder), report)
+    return Study(done, plan_summary(plan_demands(done, report)))
 
 
 def _folder(unit: Unit) -> Path:

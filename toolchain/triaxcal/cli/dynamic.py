@@ -15,7 +15,8 @@ from triaxcal.cli.progress import bar, calibrate
 @click.option(
     "--plan",
     is_flag=True,
-    help="Only report what the motion in imu_truth.toml determines; without a recording.",
+    help="Report what a planned motion determines, and how much of it reaches [limits]; without a "
+    "recording.",
 )
 def dynamic(unit: Path, build: Path, plan: bool) -> None:
     """Calibrate a whole IMU from a recording on a turntable.

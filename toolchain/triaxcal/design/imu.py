@@ -12,43 +12,53 @@ from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
+from triaxcal.design.imuprogrammes import Programme, programmes_of
 from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.observability import observability
 from triaxcal.dynamic.unit import DynamicUnit
-from triaxcal.simulation.imu import simulate_imu
-from triaxcal.simulation.imu_truth import ImuTruth, SecondTriad
-from triaxcal.simulation.imu_unit import planned_motion
 
 
 def plan_unit(folder: Path, progress: Progress) -> DynamicUnit:
     """Standard deviations that the unit in `folder` will have after the motion it plans.
 
-    The motion is that of [motion] in imu_truth.toml, everything else of unit.toml; the recording
-    that unit.toml names is not read. The values of the result's states are zero.
+    The motion is that of [motion] in imu_truth.toml, or where there is no such file the usual one
+    on a table; everything else is of unit.toml. The recording that unit.toml names is not read. The
+    values of the result's states are zero.
 
     Raises
     ------
     RefusedError
-        As `planned_motion`, `read_dynamic` and `calibrate_dynamic`; where [noise] states no white
-        noise.
+        As `programmes_of`, `read_dynamic` and `planned`.
     """
     unit = read_dynamic(folder)
-    motion, rate_hz = planned_motion(folder)
-    truth = ImuTruth(
-        second=SecondTriad() if "second-triad" in unit.blocks else None,
-        rate_convention=unit.rate_convention,
-        force_convention=unit.force_convention,
-    )
+    programme = programmes_of(unit)[0]
+    return planned(unit, programme, programme.size, progress)
+
+
+def planned(
+    unit: DynamicDescription, programme: Programme, size: float, progress: Progress
+) -> DynamicUnit:
+    """What a programme of a size determines; its recording is kept in the result.
+
+    Raises
+    ------
+    RefusedError
+        As `calibrate_dynamic`; where [noise] states no white noise.
+    """
+    recording = programme.recording(size)
+    blocks = tuple(b for b in unit.state_blocks() if b.needs not in programme.without)
     result = calibrate_dynamic(
-        simulate_imu(truth, motion, rate_hz, 0),
+        recording,
         _planned_noise(unit),
-        unit.state_blocks(),
+        blocks,
         reference_degc=unit.reference_degc,
-        progress=lambda number, part: progress(f"pass {number + 1}", part),
+        progress=lambda number, part: progress(f"{programme.name}, pass {number + 1}", part),
     )
-    return DynamicUnit(unit, result, observability(result.layout, result.covariance), (), ())
+    seen = observability(result.layout, result.covariance)
+    named = replace(recording, name=f"{programme.name}, {programme.said(size)}")
+    return DynamicUnit(unit, result, seen, (), (), recording=named)
 
 
 def _planned_noise(unit: DynamicDescription) -> DataSheet:

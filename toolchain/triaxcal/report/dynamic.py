@@ -17,7 +17,6 @@ from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.delivery.imuverdict import ImuVerdict
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Observability
-from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.dynamicpage import digits, dynamic_page, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
@@ -155,30 +154,9 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
             size = f"{effect.chi_square:.1f} of {effect.states}"
             lines.append(f"  {effect.name:24s} {size:>14s}{call}")
             lines += [" " * 8 + effect.hint] if effect.hint else []
-    lines += _seen_lines(seen)
+    lines += seen_lines(seen)
     lines += ["", *imu_c_lines(made), "", f"files           {target}/", " " * 16 + ", ".join(files)]
     return "\n".join(lines)
-
-
-def plan_summary(done: DynamicUnit) -> str:
-    """What a planned motion determines, for the screen."""
-    result, layout = done.result, done.result.layout
-    span = result.survey.windows.start_s[[0, -1]]
-    minutes, states = (span[1] - span[0]) / 60, 3 + len(layout)
-    noise = done.unit.noise
-    unknown = None in (noise.gyro_bias_instability_deg_per_h, noise.accel_bias_instability_ug)
-    lines = [
-        f"plan            {done.unit.name}: {minutes:.1f} min, {states} states",
-        "",
-        "expected standard deviations from a recording of this motion, if the model is right",
-        *(["without bias instability, which [noise] does not state"] * unknown),
-    ]
-    for block in layout.blocks:
-        lines.append(block.title)
-        for i, state in enumerate(block.states, start=layout.place(block.name).start):
-            sd = result.sd[i] / state.per_unit
-            lines.append(f"  {state.name:9s} {digits(sd, sd):>10s} {state.unit}")
-    return "\n".join([*lines, *_seen_lines(done.seen)])
 
 
 def _verdict_lines(verdict: ImuVerdict) -> list[str]:
@@ -189,8 +167,8 @@ def _verdict_lines(verdict: ImuVerdict) -> list[str]:
     return lines + [f"  {note}" for note in verdict.notes]
 
 
-def _seen_lines(seen: Observability) -> list[str]:
-    """What the motion did not separate."""
+def seen_lines(seen: Observability) -> list[str]:
+    """What a motion does not separate, for the screen."""
     lines: list[str] = []
     if seen.unseen:
         lines += ["", "not observable in this motion (their values are those of the prior):"]
