@@ -26,6 +26,11 @@ LESS_NOISE = 0.5
 deviation."""
 
 
+def counted(number: int, thing: str) -> str:
+    """As "1 rest", "2 rests"."""
+    return f"{number} {thing}{'s' * (number != 1)}"
+
+
 def largest(freedom: int) -> float:
     """Limit of a chi-square: exceeded by chance in `SHARE` of all cases, with the tolerance."""
     return float((1 + MODEL_TOLERANCE) * chi2.isf(SHARE, freedom))
@@ -100,7 +105,7 @@ def _rests(error: FloatArray, sd: FloatArray, value: float) -> Check:
     size, its = abs(error[worst]) / STANDARD_G * 1e6, sd[worst] / STANDARD_G * 1e6
     return Check(
         "held-out rests", value <= limit,
-        f"|a| - g of {len(error)} rests: {size:.3g} micro-g at the worst, where {its:.3g} is the "
+        f"|a| - g of {counted(len(error), 'rest')}: {size:.3g} micro-g at the worst, where {its:.3g} is the "
         f"predicted standard deviation (chi-square {value:.3g}, limit {limit:.3g})",
         value, limit, "", len(error),
     )  # fmt: skip
@@ -110,7 +115,7 @@ def _turns(angle_deg: FloatArray, sd_deg: FloatArray, value: float) -> Check:
     limit, worst = largest(2 * len(angle_deg)), int(np.argmax(angle_deg / sd_deg))
     return Check(
         "held-out turns", value <= limit,
-        f"closure of {len(angle_deg)} turns: {angle_deg[worst]:.3g} deg at the worst, where "
+        f"closure of {counted(len(angle_deg), 'turn')}: {angle_deg[worst]:.3g} deg at the worst, where "
         f"{sd_deg[worst]:.3g} is the predicted standard deviation of a component (chi-square "
         f"{value:.3g}, limit {limit:.3g})",
         value, limit, "", 2 * len(angle_deg),
@@ -158,7 +163,7 @@ def effects_off(off: Sequence[Effect]) -> Iterator[Check]:
     if not off:
         return
     if worst is None:
-        words = f"none of {len(off)} shows"
+        words = f"none of {len(off)} would move a constant"
         yield Check("effects that are off", True, words, 0.0, MOVES_SD, "sd", len(off))
         return
     yield Check(

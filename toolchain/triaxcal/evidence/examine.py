@@ -15,6 +15,7 @@ from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.evidence.case import Case
 from triaxcal.evidence.causes import causes_of
 from triaxcal.evidence.chance import (
+    counted,
     earth,
     effects_off,
     held_out_checks,
@@ -106,8 +107,8 @@ def _notes(held: HeldOut | None) -> tuple[str, ...]:
         return ()
     rests = len(held.stretches)
     words = (
-        f"held out: every {held.every}th rest and the turns before and after it, {rests} rests "
-        f"and {2 * rests} turns, predicted by the rest of the recording; the delivered constants "
-        "are those of the whole recording"
+        f"held out: one rest in {held.every} and the turns before and after it, "
+        f"{counted(rests, 'rest')} and {2 * rests} turns, predicted by the rest of the recording; "
+        "the delivered constants are those of the whole recording"
     )
     return (words,)

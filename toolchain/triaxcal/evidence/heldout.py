@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.dynamic.blocks import north
+from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.filterpass import Progress, run_pass
 from triaxcal.dynamic.layout import Layout
@@ -18,11 +19,12 @@ from triaxcal.evidence.prediction import Predicted, StretchWatch
 from triaxcal.evidence.stretches import EVERY, stretches_of, without
 from triaxcal.model.types import FloatArray
 
-SPARSER = (EVERY, 2 * EVERY + 1, 4 * EVERY + 3)
+SPARSER = (EVERY, 7, 11, 23)
 """Every so many rests; the first with which the rest of the recording still determines the
 constants."""
 KEPT_SD = 2.0
-"""It does where no standard deviation of the base model grows by more than this factor."""
+"""It does where no standard deviation of the base model grows by more than this factor. Others may:
+an attitude that is forgotten costs the heading, and what only a heading shows turns no tilt."""
 PASSES_MAX = 3
 AGAIN_SD = 5.0
 """Constants that a part of the recording moves by chance move by less; its square is what one
@@ -62,9 +64,9 @@ def held_out(case: Case, progress: Progress | None = None) -> HeldOut | None:
         found = held_out_every(case, every, progress=progress)
         if found is None:
             continue
-        base = len(result.layout)
+        base = sum(len(block.states) for block in BASE)
         sd = np.sqrt(np.diag(found.covariance)[:base])
-        if (sd <= KEPT_SD * result.sd).all():
+        if (sd <= KEPT_SD * result.sd[:base]).all():
             return found
     return None
 
