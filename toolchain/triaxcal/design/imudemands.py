@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
 from triaxcal.design.imu import planned
 from triaxcal.design.imuprogrammes import Programme, programmes_of
@@ -71,12 +72,15 @@ class Reached:
     minutes : float
     left : PlannedDemand or None
         The worst demand, where this much does not meet it, which is all that was tried.
+    refused : str
+        Why no recording of the programme would be calibrated; "" where it would.
     """
 
     name: str
     words: str
     minutes: float
-    left: PlannedDemand | None
+    left: PlannedDemand | None = None
+    refused: str = ""
 
 
 @dataclass(frozen=True)
@@ -98,7 +102,11 @@ def plan_demands(done: DynamicUnit, progress: Progress) -> ImuPlan:
     programmes = programmes_of(done.unit)
     reached = [_search(done, programmes[0], progress)]
     for other in programmes[1:]:
-        reached.append(_search(planned(done.unit, other, other.size, progress), other, progress))
+        try:
+            first = planned(done.unit, other, other.size, progress)
+            reached.append(_search(first, other, progress))
+        except RefusedError as refusal:
+            reached.append(Reached(other.name, "", 0.0, refused=refusal.found))
     return ImuPlan(done, planned_demands(done), tuple(reached))
 
 
@@ -164,4 +172,4 @@ def _search(done: DynamicUnit, programme: Programme, progress: Progress) -> Reac
     else:
         size, done = best
     minutes = done.result.survey.duration_s / 60
-    return Reached(programme.name, programme.words.format(size), minutes, left)
+    return Reached(programme.name, programme.said(size), minutes, left)

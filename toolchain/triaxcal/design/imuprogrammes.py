@@ -18,7 +18,7 @@ from triaxcal.simulation.imu_unit import IMU_TRUTH_FILE, planned_motion
 
 RATE_HZ = 100.0
 """Where neither file states a rate: the covariance hardly depends on it."""
-MINUTES, MINUTES_MOST = 4.0, 40.0
+MINUTES, MINUTES_LEAST, MINUTES_MOST = 4.0, 2.0, 40.0
 """An axis. P2 records 10 to 40 minutes an axis."""
 STILL_S = 60.0
 POSES, POSES_LEAST, POSES_MOST = 36.0, 13.0, 360.0
@@ -32,8 +32,8 @@ class Programme:
     Attributes
     ----------
     name : str
-    words : str
-        How a size is said, as "{:.3g} min an axis".
+    said : callable
+        Words for a size, as "4 min about each axis".
     size, least, most : float
         Where a search begins, and its ends.
     recording : callable
@@ -43,7 +43,7 @@ class Programme:
     """
 
     name: str
-    words: str
+    said: Callable[[float], str]
     size: float
     least: float
     most: float
@@ -84,9 +84,11 @@ def _stated(unit: DynamicDescription) -> Programme:
         return simulate_imu(truth, _repeated(motion, round(size)), rate_hz, 0)
 
     most = max(1.0, MINUTES_MOST * 60 * len(motion.mountings) // motion.duration_s)
-    return Programme(
-        "[motion] of imu_truth.toml", "its moves {:.0f} times", 1.0, 1.0, most, recording
-    )
+    return Programme("[motion] of imu_truth.toml", _times, 1.0, 1.0, most, recording)
+
+
+def _times(size: float) -> str:
+    return "its moves once" if round(size) == 1 else f"its moves {size:.0f} times"
 
 
 def _repeated(motion: ImuMotion, times: int) -> ImuMotion:
@@ -104,9 +106,13 @@ def _table(unit: DynamicDescription, rate_hz: float) -> Programme:
         )
         return simulate_imu(truth, placed, rate_hz, 0)
 
-    words = "{:.3g} min about each axis"
     without = frozenset({"table_angle_rad", "table"})
-    return Programme("on a table", words, MINUTES, MINUTES, MINUTES_MOST, recording, without)
+    ends = MINUTES_LEAST, MINUTES_MOST
+    return Programme("on a table", _minutes, MINUTES, *ends, recording, without)
+
+
+def _minutes(size: float) -> str:
+    return f"{size:.3g} min about each axis"
 
 
 def _hand(unit: DynamicDescription, rate_hz: float) -> Programme:
@@ -116,6 +122,9 @@ def _hand(unit: DynamicDescription, rate_hz: float) -> Programme:
         motion = HandMotion(round(size), unit.latitude_deg, unit.gravity_m_per_s2)
         return hand_recording(motion, rate_hz, conventions, unit.reference_degc)
 
-    words = f"{{:.0f}} poses of {REST_S:g} s"
     without = frozenset({"table_angle_rad", "table", "temp_degc"})
-    return Programme("by hand", words, POSES, POSES_LEAST, POSES_MOST, recording, without)
+    return Programme("by hand", _poses, POSES, POSES_LEAST, POSES_MOST, recording, without)
+
+
+def _poses(size: float) -> str:
+    return f"{size:.0f} poses of {REST_S:g} s"

@@ -105,8 +105,9 @@ def _rests(error: FloatArray, sd: FloatArray, value: float) -> Check:
     size, its = abs(error[worst]) / STANDARD_G * 1e6, sd[worst] / STANDARD_G * 1e6
     return Check(
         "held-out rests", value <= limit,
-        f"|a| - g of {counted(len(error), 'rest')}: {size:.3g} micro-g at the worst, where {its:.3g} is the "
-        f"predicted standard deviation (chi-square {value:.3g}, limit {limit:.3g})",
+        f"|a| - g of {counted(len(error), 'rest')}: {size:.3g} micro-g at the worst, where "
+        f"{its:.3g} is the predicted standard deviation (chi-square {value:.3g}, limit "
+        f"{limit:.3g})",
         value, limit, "", len(error),
     )  # fmt: skip
 
@@ -115,8 +116,8 @@ def _turns(angle_deg: FloatArray, sd_deg: FloatArray, value: float) -> Check:
     limit, worst = largest(2 * len(angle_deg)), int(np.argmax(angle_deg / sd_deg))
     return Check(
         "held-out turns", value <= limit,
-        f"closure of {counted(len(angle_deg), 'turn')}: {angle_deg[worst]:.3g} deg at the worst, where "
-        f"{sd_deg[worst]:.3g} is the predicted standard deviation of a component (chi-square "
+        f"closure of {counted(len(angle_deg), 'turn')}: {angle_deg[worst]:.3g} deg at the worst, "
+        f"where {sd_deg[worst]:.3g} is the predicted standard deviation of a component (chi-square "
         f"{value:.3g}, limit {limit:.3g})",
         value, limit, "", 2 * len(angle_deg),
     )  # fmt: skip

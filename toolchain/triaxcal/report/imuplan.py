@@ -49,6 +49,8 @@ def _lines_of(demand: PlannedDemand) -> list[str]:
 
 
 def _reached_words(reached: Reached) -> str:
+    if reached.refused:
+        return f"  {reached.name}: not planned, {reached.refused}"
     size = f"{reached.words}, {reached.minutes:.0f} min in all"
     left = reached.left
     if left is None:
