@@ -13,10 +13,12 @@ from dynamic_cases import UNIT_TOML
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.main import main
 from triaxcal.design.imu import plan_unit
-from triaxcal.design.imudemands import plan_demands
+from triaxcal.design.imudemands import ImuPlan, plan_demands, reach
+from triaxcal.design.imuprogrammes import programmes_of
 from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.shares import variance_shares
 from triaxcal.dynamic.unit import DynamicUnit, calibrate_unit
+from triaxcal.report.imuplan import plan_summary
 from triaxcal.simulation.imu_unit import planned_motion, write_simulated_recording
 
 TRUTH = """\
@@ -143,7 +145,8 @@ def test_shares_of_the_variance_are_those_of_the_sources(tmp_path: Path) -> None
     shares = variance_shares(done.recording, done.result)
     np.testing.assert_allclose(sum(shares.values()), 1.0, atol=0.05)
     gyro = shares["gyro noise"]
-    assert gyro.min() < 0.1 < 0.3 < gyro.max()
+    assert gyro.min() < 0.1
+    assert gyro.max() > 0.3
     noise = done.result.noise
     half = replace(noise, gyro_arw_deg_per_sqrt_h=noise.gyro_arw_deg_per_sqrt_h / 2**0.5)
     left = (calibrate_dynamic(done.recording, half).sd / done.result.sd) ** 2
@@ -152,18 +155,33 @@ def test_shares_of_the_variance_are_those_of_the_sources(tmp_path: Path) -> None
 
 
 def test_a_plan_without_a_motion_takes_the_usual_ones(tmp_path: Path) -> None:
-    folder = with_demands(unit(tmp_path), 1e-3, 1.0)
+    folder = with_demands(unit(tmp_path), 100.0, 1.0)
     (folder / "imu_truth.toml").unlink()
     told = CliRunner().invoke(main, ["dynamic", str(folder), "--plan"], catch_exceptions=False)
     assert told.exit_code == 0
     for words in (
         "motion          on a table, 4 min about each axis",
-        "gyro_scale_sd_ppm = 0.001: Theta",
-        "NOT MET",
-        "  on a table: not 40 min about each axis, ",
+        "gyro_scale_sd_ppm = 100: Theta",
+        "  on a table: 2 min about each axis, ",
         "accel_bias_sd_mm_per_s2 = 1: df0_",
         "variance from ",
         "  by hand: ",
     ):
         assert words in told.output
     assert not (folder / "recording.csv").exists()
+
+
+def test_what_no_motion_meets_is_said(tmp_path: Path) -> None:
+    """With the constant, its limit, and what limits it, at the programme's end."""
+    folder = with_demands(unit(tmp_path), 1e-3, 1.0)
+    done = plan_unit(folder, lambda _step, _part: None)
+    programme = replace(programmes_of(done.unit)[0], most=2.0)
+    found = reach(done, programme, lambda _step, _part: None)
+    assert found.words == "its moves 2 times"
+    assert found.left is not None
+    assert (found.left.key, found.left.met) == ("gyro_scale_sd_ppm", False)
+    assert found.left.sources[0][1] > 0.1
+    said = plan_summary(ImuPlan(done, (found.left,), (found,)))
+    assert "gyro_scale_sd_ppm = 0.001: Theta" in said
+    assert "NOT MET" in said
+    assert "[motion] of imu_truth.toml: not its moves 2 times, " in said

@@ -100,11 +100,11 @@ def plan_demands(done: DynamicUnit, progress: Progress) -> ImuPlan:
     if not demanded(done.unit.limits, done.result.layout):
         return ImuPlan(done, (), ())
     programmes = programmes_of(done.unit)
-    reached = [_search(done, programmes[0], progress)]
+    reached = [reach(done, programmes[0], progress)]
     for other in programmes[1:]:
         try:
             first = planned(done.unit, other, other.size, progress)
-            reached.append(_search(first, other, progress))
+            reached.append(reach(first, other, progress))
         except RefusedError as refusal:
             reached.append(Reached(other.name, "", 0.0, refused=refusal.found))
     return ImuPlan(done, planned_demands(done), tuple(reached))
@@ -153,7 +153,7 @@ def _worst(done: DynamicUnit) -> float:
     return max(found)
 
 
-def _search(done: DynamicUnit, programme: Programme, progress: Progress) -> Reached:
+def reach(done: DynamicUnit, programme: Programme, progress: Progress) -> Reached:
     """From what a programme of its usual size determines to the size that meets all demands."""
     size, best = programme.size, None
     for _ in range(ROUNDS):
