@@ -12,12 +12,15 @@ def plan_summary(plan: ImuPlan) -> str:
     done = plan.done
     result, layout = done.result, done.result.layout
     minutes, states = result.survey.duration_s / 60, 3 + len(layout)
+    noise = done.unit.noise
+    unknown = None in (noise.gyro_bias_instability_deg_per_h, noise.accel_bias_instability_ug)
     lines = [
         f"plan            {done.unit.name}: {minutes:.1f} min, {states} states",
         f"motion          {'' if done.recording is None else done.recording.name}",
         *_demand_lines(plan),
         "",
         "expected standard deviations from a recording of this motion, if the model is right",
+        *(["without bias instability, which [noise] does not state"] * unknown),
     ]
     for block in layout.blocks:
         lines.append(block.title)
