@@ -83,6 +83,18 @@ def coarse_stamps(rows: Rows) -> Rows:
     return np.column_stack([np.floor(rows[:, 0] * 370 + 0.3) / 370, rows[:, 1:]])
 
 
+def packets_of_ten(rows: Rows) -> Rows:
+    """A radio link: ten rows arrive at once, each some 20 us after the other, 3 ms sd late."""
+    newest = np.minimum(np.arange(len(rows)) // 10 * 10 + 9, len(rows) - 1)
+    late = np.repeat(np.abs(3e-3 * RNG(11).standard_normal(len(rows) // 10 + 1)), 10)[: len(rows)]
+    after = 2e-5 * (np.arange(len(rows)) % 10)
+    return np.column_stack([rows[newest, 0] + late + after, rows[:, 1:]])
+
+
+def stamps_of_seconds(rows: Rows) -> Rows:
+    return np.column_stack([np.floor(rows[:, 0] + 1e-9), rows[:, 1:]])
+
+
 def doubled(rows: Rows) -> Rows:
     return np.repeat(rows, 1 + (RNG(8).random(len(rows)) < 0.02), axis=0)
 

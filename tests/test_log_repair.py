@@ -16,7 +16,9 @@ from spoiled_logs import (
     jitter,
     log_of,
     mended,
+    packets_of_ten,
     restarted,
+    stamps_of_seconds,
 )
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.repair import repaired
@@ -157,13 +159,32 @@ def test_increments_are_not_made_up() -> None:
 
 def test_a_clock_that_is_none() -> None:
     whole = rows()
-    whole[:, 0] = np.floor(whole[:, 0])
-    with pytest.raises(RefusedError, match="repeat the time of the row before"):
-        mended(whole)
     whole[:, 0] = np.random.default_rng(3).permutation(len(whole))
     with pytest.raises(RefusedError) as refusal:
         mended(whole)
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(("spoil", "off_s"), [(packets_of_ten, 3e-4), (stamps_of_seconds, 5e-3)])
+def test_rows_of_packets_have_beats_of_their_own(spoil: Spoil, off_s: float) -> None:
+    whole = rows(120.0)
+    found = mended(spoil(whole))
+    assert "stamps of packets" in found.findings[0]
+    assert np.array_equal(found.samples.rate, whole[:, 1:4])
+    late = found.samples.time_s - whole[:, 0]
+    # The line through 1200 packets of 3 ms, at its ends; seconds hide half a sample.
+    assert np.abs(late - late.mean()).max() < off_s
+    without = np.delete(whole, slice(5000, 5010), 0)
+    lost = mended(
+        spoil(without)
+        if spoil is stamps_of_seconds
+        else np.delete(spoil(whole), slice(5000, 5010), 0)
+    )
+    place = np.rint((lost.samples.time_s - lost.samples.time_s[0]) * RATE_HZ).astype(int)
+    assert place[-1] == len(whole) - 1
+    assert lost.samples.turn_variance is not None
+    filled = np.flatnonzero(lost.samples.turn_variance)
+    assert len(filled) == 10
 
 
 def test_steps_that_add_up_are_no_jitter() -> None:

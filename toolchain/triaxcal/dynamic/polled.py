@@ -43,10 +43,12 @@ def white_density(series: Series, place: slice) -> float:
 
 
 def at_least_seen(recording: ImuRecording, noise: DataSheet) -> DataSheet:
-    """Noise as it is stated, or as large as a slower triad shows it."""
+    """Noise as it is stated, or as large as a slower triad shows it; none where none is stated."""
     rate, force = recording.seen_density.get("rate", 0.0), recording.seen_density.get("force", 0.0)
-    if rate > LARGER * noise.rate_density:
+    if noise.gyro_arw_deg_per_sqrt_h is not None and rate > LARGER * noise.rate_density:
         noise = replace(noise, gyro_arw_deg_per_sqrt_h=math.degrees(rate) * 60)
+    if noise.accel_vrw_ug_per_sqrt_hz is None:
+        return noise
     counts = (noise.accel_lsb * MICRO_G) ** 2 / 12 / (recording.force_hz or recording.rate_hz)
     if force > LARGER * math.sqrt(noise.force_density() ** 2 + counts):
         noise = replace(noise, accel_vrw_ug_per_sqrt_hz=force / MICRO_G, accel_lsb=0.0)

@@ -21,6 +21,8 @@ BRIDGED_SD_RAD = 0.02
 _AROUND = 128
 """Beats around a hole that are looked at."""
 _POINTS = 4
+_EARLY = 0.03
+"""Part of the new values that are hardly late, where they are late by anything up to a row."""
 
 
 @dataclass(frozen=True)
@@ -125,10 +127,7 @@ def held_series(time_s: FloatArray, values: FloatArray, step_s: float, turns: sl
     tell = spans[in_motion[:-1] & in_motion[1:]]
     clock = even_clock(time_s[new], float(tell[tell < 3 * np.median(tell)].mean()))
     late = time_s[new] - clock.time_s
-    # Late by anything up to a row: the middle two thirds are 0.68 of it, and the clock is in its
-    # middle.
-    low, high = np.quantile(late, [0.16, 0.84])
-    early_s = -float(high - low) / 1.36 if clock.smoothed else 0.0
+    early_s = float(np.quantile(late, _EARLY)) if clock.smoothed else 0.0
     every = np.arange(clock.number[-1] + 1)
     at = np.interp(every, clock.number, clock.time_s) + early_s
     row = np.searchsorted(time_s, at - 0.01 * step_s)

@@ -93,7 +93,7 @@ def step_of(stamps_s: FloatArray) -> float:
 def even_clock(stamps_s: FloatArray, step_s: float) -> EvenClock:
     """Number rising stamps, shape (n,) with n > 1, of a clock of about `step_s`."""
     number = numbered(stamps_s, step_s)
-    time_s, residual_s = _smoothed(stamps_s, number, step_s)
+    time_s, residual_s = smoothed(stamps_s, number, step_s)
     rms_s = float(np.sqrt(np.mean(residual_s**2)))
     step_s = float(np.median(np.diff(time_s) / np.diff(number)))
     if rms_s < EXACT * step_s:
@@ -110,6 +110,8 @@ def taken_at_stamps(stamps_s: FloatArray, clock: EvenClock, values: FloatArray) 
     if not clock.smoothed:
         return False
     index = np.flatnonzero(clock.number[4:] - clock.number[:-4] == 4) + 2
+    close = np.diff(stamps_s) < _CLEAN * clock.step_s
+    index = index[~(close[index - 2] | close[index - 1] | close[index] | close[index + 1])]
     if len(index) == 0:
         return False
     change = np.abs(values[index + 1] - values[index - 1]).max(axis=1)
@@ -163,7 +165,7 @@ def _lost_after(stamps_s: FloatArray, step_s: float) -> FloatArray:
     return lost
 
 
-def _smoothed(
+def smoothed(
     stamps_s: FloatArray, number: IntArray, step_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Times of the even clock, and what the stamps are off, of each part without a long pause."""

@@ -20,6 +20,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 from triaxcal.readings.evenclock import EvenClock, even_clock, step_of
 from triaxcal.readings.order import LEFT_OUT_MAX, rising
+from triaxcal.readings.packets import packet_clock
 
 _HOLE = 0.7
 """Of a step: so far from both neighbours a stamp has a beat of its own."""
@@ -68,8 +69,7 @@ def sequence(stamps_s: FloatArray, same: BoolArray, numbers: FloatArray, place: 
     ------
     RefusedError
         Where more rows are left out than `LEFT_OUT_MAX`; where more are exchanged or have no usable
-        stamp than
-        `PLACED_MAX`.
+        stamp than `PLACED_MAX`.
     """
     found: list[str] = []
     word = place.rsplit(", ", 1)[-1]
@@ -77,6 +77,12 @@ def sequence(stamps_s: FloatArray, same: BoolArray, numbers: FloatArray, place: 
     def first(rows: IntArray | BoolArray) -> str:
         return f"the first is {word} {int(numbers[rows][0])}"
 
+    packets = packet_clock(stamps_s, same)
+    if packets is not None:
+        told = (
+            f"{_rows(len(stamps_s))} with stamps of packets: the newest row of each has its stamp"
+        )
+        return Sequence(np.arange(len(stamps_s)), packets, (told,), 0)
     doubled = same & (np.diff(stamps_s, prepend=np.nan) == 0.0)
     single = np.flatnonzero(~doubled)
     if doubled.any():
