@@ -81,6 +81,7 @@ LONG = {
     "test_diagnosis_faults.py",
     "test_dynamic_calibrate.py",
     "test_dynamic_equations.py",
+    "test_dynamic_hand.py",
     "test_dynamic_logs.py",
     "test_dynamic_plan.py",
     "test_dynamic_together.py",

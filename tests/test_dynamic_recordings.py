@@ -72,6 +72,9 @@ IMUCAL_REST = {(0, 1): (540, 1271), (0, -1): (1620, 2361), (1, 1): (2814, 3298),
 IMUCAL_TURNS = ((6770, 7093), (8081, 8405), (9205, 9512))
 HAND_DEG = 2.0
 """A turn by hand against an edge comes back to where it began within so much."""
+CLOSES_DEG = 0.13
+"""Between two rests gravity turns as the gyros say within so much: 0.05 to 0.2 deg in this session,
+at up to 800 deg/s and 102.4 Hz. It is no noise of rest, and so stated as angle random walk."""
 
 
 @pytest.mark.slow
@@ -88,7 +91,8 @@ def test_hand_turns_of_imucal_agree_with_its_own_evaluation() -> None:
     start = 420  # it is put down before
     sd = [values[slice(*rest)].std(axis=0).max() for values in (rate, force)]
     root = np.sqrt(IMUCAL_RATE_HZ)
-    noise = DataSheet(float(np.degrees(sd[0] / root) * 60), float(sd[1] / root / 9.80665e-6))
+    assert np.degrees(sd[0] / root) < CLOSES_DEG / 10
+    noise = DataSheet(CLOSES_DEG * 60, float(sd[1] / root / 9.80665e-6))
     samples = ImuSamples(
         np.arange(len(table) - start) / IMUCAL_RATE_HZ, rate[start:], force[start:]
     )
@@ -99,7 +103,8 @@ def test_hand_turns_of_imucal_agree_with_its_own_evaluation() -> None:
     found = result.p[result.layout.place("accelerometer-bias")]
     for axis, section in enumerate(IMUCAL_TURNS):
         turned = np.degrees(np.sum((rate[slice(*section)] - bias)[:, axis])) / IMUCAL_RATE_HZ
-        assert abs(abs(turned) - 360.0 * (1 + theta[axis, axis])) < HAND_DEG
+        sd_deg = 360.0 * result.sd[result.layout.place("gyro-matrix")][4 * axis]
+        assert abs(abs(turned) - 360.0 * (1 + theta[axis, axis])) < HAND_DEG + 3 * sd_deg
         ends = [force[slice(*IMUCAL_REST[axis, sign])].mean(axis=0)[axis] for sign in (1, -1)]
         # The half-sum takes the unit as level in both: cosines of 2 deg are 6 mm/s^2.
         assert abs(sum(ends) / 2 - found[axis]) < 9.81 * (1 - np.cos(np.radians(HAND_DEG)))

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from dynamic_cases import changed, held, mems_short, part, short_motion
+from hand_cases import hand_short, stated
 from triaxcal.base.errors import RefusedError
+from triaxcal.dynamic.poses import static_poses
 from triaxcal.dynamic.recording import ImuRecording, ImuSamples
 from triaxcal.dynamic.survey import survey
 from triaxcal.simulation.imu import simulate_imu
-from triaxcal.simulation.imu_motion import three_axes
+from triaxcal.simulation.imu_motion import ImuMotion, Mounting, Move, three_axes
 
 
 def _samples() -> ImuSamples:
@@ -24,33 +26,42 @@ def _with(**columns: np.ndarray) -> ImuRecording:
     return changed(mems_short()[1], **columns)
 
 
-def _no_still() -> ImuRecording:
-    time = _samples().time_s
-    return part(mems_short()[1], time > 9.0)
+def _without_rests() -> ImuRecording:
+    """One turn after the other about a level axis; between two of them it only turns round."""
+    moves = tuple(Move(sign * 360.0, 60.0, 0.0) for sign in (1, -1) * 4)
+    motion = ImuMotion(tuple(Mounting(moves, 0.0) for _ in range(3)))
+    recording = held(simulate_imu(mems_short()[0], motion, 50.0, 1))
+    lifted = recording.all().time_s
+    turning = np.zeros(len(lifted), dtype=bool)
+    for start in motion.start_s:
+        turning |= (lifted > start + 0.5) & (lifted < start + 55.0)
+    return part(recording, turning)
 
 
-def _turning() -> ImuRecording:
-    """From the middle of an even turn on: no gyro tells it from a bias."""
-    recording = held(simulate_imu(mems_short()[0], three_axes(1.5, still_s=12.0), 50.0, 1))
-    samples = recording.all()
-    return part(recording, samples.time_s > 14.0)
+def _cut(first: float, last: float, axes_minutes: float = 1.5) -> ImuRecording:
+    """Nothing was recorded between the two times."""
+    recording = held(simulate_imu(mems_short()[0], three_axes(axes_minutes, still_s=12.0), 50.0, 1))
+    time = recording.all().time_s
+    return part(recording, (time < first) | (time > last))
 
 
-def _lost(count: int) -> ImuRecording:
-    """So many samples are missing in an even turn."""
-    recording = held(simulate_imu(mems_short()[0], three_axes(1.5, still_s=12.0), 50.0, 1))
-    number = np.arange(len(recording.all().time_s))
-    return part(recording, (number < 800) | (number >= 800 + count))
+def _driven(size: float, rests: slice) -> ImuRecording:
+    """An even acceleration along the unit's own axes in some of the rests of a hand."""
+    recording, samples = hand_short()[1], hand_short()[1].all()
+    force = samples.force.copy()
+    for rest in survey(recording).rests[rests]:
+        inside = (samples.time_s >= rest.start_s) & (
+            samples.time_s < rest.start_s + rest.duration_s
+        )
+        force[inside] *= 1 + size / 9.81
+    return changed(recording, force=force)
 
 
-def _cut_at_rest() -> ImuRecording:
-    time = _samples().time_s
-    return part(mems_short()[1], (time < 3.0) | (time > 4.0))
-
-
-def _gap() -> ImuRecording:
-    time = _samples().time_s
-    return part(mems_short()[1], (time < 20.0) | (time > 20.5))
+def _shaken() -> ImuRecording:
+    """An engine of 23 Hz."""
+    recording, samples = hand_short()[1], hand_short()[1].all()
+    shake = 1.5 * np.sin(2 * np.pi * 23.0 * samples.time_s)[:, None] * [0.5, -0.3, 0.8]
+    return changed(recording, force=samples.force + shake)
 
 
 def _saturated() -> ImuRecording:
@@ -64,21 +75,9 @@ def _two_axes() -> ImuRecording:
 
 
 CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
-    "no stand-still": (
-        _no_still,
-        ("is at rest for", "then turns at", "at least 5 s at rest at the start"),
-    ),
-    "starts in an even turn": (
-        _turning,
-        ("14.0 s: is not at rest: turns at 30.", "at least 5 s at rest at the start"),
-    ),
-    "one sample lost in a turn": (
-        lambda: _lost(1),
-        ("16.1 s: after a gap the unit is not at rest: turns at 30.", "lose no samples"),
-    ),
-    "a gap after three seconds": (
-        _cut_at_rest,
-        ("0.0 s: is at rest for 3.0 s, then the recording ends or has a gap; expected",),
+    "no rest at all": (
+        _without_rests,
+        ("the unit never rests", "rests of a second and more", "put the unit down"),
     ),
     "deg/h for deg/s": (
         lambda: _with(rate=_samples().rate / 36000),
@@ -102,7 +101,7 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
     ),
     "g for m/s^2": (
         lambda: _with(force=_samples().force / 9.80665),
-        ("the force at the start is 0.99", "g taken for m/s^2?", "force_unit"),
+        ("the force at rest is 0.99", "g taken for m/s^2?", "force_unit"),
     ),
     "exchanged axes": (
         lambda: _with(rate=_samples().rate[:, [1, 2, 0]]),
@@ -116,7 +115,6 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
         lambda: _with(rate=_samples().rate * [1.0, -1.0, 1.0]),
         ("x, -y, z", "a left-handed triad of gyros"),
     ),
-    "a gap while turning": (_gap, ("20.5 s", "is at rest for", "after each gap")),
     "saturated": (_saturated, ("gyro x reads exactly", "50 deg/s", "saturated", "more slowly")),
     "an axis never rotated": (
         _two_axes,
@@ -134,6 +132,87 @@ def test_refused(case: str) -> None:
     assert "\n" not in text
     for word in words:
         assert word in text, text
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (
+            lambda: _driven(0.3, slice(0, 1)),
+            (
+                "0.0 s: the force of this rest is +0.",
+                "off gravity by the others",
+                "accelerated",
+            ),
+        ),
+        (
+            lambda: _driven(-0.25, slice(3, 9)),
+            ("off gravity by the others", "rests on something that does not move"),
+        ),
+        (
+            _shaken,
+            ("forces of the rests scatter by 0.", "times the noise of [noise]", "shaken"),
+        ),
+    ],
+    ids=["driven at the start", "driven in some rests", "an engine"],
+)
+def test_a_rest_in_a_moving_vehicle_is_refused(
+    make: Callable[[], ImuRecording], words: tuple[str, ...]
+) -> None:
+    recording = make()
+    with pytest.raises(RefusedError) as refusal:
+        static_poses(recording, survey(recording), stated(hand_short()[0]))
+    text = str(refusal.value)
+    assert "\n" not in text
+    for word in words:
+        assert word in text, text
+
+
+def test_one_rest_that_is_not_gravity_alone_is_left_out_and_said() -> None:
+    recording = _driven(0.3, slice(7, 8))
+    found = survey(recording)
+    static = static_poses(recording, found, stated(hand_short()[0]))
+    assert static.left_out == (found.rests[7].start_s,)
+    without = found.without(static.left_out)
+    assert len(without.rests) == len(found.rests) - 1
+    assert any(f"{found.rests[7].start_s:.1f} s: not gravity alone" in f for f in without.findings)
+    assert not without.use[found.rests[7].first : found.rests[7].end].any()
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "starts"),
+    [(0.0, 14.0, 1), (16.02, 16.06, 2), (3.0, 4.0, 2), (20.0, 20.5, 2)],
+    ids=["starts in an even turn", "lost while turning", "lost at rest", "a gap while turning"],
+)
+def test_a_section_begins_with_its_first_rest(first: float, last: float, starts: int) -> None:
+    """Nothing but the force tells an even turn from a bias: all rests read the same rate."""
+    recording = _cut(first, last)
+    found = survey(recording)
+    assert len(found.sections) == starts
+    truth = mems_short()[0]
+    bias = np.radians(truth.gyro_bias_deg_per_h) / 3600
+    samples = recording.all()
+    for section in found.sections:
+        assert section.still_s > 0.5
+        assert 0 <= section.start_s - samples.time_s[section.first] < 1.5 / recording.rate_hz
+        # Earth 15 deg/h; noise 0.3 deg/sqrt(h) over half a second 25 deg/h.
+        assert np.degrees(np.abs(section.rate - bias).max()) * 3600 < 15 + 5 * 25
+    lost_in_a_turn = last > 14.0
+    assert any("are not used, the first at" in f for f in found.findings) == (
+        lost_in_a_turn or starts == 1
+    )
+
+
+def test_a_gyro_that_clips_for_a_moment_starts_a_new_section() -> None:
+    """Between two counts of its full scale the turn is unknown; elsewhere the recording stands."""
+    recording, samples = hand_short()[1], hand_short()[1].all()
+    fastest = np.abs(samples.rate).max()
+    clip = 0.97 * fastest
+    rate = np.clip(samples.rate, -clip, clip)
+    at = samples.time_s[np.flatnonzero(np.abs(samples.rate).max(axis=1) > clip)]
+    found = survey(changed(recording, rate=rate))
+    assert len(found.sections) > len(survey(recording).sections)
+    assert any(f"a gyro clips at {at[0]:.1f}"[:-1] in text for text in found.findings)
 
 
 def test_a_gap_at_rest_is_a_new_alignment() -> None:

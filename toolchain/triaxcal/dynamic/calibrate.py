@@ -19,6 +19,7 @@ from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet, not_stated
 from triaxcal.dynamic.passdata import PassResult, Reference, Task
 from triaxcal.dynamic.polled import at_least_seen
+from triaxcal.dynamic.poses import StaticComparison, StaticPoses, compared, static_poses
 from triaxcal.dynamic.preintegrate import NODES
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.restnoise import with_rests
@@ -31,6 +32,8 @@ BLOCK_TURN_RAD = 0.2
 BLOCK_MAX_S = 0.5
 HEADING_SD_MAX_RAD = 0.3
 """Where the Earth's horizontal rate is known better than this, its direction is the heading."""
+TOO_FAST_SD = 4.0
+"""A rate beyond the Earth's by so many standard deviations has no direction of the north."""
 PASSES_MAX = 12
 SETTLED_SD = 0.05
 """A pass that moves no constant by more than this part of its standard deviation is the last."""
@@ -67,6 +70,8 @@ class DynamicResult:
         Of the last pass; its layout has the wandering biases after the constants.
     passes : tuple of PassResult
         The last one gave the result.
+    static : StaticComparison
+        The accelerometers against what the rests alone say.
     """
 
     layout: Layout
@@ -80,6 +85,7 @@ class DynamicResult:
     estimated: tuple[str, ...]
     frame: Frame
     passes: tuple[PassResult, ...]
+    static: StaticComparison
 
 
 def calibrate_dynamic(
@@ -91,17 +97,19 @@ def calibrate_dynamic(
     Raises
     ------
     RefusedError
-        As `survey`; when the passes do not settle.
+        As `survey` and `static_poses`; when the passes do not settle.
     """
     found = survey(recording)
     wanted = Layout((*BASE, *blocks))
     searching = Layout((*wanted.blocks, north.BLOCK))
     size = _block_size(recording, found)
     duration_s = found.duration_s
-    start = _first_reference(searching, recording, found)
     stated, noise = noise, at_least_seen(recording, with_rests(recording.name, found, noise))
     decided = noise == usual(noise)
     noise = usual(noise)
+    static = static_poses(recording, found, noise)
+    found = found.without(static.left_out)
+    start = _first_reference(searching, recording, found, static)
     passes: list[PassResult] = []
     part_of_step, step = 1.0, np.zeros(0)
     for number in range(PASSES_MAX):
@@ -129,7 +137,8 @@ def calibrate_dynamic(
             covariance = done.root @ done.root.T
             shown = (done.p, sd, covariance, done.stage_p, start.heading_rad, found)
             used = noise, not_stated(stated, noise)
-            return DynamicResult(layout, *shown, *used, frame, tuple(passes))
+            beside = compared(static, found, recording.gravity_m_per_s2, done.p, sd)
+            return DynamicResult(layout, *shown, *used, frame, tuple(passes), beside)
     raise RefusedError(
         recording.name,
         f"after {PASSES_MAX} passes the constants still move by {moved:.1f} standard deviations",
@@ -157,9 +166,16 @@ def _block_size(recording: ImuRecording, found: Survey) -> int:
     return max(1, int(min(longest, turn) // unit)) * unit
 
 
-def _first_reference(layout: Layout, recording: ImuRecording, found: Survey) -> Reference:
-    """Everything zero, but the gyros' biases as seen at rest, less the Earth's vertical rate."""
+def _first_reference(
+    layout: Layout, recording: ImuRecording, found: Survey, static: StaticPoses
+) -> Reference:
+    """The accelerometers as the rests alone say, if they do, and the gyros' biases as seen at rest.
+
+    Those have the Earth's vertical rate taken off; everything else is zero.
+    """
     p = np.zeros(len(layout))
+    if static.determined:
+        p[: len(static.p)] = static.p
     section = found.sections[0]
     up = section.force / np.linalg.norm(section.force)
     vertical = EARTH_RATE_RAD_PER_S * math.sin(math.radians(recording.latitude_deg))
@@ -180,7 +196,13 @@ def _next_reference(
             start.heading_rad + part * done.heading_change_rad,
         )
     rate, sd = done.north[:, 0], done.north[:, 1]
-    if float(sd.max()) > HEADING_SD_MAX_RAD * horizontal:
+    if _too_fast(rate, sd) or float(sd.max()) > HEADING_SD_MAX_RAD * horizontal:
         return Reference(done.p, done.stage_p, None)
     heading = math.pi / 2 - np.arctan2(rate[:, 1], rate[:, 0])
     return Reference(done.p[:n], done.stage_p, heading)
+
+
+def _too_fast(rate: FloatArray, sd: FloatArray) -> bool:
+    """Whether horizontal rates (sections, 2) are beyond the Earth's whole rate: no heading."""
+    size = np.linalg.norm(rate, axis=1)
+    return bool((size > EARTH_RATE_RAD_PER_S + TOO_FAST_SD * sd.max(axis=1)).any())

@@ -8,7 +8,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import TableKeys, Values, setting
 from triaxcal.base.kinds import TEXT, Kind, listed, number, word
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
-from triaxcal.dynamic.recording import CONVENTIONS
+from triaxcal.dynamic.recording import CONVENTIONS, MOTIONS
 from triaxcal.dynamic.scales import ANGLE_UNITS, FORCE_UNITS, RATE_UNITS, UPWARD, VELOCITY_UNITS
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.unit.recordingfile import (
@@ -141,6 +141,9 @@ class DynamicTable(WrittenFile, _Recorded):
         Temperature at which the constants are given, and from which it is counted.
     blocks
         Extensions that are switched on.
+    motion
+        How the unit is turned: by "hand" the accelerometers are believed at rest only, on a
+        "table" in all turns about an axis too.
     """
 
     time_column: tuple[Column, ...] = setting(TIMES, (), words="none", example='"time_s"')
@@ -166,6 +169,7 @@ class DynamicTable(WrittenFile, _Recorded):
     blocks: tuple[str, ...] = setting(
         listed(TEXT, range(100), "a list of names in quotes"), (), words="none"
     )
+    motion: str | None = setting(word(MOTIONS), None, words="found in the recording")
 
 
 def dynamic_table() -> TableKeys:

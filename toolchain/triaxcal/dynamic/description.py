@@ -66,6 +66,8 @@ class DynamicDescription:
         Axis that points up at the first rest, as "+z".
     thermal : ThermalChoice, or None
         Which functions the constants follow over temperature.
+    motion : str
+        How the unit was turned, "" where the recording decides.
     """
 
     name: str
@@ -90,6 +92,7 @@ class DynamicDescription:
     forces: ForcesApart | None = None
     up_at_start: str | None = None
     thermal: ThermalChoice | None = None
+    motion: str = ""
 
     @property
     def recording(self) -> Path:
@@ -246,6 +249,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         forces=forces_apart(found, clock),
         up_at_start=found.up_at_start,
         thermal=_thermal(path, tables["thermal"], found.blocks),
+        motion=found.motion or "",
     )
 
 

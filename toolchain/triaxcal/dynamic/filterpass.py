@@ -85,6 +85,8 @@ class _Pass:
         self.north = np.zeros((len(self.found.sections), 2, 2))
         self.turned = np.zeros(len(self.found.sections))
         self.blocks = self._as_blocks(FIRST_SEGMENT_S if first else SEGMENT_S)
+        self.levels_s = self.found.levels_s
+        self.unused = np.concatenate([[0], np.cumsum(~self.found.use)])
 
     def _as_blocks(self, seconds: float) -> int:
         return max(1, round(seconds / (self.frame.block * self.frame.interval_s)))
@@ -159,7 +161,7 @@ class _Pass:
                     pool = piece if pool is None else joined([pool, piece])
             assert pool is not None
             blocks = min(self.blocks, (len(pool) - lead - 1) // size)
-            blocks = self._until_next_stage(float(pool.time_s[lead]), blocks)
+            blocks = self._until_next_cut(float(pool.time_s[lead]), blocks)
             if blocks == 0:
                 return
             end = lead + blocks * size
@@ -168,24 +170,30 @@ class _Pass:
             keep = max(0, end - MARGIN)
             pool, lead = pool[keep:], end - keep
 
-    def _until_next_stage(self, time_s: float, blocks: int) -> int:
-        """At most so many blocks that a segment ends at the next mounting, and at the next cut."""
+    def _until_next_cut(self, time_s: float, blocks: int) -> int:
+        """At most so many blocks that a segment ends at the next mounting or cut.
+
+        And at the end of a rest in the hand, to be levelled there.
+        """
         self._next_stage(time_s)
         if self.cuts_s and time_s >= self.cuts_s[0]:
             self._forget_attitude()
             self.cuts_s = tuple(cut for cut in self.cuts_s if cut > time_s)
+        block_s = self.frame.block * self.frame.interval_s
+        ahead = self.levels_s[self.levels_s >= time_s + block_s]
+        if len(ahead):
+            blocks = min(blocks, math.floor((float(ahead[0]) - time_s) / block_s + 1e-6))
         stages = self.found.stages[self.stage + 1 : self.stage + 2]
         ends = [stage.start_s for stage in stages] + list(self.cuts_s[:1])
-        if blocks == 0 or not ends:
-            return blocks
-        left_s = min(ends) - time_s
-        return min(blocks, max(1, math.ceil(left_s / (self.frame.block * self.frame.interval_s))))
+        if ends:
+            blocks = min(blocks, max(1, math.ceil((min(ends) - time_s) / block_s)))
+        return blocks
 
     def _segment(self, samples: ImuSamples, lead: int, blocks: int, C: FloatArray) -> FloatArray:
         time_s = samples.time_s[lead : lead + blocks * self.frame.block + 1 : self.frame.block]
         about = About(C, self.p, self._earth())
         made = equations(Window(samples, lead, blocks, about, self.frame))
-        use = self._used((time_s[:-1] + time_s[1:]) / 2)
+        use = self._used(time_s)
         rows = whitened(made, use, self.frame, self.noise)
         freedom = 3 * (1 if made.y2 is None else 2) * use
         for more, where in self._table_rows(samples, lead, made, use):
@@ -245,16 +253,19 @@ class _Pass:
 
     def _level_again(self, made: BlockEquations, use: IntArray) -> FloatArray:
         """Tilt (3,) that takes the mean of y (9) away at the segment's end; none while handled."""
-        last = slice(-self._as_blocks(RELEVEL_S), None)
-        if not use[last].all():
+        blocks = min(self._as_blocks(RELEVEL_S), int(np.argmin(np.append(use[::-1], 0))))
+        if blocks == 0:
             return np.zeros(3)
-        y = made.y[last].mean(axis=0) / self.frame.gravity
+        y = made.y[-blocks:].mean(axis=0) / self.frame.gravity
         return np.array([y[1], -y[0], 0.0])
 
-    def _used(self, time_s: FloatArray) -> IntArray:
-        windows = self.found.windows
-        place = np.searchsorted(windows.start_s, time_s, side="right") - 1
-        return self.found.use[np.maximum(place, 0)].astype(np.int64)
+    def _used(self, ends_s: FloatArray) -> IntArray:
+        """Blocks in all of whose windows the accelerometers are believed; `ends_s` (blocks + 1)."""
+        start_s = self.found.windows.start_s
+        first = np.maximum(np.searchsorted(start_s, ends_s[:-1], side="right") - 1, 0)
+        end = np.maximum(np.searchsorted(start_s, ends_s[1:] - 1e-6, side="left"), first + 1)
+        whole: IntArray = (self.unused[end] == self.unused[first]).astype(np.int64)
+        return whole
 
     def _next_stage(self, time_s: float) -> None:
         stages = self.found.stages

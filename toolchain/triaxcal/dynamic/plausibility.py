@@ -16,7 +16,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.blocks.attitude import skew
 from triaxcal.dynamic.recording import ImuRecording
-from triaxcal.dynamic.windows import Windows
+from triaxcal.dynamic.windows import WINDOW_S, Windows
 from triaxcal.model.types import FloatArray
 
 GRAVITY_TOLERANCE = 0.25
@@ -38,9 +38,19 @@ def refuse_wrong_units(recording: ImuRecording, windows: Windows) -> None:
     RefusedError
         For wrong units of force or rate, and for exchanged or left-handed axes.
     """
-    start = windows.start_s < windows.start_s[0] + START_S
-    _refuse_force(recording, windows.force[start].mean(axis=0))
+    start = _quietest(windows)
+    _refuse_force(recording, np.median(windows.force[start], axis=0))
     _refuse_rate(recording, windows, np.median(windows.rate[start], axis=0))
+
+
+def _quietest(windows: Windows) -> slice:
+    """The `START_S` in which the direction of the force changes least; of equals the first."""
+    length = min(round(START_S / WINDOW_S), len(windows.first))
+    direction = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
+    change = np.r_[0.0, np.cumsum((np.diff(direction, axis=0) ** 2).sum(axis=1))]
+    spread = change[length - 1 :] - change[: len(change) - length + 1]
+    begin = int(np.flatnonzero(spread <= 2 * spread.min())[0])
+    return slice(begin, begin + length)
 
 
 def _refuse_force(recording: ImuRecording, force: FloatArray) -> None:
@@ -55,7 +65,7 @@ def _refuse_force(recording: ImuRecording, force: FloatArray) -> None:
         hint = next((h for k, h in hints.items() if abs(size * k / g - 1) < 0.2), "")
         raise RefusedError(
             recording.name,
-            f"the force at the start is {size:.4g} m/s^2{hint}",
+            f"the force at rest is {size:.4g} m/s^2{hint}",
             expected=f"local gravity, {g:.4f} m/s^2, within {100 * GRAVITY_TOLERANCE:.0f} %",
             remedy="check force_unit and force_samples in [dynamic]",
         )

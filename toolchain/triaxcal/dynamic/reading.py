@@ -61,6 +61,7 @@ def read_recording(unit: DynamicDescription) -> ImuRecording:
         force_convention=unit.force_convention,
         table=unit.table,
         findings=tuple(findings),
+        motion=unit.motion,
     )
     step_s = even_step(tables[0][0]) if len(tables) == 1 else None
     if step_s is not None:

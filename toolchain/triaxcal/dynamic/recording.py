@@ -23,6 +23,8 @@ from triaxcal.model.types import FloatArray
 
 INSTANT, INCREMENT = "instant", "increment"
 CONVENTIONS = (INSTANT, INCREMENT)
+HAND, TABLE = "hand", "table"
+MOTIONS = (HAND, TABLE)
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,8 @@ class ImuRecording:
         Needed only where the table's angle readings are used.
     findings : tuple of str
         What was left out or repaired when it was read.
+    motion : str
+        One of `MOTIONS` where it is stated how the unit was turned; "": the recording decides.
     starts_s : tuple of float
         When the second and every further one begins, where it is several recordings.
     force_hz : float or None
@@ -166,6 +170,7 @@ class ImuRecording:
     force_convention: str = INSTANT
     table: Turntable | None = None
     findings: tuple[str, ...] = ()
+    motion: str = ""
     starts_s: tuple[float, ...] = ()
     force_hz: float | None = None
     seen_density: Mapping[str, float] = field(default_factory=dict)

@@ -82,7 +82,7 @@ def rest_noise(name: str, found: Survey) -> tuple[float, float]:
 def _rests(found: Survey) -> list[IntArray]:
     """Numbers of the windows of each rest that is long enough."""
     windows = found.windows
-    rest = found.still & found.use
+    rest = found.resting
     full = np.abs(windows.duration_s - np.median(windows.duration_s)) < 1e-9
     places = np.flatnonzero(rest & full)
     cut = (np.diff(places) > 1) | (np.diff(windows.section[places]) != 0)

@@ -1,73 +1,39 @@
-"""What the recording holds: sections without a gap, stand-stills, and axes put on the table.
+"""What the recording holds: sections without a gap, rests, and axes put on the table.
 
 The survey reads the recording once and keeps means over short windows; nothing is fitted.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.dynamic.clipping import cut_at_clips
 from triaxcal.dynamic.plausibility import refuse_wrong_units
 from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.rests import REST_MIN_S, Quiet, guard_of, quiet_windows, runs_of
+from triaxcal.dynamic.stages import Stage, find_stages
 from triaxcal.dynamic.windows import WINDOW_S, Windows, read_windows
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
-STILL_MIN_S = 5.0
-"""Shortest stand-still that an alignment may start from."""
-STILL_RAD_PER_S = np.radians(0.25)
-"""Change of the rate, against the stand-still before, that is no noise any more."""
-AXIS_COSINE = np.cos(np.radians(25.0))
-"""A turn counts as one about an instrument axis within 25 deg."""
 AXIS_TURN_MIN_RAD = 2 * np.pi
 """An axis that turned less in all was never put on the table."""
-REST_MAX_RAD_PER_S = np.radians(25.0)
-"""Data sheets of the coarsest gyros allow 20 deg/s at rest: a section that starts faster turns."""
-REST_FORCE_COSINE = np.cos(np.radians(5.0))
-"""Gravity leans by less at rest: 1 deg/s about a level axis shows in `STILL_MIN_S`."""
-STAGE_TURN_RAD = np.pi
-"""Less than half a turn about an axis is handling, not a stage."""
-STILL_SD = 5.0
-STILL_MAX_RAD_PER_S = np.radians(3.0)
-"""A noisy gyro is given so many deviations of a window's mean, by its first seconds."""
-GUARD_S = 2.0
-"""Around handling nothing is used: what lifts the unit starts and ends slowly."""
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One axis on the table.
-
-    Attributes
-    ----------
-    axis : int
-        Instrument axis 0, 1, 2 that the unit turned about.
-    start_s, end_s : float
-        From the stand-still before its first turn to the end of its last.
-    turned_rad : float
-        Sum of the turns, both senses.
-    """
-
-    axis: int
-    start_s: float
-    end_s: float
-    turned_rad: float
 
 
 @dataclass(frozen=True)
 class Section:
-    """Samples without a gap between them, which begin with a stand-still.
+    """Samples without a gap between them, which begin with a rest.
 
     Attributes
     ----------
     first, last : int
         Numbers of the samples.
     start_s, still_s : float
-        Time of the first sample; length of the stand-still.
+        Time of the first sample; length of the rest.
     rate, force : arrays, shape (3,)
-        Means over the stand-still, as measured.
+        Means over the rest, as measured.
     """
 
     first: int
@@ -79,27 +45,85 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Rest:
+    """A stretch in which the unit does not move, without the guards at its edges.
+
+    Attributes
+    ----------
+    first, end : int
+        Number of the first window and of the one after the last.
+    start_s, duration_s : float
+    force : array, shape (3,)
+        Mean, m/s^2, as measured.
+    force_scatter : float
+        Standard deviation of the samples within a window, m/s^2; median over the windows.
+    """
+
+    first: int
+    end: int
+    start_s: float
+    duration_s: float
+    force: FloatArray
+    force_scatter: float
+
+
+@dataclass(frozen=True)
 class Survey:
     """Everything the filter must know of a recording before it starts.
 
     Attributes
     ----------
     windows : Windows
+        Those of sections without a rest have the section -1.
     sections : tuple of Section
     stages : tuple of Stage
+    rests : tuple of Rest
     use : array, shape (w,), bool
-        Windows in which the unit stands or turns on the table; the others are handling.
+        Windows in which the accelerometers are believed: rests, and turns on the table.
     still : array, shape (w,), bool
     rate_max : float
         Largest mean rate in a window, rad/s.
+    guard_s : float
+        Cut from a rest where it meets a motion that is not the table's.
+    findings : tuple of str
+        What of the recording is not used.
     """
 
     windows: Windows
     sections: tuple[Section, ...]
     stages: tuple[Stage, ...]
+    rests: tuple[Rest, ...]
     use: BoolArray
     still: BoolArray
     rate_max: float
+    guard_s: float
+    findings: tuple[str, ...] = ()
+
+    def without(self, starts_s: tuple[float, ...]) -> Survey:
+        """The same without the rests that begin at `starts_s`."""
+        if not starts_s:
+            return self
+        use = self.use.copy()
+        out = [rest for rest in self.rests if rest.start_s in starts_s]
+        for rest in out:
+            use[rest.first : rest.end] = False
+        said = [f"rest at {rest.start_s:.1f} s: not gravity alone, not used" for rest in out]
+        kept = tuple(rest for rest in self.rests if rest.start_s not in starts_s)
+        return replace(self, rests=kept, use=use, findings=(*self.findings, *said))
+
+    @property
+    def resting(self) -> BoolArray:
+        """Windows of the rests, shape (w,)."""
+        resting = np.zeros(len(self.use), dtype=bool)
+        for rest in self.rests:
+            resting[rest.first : rest.end] = True
+        return resting
+
+    @property
+    def levels_s(self) -> FloatArray:
+        """Ends of the rests after which the unit is moved by hand, s."""
+        ends = [rest.end for rest in self.rests if not self.use[min(rest.end, len(self.use) - 1)]]
+        return np.array([self.windows.start_s[end] for end in ends], dtype=np.float64)
 
     @property
     def duration_s(self) -> float:
@@ -114,106 +138,62 @@ def survey(recording: ImuRecording) -> Survey:
     Raises
     ------
     RefusedError
-        As `read_windows` and `refuse_wrong_units`; when a section does not begin with a stand-still
-        of `STILL_MIN_S`; when an axis was never rotated.
+        As `read_windows` and `refuse_wrong_units`; when the unit never rests; when an axis was
+        never turned.
     """
-    windows, edges = read_windows(recording)
+    windows, edges, clips = cut_at_clips(*read_windows(recording))
     refuse_wrong_units(recording, windows)
-    sections, still = [], np.zeros(len(windows.first), dtype=bool)
-    for number, (first, last) in enumerate(edges):
-        inside = np.flatnonzero(windows.section == number)
-        section, standing = _section(recording.name, windows, inside, first, last)
-        sections.append(section)
-        still[inside] = standing
-    stages, use = _stages(windows, sections, still, recording.starts_s)
-    _refuse_missing_axis(recording.name, windows, still, sections)
+    quiet = quiet_windows(windows, recording.starts_s)
+    if quiet is None:
+        raise _no_rest(recording.name, windows)
+    stages, turning = find_stages(windows, quiet, recording)
+    use, guard = _used(windows, quiet, turning)
+    rests = _rests(windows, use & quiet.calm)
+    if not rests:
+        raise _no_rest(recording.name, windows)
+    sections, numbers, findings = _sections(windows, edges, use, rests)
+    windows = replace(windows, section=numbers[windows.section])
+    _refuse_missing_axis(recording.name, windows, quiet)
+    rate_max = float(np.linalg.norm(windows.rate, axis=1).max())
+    found = (tuple(sections), stages, rests, use, quiet.still, rate_max)
+    return Survey(windows, *found, guard * WINDOW_S, (*clips, *findings))
+
+
+def _no_rest(name: str, windows: Windows) -> RefusedError:
     speed = np.linalg.norm(windows.rate, axis=1)
-    rate_max = float(speed.max())
-    return Survey(windows, tuple(sections), stages, use, still, rate_max)
+    return RefusedError(
+        name,
+        f"the unit never rests: half of the time its gyros read more than "
+        f"{np.degrees(np.median(speed)):.1f} deg/s",
+        expected="rests of a second and more between the turns, in which rate and force stay",
+        remedy="put the unit down between the turns, on something that does not move",
+    )
 
 
-def _section(
-    name: str, windows: Windows, inside: IntArray, first: int, last: int
-) -> tuple[Section, BoolArray]:
-    """Stand-still at the start of a section, and which of its windows stand."""
-    rate, start = windows.rate[inside], windows.start_s[inside]
-    few = max(2, round(2.0 / WINDOW_S))
-    reference = np.median(rate[:few], axis=0)
-    begin = rate[: round(STILL_MIN_S / WINDOW_S)]
-    noise = 1.4826 * np.median(np.abs(np.diff(begin, axis=0)), axis=0).max() / np.sqrt(2)
-    limit = min(max(STILL_RAD_PER_S, STILL_SD * noise), STILL_MAX_RAD_PER_S)
-    standing: BoolArray = np.abs(rate - reference).max(axis=1) < limit
-    run = len(standing) if standing.all() else int(np.argmin(standing))
-    length_s = float(windows.duration_s[inside][:run].sum())
-    found = ""
-    if length_s < STILL_MIN_S:
-        found = f"is at rest for {length_s:.1f} s, then " + (
-            f"turns at {np.degrees(np.linalg.norm(rate[run] - reference)):.1f} deg/s"
-            if run < len(rate)
-            else "the recording ends or has a gap"
-        )
-    elif _turns_evenly(reference, windows.force[inside][: round(STILL_MIN_S / WINDOW_S)]):
-        found = f"is not at rest: turns at {np.degrees(np.linalg.norm(reference)):.1f} deg/s"
-    if found:
-        raise RefusedError(
-            f"{name}, {start[0]:.1f} s",
-            found if first == 0 else f"after a gap the unit {found}",
-            expected=f"at least {STILL_MIN_S:.0f} s at rest at the start and after each gap",
-            remedy="keep the unit at rest before the first turn, and lose no samples in the turns",
-        )
-    kept = slice(0, max(1, run - 1))
-    mean_rate, mean_force = rate[kept].mean(axis=0), windows.force[inside][kept].mean(axis=0)
-    return Section(first, last, float(start[0]), length_s, mean_rate, mean_force), standing
+def _used(windows: Windows, quiet: Quiet, turning: BoolArray) -> tuple[BoolArray, int]:
+    """Windows in which the accelerometers are believed, and the guard in windows.
 
-
-def _turns_evenly(rate: FloatArray, force: FloatArray) -> bool:
-    """Whether a section starts in an even turn, which to the gyros alone looks like a bias.
-
-    Medians of seconds: one spoiled sample is no turn.
+    A rest beside a turn on the table is whole; where it meets anything else it is cut.
     """
-    second = round(1.0 / WINDOW_S)
-    seconds = [np.median(force[k : k + second], axis=0) for k in range(0, len(force), second)]
-    direction = np.array([f / np.linalg.norm(f) for f in seconds])
-    leans = bool((direction @ direction[0]).min() < REST_FORCE_COSINE)
-    return leans or float(np.linalg.norm(rate)) > REST_MAX_RAD_PER_S
+    use = quiet.calm | turning
+    rests = [
+        (a, b, _meets_motion(use, windows, a - 1, a), _meets_motion(use, windows, b, b - 1))
+        for a, b in runs_of(use & ~turning, windows.section)
+        if b - a >= round(REST_MIN_S / WINDOW_S)
+    ]
+    guard = guard_of(windows, rests)
+    use &= ~_widened(~use, guard)
+    for a, b in runs_of(use, windows.section):
+        if not turning[a:b].any() and b - a < round(REST_MIN_S / WINDOW_S):
+            use[a:b] = False
+    return use, guard
 
 
-def _stages(
-    windows: Windows, sections: list[Section], still: BoolArray, anew: tuple[float, ...] = ()
-) -> tuple[tuple[Stage, ...], BoolArray]:
-    """Stages, and the windows that belong to one or stand still.
-
-    `anew` are times of further recordings: the unit was put on the table anew.
-    """
-    bias = np.array([section.rate for section in sections])[windows.section]
-    rate = windows.rate - bias
-    speed = np.linalg.norm(rate, axis=1)
-    axis = np.argmax(np.abs(rate), axis=1)
-    along = np.abs(rate[np.arange(len(rate)), axis]) >= AXIS_COSINE * speed
-    label = np.where(still, -1, np.where(along, axis, -2))
-    turning = np.flatnonzero(label != -1)
-    use = still.copy()
-    stages: list[Stage] = []
-    if len(turning) == 0:
-        return (), use
-    # Runs of turning windows about the same axis of the same section, stand-stills disregarded.
-    key = label[turning] + 4 * windows.section[turning]
-    breaks = np.flatnonzero(np.diff(key)) + 1
-    end_before = windows.start_s[0]
-    for run in np.split(turning, breaks):
-        turned = float((speed[run] * windows.duration_s[run]).sum())
-        kind = int(label[run[0]])
-        end = float(windows.start_s[run[-1]] + windows.duration_s[run[-1]])
-        if kind >= 0 and turned >= STAGE_TURN_RAD:
-            use[run] = True
-            last = stages[-1] if stages else None
-            moved = last is None or any(last.start_s < s <= windows.start_s[run[0]] for s in anew)
-            if last is not None and last.axis == kind and not moved:
-                stages[-1] = Stage(kind, last.start_s, end, last.turned_rad + turned)
-            else:
-                stages.append(Stage(kind, float(end_before), end, turned))
-        end_before = end
-    return tuple(stages), use & ~_widened(~use, round(GUARD_S / WINDOW_S))
+def _meets_motion(use: BoolArray, windows: Windows, outside: int, inside: int) -> bool:
+    """Whether the window beside a rest exists, without a gap between, and moves."""
+    if not 0 <= outside < len(use) or windows.section[outside] != windows.section[inside]:
+        return False
+    return bool(not use[outside])
 
 
 def _widened(marked: BoolArray, by: int) -> BoolArray:
@@ -222,12 +202,61 @@ def _widened(marked: BoolArray, by: int) -> BoolArray:
     return near
 
 
-def _refuse_missing_axis(
-    name: str, windows: Windows, still: BoolArray, sections: list[Section]
-) -> None:
-    bias = np.array([section.rate for section in sections])[windows.section]
-    turns = np.abs(windows.rate - bias) * windows.duration_s[:, None]
-    for axis, turn in enumerate(turns[~still].sum(axis=0)):
+def _rests(windows: Windows, resting: BoolArray) -> tuple[Rest, ...]:
+    found = []
+    for a, b in runs_of(resting, windows.section):
+        if b - a < round(REST_MIN_S / WINDOW_S):
+            continue
+        duration = float(windows.duration_s[a:b].sum())
+        force = np.average(windows.force[a:b], axis=0, weights=windows.duration_s[a:b])
+        scatter = float(np.median(windows.force_scatter[a:b]))
+        found.append(Rest(a, b, float(windows.start_s[a]), duration, force, scatter))
+    return tuple(found)
+
+
+def _sections(
+    windows: Windows, edges: list[tuple[int, int]], use: BoolArray, rests: tuple[Rest, ...]
+) -> tuple[list[Section], IntArray, list[str]]:
+    """Sections from their first rest on, their new numbers, and what is left out for want of one.
+
+    A section without a rest has the number -1.
+    """
+    sections: list[Section] = []
+    numbers = np.full(len(edges), -1, dtype=np.int64)
+    lost_s: list[tuple[float, float]] = []
+    for number, (first, last) in enumerate(edges):
+        inside = np.flatnonzero(windows.section == number)
+        if len(inside) == 0:
+            continue
+        start_s = float(windows.start_s[inside[0]])
+        rest = next((r for r in rests if windows.section[r.first] == number), None)
+        if rest is None:
+            use[inside] = False
+            lost_s.append((start_s, float(windows.duration_s[inside].sum())))
+            continue
+        begin = first
+        if rest.first > inside[0]:
+            begin = int(windows.first[rest.first])
+            lost_s.append((start_s, rest.start_s - start_s))
+        rate = windows.rate[rest.first : rest.end].mean(axis=0)
+        numbers[number] = len(sections)
+        sections.append(Section(begin, last, rest.start_s, rest.duration_s, rate, rest.force))
+    return sections, numbers, _told(lost_s)
+
+
+def _told(lost_s: list[tuple[float, float]]) -> list[str]:
+    """What is said of starts and lengths of what is before the first rest of a section."""
+    if not lost_s:
+        return []
+    places = f" in {len(lost_s)} places" if len(lost_s) > 1 else ""
+    total_s = sum(length for _, length in lost_s)
+    told = f"{total_s:.1f} s{places} are not used, the first at {lost_s[0][0]:.1f} s"
+    return [f"{told}: what is before the first rest, and between a gap and the next one"]
+
+
+def _refuse_missing_axis(name: str, windows: Windows, quiet: Quiet) -> None:
+    turns = np.abs(windows.rate - quiet.bias) * windows.duration_s[:, None]
+    for axis, turn in enumerate(turns[~quiet.still].sum(axis=0)):
         if turn < AXIS_TURN_MIN_RAD:
             raise RefusedError(
                 name,

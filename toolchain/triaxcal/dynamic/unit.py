@@ -38,7 +38,7 @@ class DynamicUnit:
     off : tuple of Effect
         Effects that are switched off, tested on the recording.
     findings : tuple of str
-        What was left out or repaired when the recording was read.
+        What of the recording was left out, repaired or not used.
     range_degc : tuple of two floats, or None
         Working temperatures: those of [device], else of the recording; None where it has none.
     recorded_degc : tuple of two floats, or None
@@ -100,7 +100,7 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     seen = observability(result.layout, result.covariance)
     recorded = None if temperatures is None else temperatures.ends_degc
     range_degc = recorded if unit.device is None else unit.device.range_degc
-    findings = (*recording.findings, *unknown)
+    findings = (*recording.findings, *result.survey.findings, *unknown)
     about = unit, result, seen, off, findings, range_degc, recorded, recording
     return DynamicUnit(*about) if over is None else DynamicUnit(*about, over.over, full)
 

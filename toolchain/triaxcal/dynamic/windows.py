@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording
-from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
 WINDOW_S = 0.1
 GAP_INTERVALS = 1.75
@@ -32,6 +32,10 @@ class Windows:
         Number of the first sample.
     rate, force : arrays, shape (w, 3)
         rad/s, m/s^2, as measured.
+    force_scatter : array, shape (w,)
+        Standard deviation of the samples within the window, of the noisiest accelerometer, m/s^2.
+    rate_peak, at_peak : arrays, shape (w, 3)
+        Largest absolute rate of a sample, rad/s, and how many samples read it.
     section : array, shape (w,)
         Number of the section without a gap.
     """
@@ -41,7 +45,14 @@ class Windows:
     first: IntArray
     rate: FloatArray
     force: FloatArray
+    force_scatter: FloatArray
+    rate_peak: FloatArray
+    at_peak: IntArray
     section: IntArray
+
+    def part(self, marked: BoolArray) -> Windows:
+        """Those that are marked."""
+        return Windows(**{f.name: getattr(self, f.name)[marked] for f in fields(self)})
 
 
 def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]]]:
@@ -81,9 +92,17 @@ def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]
                 continue
             sizes = np.diff(starts, append=int(b))
             means = [np.add.reduceat(v[: int(b)], starts) / sizes[:, None] for v in (rate, force)]
+            deviation = force[begin : int(b)] - np.repeat(means[1], sizes, axis=0)
+            variance = np.add.reduceat(deviation**2, starts - begin) / sizes[:, None]
             section = np.full(len(starts), len(edges) - 1)
             at_s, duration_s = chunk.time_s[starts], sizes * interval
-            rows.append((at_s, duration_s, count + starts, *means, section))
+            scatter = np.sqrt(variance.max(axis=1))
+            size = np.abs(rate[begin : int(b)])
+            peak = np.maximum.reduceat(size, starts - begin)
+            held = size >= np.repeat(peak, sizes, axis=0)
+            at_peak = np.add.reduceat(held.astype(np.int64), starts - begin)
+            of_forces = (*means, scatter)
+            rows.append((at_s, duration_s, count + starts, *of_forces, peak, at_peak, section))
         count += len(chunk)
         previous_s = float(chunk.time_s[-1])
     edges[-1] = (edges[-1][0], count - 1)

@@ -1,0 +1,66 @@
+"""Where a gyro met its full scale for a moment: the attitude is lost there, and only there.
+
+A gyro that clips reads its largest value many times, and the next smaller one seldom; noise in an
+even turn does the reverse. The turn of that moment is unknown, so that the recording is cut: what
+follows begins with the next rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from triaxcal.dynamic.windows import Windows
+from triaxcal.model.types import BoolArray
+
+SAME = 1e-4
+"""Full scales of both signs differ by one count."""
+SAMPLES, TIMES = 5, 3
+"""At the largest value: at least so many, and so many times those at the next smaller value."""
+LEAST_RAD_PER_S = np.radians(50.0)
+"""No full scale of a gyro for motion is smaller."""
+
+
+def clipped(windows: Windows) -> BoolArray:
+    """Windows, shape (w,), in which a gyro stays at the largest value of its recording."""
+    found = np.zeros(len(windows.first), dtype=bool)
+    for axis in range(3):
+        peak = windows.rate_peak[:, axis]
+        largest = float(peak.max())
+        at_largest = peak >= (1 - SAME) * largest
+        held = at_largest & (windows.at_peak[:, axis] > 1)
+        if largest < LEAST_RAD_PER_S or not held.any():
+            continue
+        samples = int(windows.at_peak[at_largest, axis].sum())
+        below = peak == peak[~at_largest].max(initial=0.0)
+        if samples >= max(SAMPLES, TIMES * int(windows.at_peak[below, axis].sum())):
+            found |= at_largest
+    return found
+
+
+def cut_at_clips(
+    windows: Windows, edges: list[tuple[int, int]]
+) -> tuple[Windows, list[tuple[int, int]], tuple[str, ...]]:
+    """The same with a section more after each moment in which a gyro clips, and what is said of it.
+
+    Edges are the numbers of the first and last sample of each section.
+    """
+    lost = clipped(windows)
+    starts = np.flatnonzero(lost & ~np.r_[False, lost[:-1]])
+    if len(starts) == 0:
+        return windows, edges, ()
+    section = windows.section + np.cumsum(lost & ~np.r_[False, lost[:-1]])
+    new = []
+    for number in np.unique(section):
+        inside = np.flatnonzero(section == number)
+        last = edges[int(windows.section[inside[0]])][1]
+        after = inside[-1] + 1
+        if after < len(section) and windows.section[after] == windows.section[inside[0]]:
+            last = int(windows.first[after]) - 1
+        new.append((int(windows.first[inside[0]]), last))
+    at = ", ".join(f"{windows.start_s[k]:.1f}" for k in starts[:5])
+    more = f" and {len(starts) - 5} more" if len(starts) > 5 else ""
+    said = f"a gyro clips at {at}{more} s: a new alignment at the next rest"
+    renumbered = np.unique(section, return_inverse=True)[1].astype(np.int64)
+    return replace(windows, section=renumbered), new, (said,)
