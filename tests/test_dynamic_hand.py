@@ -138,7 +138,7 @@ def test_poses_of_two_seconds_by_hand_are_within_their_deviations() -> None:
     assert 8 < error @ np.linalg.solve(result.covariance[:21, :21], error) < 39
     scales = result.layout.place("gyro-matrix").start + np.array([0, 4, 8])
     assert result.sd[scales].max() < 30e-6
-    assert len(result.passes) <= 4
+    assert len(result.passes) <= 8  # four, and three with the bias instability that it shows
 
 
 def white_noise(samples: ImuSamples, found: Survey, rate_hz: float) -> DataSheet:

@@ -86,7 +86,6 @@ class _Pass:
         self.turned = np.zeros(len(self.found.sections))
         self.blocks = self._as_blocks(FIRST_SEGMENT_S if first else SEGMENT_S)
         self.levels_s = self.found.levels_s
-        self.unused = np.concatenate([[0], np.cumsum(~self.found.use)])
 
     def _as_blocks(self, seconds: float) -> int:
         return max(1, round(seconds / (self.frame.block * self.frame.interval_s)))
@@ -193,7 +192,7 @@ class _Pass:
         time_s = samples.time_s[lead : lead + blocks * self.frame.block + 1 : self.frame.block]
         about = About(C, self.p, self._earth())
         made = equations(Window(samples, lead, blocks, about, self.frame))
-        use = self._used(time_s)
+        use = self.found.believed(time_s)
         rows = whitened(made, use, self.frame, self.noise)
         freedom = 3 * (1 if made.y2 is None else 2) * use
         for more, where in self._table_rows(samples, lead, made, use):
@@ -258,14 +257,6 @@ class _Pass:
             return np.zeros(3)
         y = made.y[-blocks:].mean(axis=0) / self.frame.gravity
         return np.array([y[1], -y[0], 0.0])
-
-    def _used(self, ends_s: FloatArray) -> IntArray:
-        """Blocks in all of whose windows the accelerometers are believed; `ends_s` (blocks + 1)."""
-        start_s = self.found.windows.start_s
-        first = np.maximum(np.searchsorted(start_s, ends_s[:-1], side="right") - 1, 0)
-        end = np.maximum(np.searchsorted(start_s, ends_s[1:] - 1e-6, side="left"), first + 1)
-        whole: IntArray = (self.unused[end] == self.unused[first]).astype(np.int64)
-        return whole
 
     def _next_stage(self, time_s: float) -> None:
         stages = self.found.stages

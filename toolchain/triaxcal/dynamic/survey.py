@@ -6,6 +6,7 @@ The survey reads the recording once and keeps means over short windows; nothing 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -110,6 +111,22 @@ class Survey:
         said = [f"rest at {rest.start_s:.1f} s: not gravity alone, not used" for rest in out]
         kept = tuple(rest for rest in self.rests if rest.start_s not in starts_s)
         return replace(self, rests=kept, use=use, findings=(*self.findings, *said))
+
+    @cached_property
+    def _unused(self) -> IntArray:
+        """Number of windows before each that are not used."""
+        return np.concatenate([[0], np.cumsum(~self.use)]).astype(np.int64)
+
+    def believed(self, ends_s: FloatArray) -> IntArray:
+        """1 for each block in all of whose windows the accelerometers are believed, else 0.
+
+        `ends_s` (blocks + 1,) are the ends of blocks that follow each other.
+        """
+        start_s = self.windows.start_s
+        first = np.maximum(np.searchsorted(start_s, ends_s[:-1], side="right") - 1, 0)
+        end = np.maximum(np.searchsorted(start_s, ends_s[1:] - 1e-6, side="left"), first + 1)
+        whole: IntArray = (self._unused[end] == self._unused[first]).astype(np.int64)
+        return whole
 
     @property
     def resting(self) -> BoolArray:
