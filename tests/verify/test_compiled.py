@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from math import prod
+from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -14,6 +15,7 @@ from conftest import needs
 from triaxcal.codegen.forms import row_words
 from triaxcal.codegen.names import names_of
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
+from triaxcal.fixedpoint.proof import prove
 from triaxcal.verify.campaign import CHECKS
 from triaxcal.verify.outcome import NOT_DONE, PASSED
 from triaxcal.verify.workspace import Workspace
@@ -22,6 +24,7 @@ pytest.importorskip("z3", reason="the package z3-solver is not installed")
 
 from triaxcal.targets.bench import best_form
 from triaxcal.targets.cores.registry import CORES
+from triaxcal.targets.shapes import unit_case
 from triaxcal.verify import compiled
 from triaxcal.verify.binary.facts import Facts
 from triaxcal.verify.binary.listing import Instruction, Listing
@@ -31,6 +34,7 @@ from triaxcal.verify.binary.terms import Atoms, Poly
 from triaxcal.verify.binary.values import UnprovenError, Words, constant
 
 SHAPE = "direct-two-segments"
+UNITS = Path(__file__).parents[2] / "units"
 NAMES = ("Cortex-M0", "Cortex-M3", "Cortex-M4F", "RV32IM")
 COMPILERS = needs("arm-none-eabi-gcc", "riscv64-unknown-elf-gcc")
 
@@ -172,6 +176,34 @@ def test_proven_for_every_input(work, listings, name: str) -> None:
     temperature, applied = proven(work, name, Listing(listings[name]))
     assert temperature.ways >= 3 * len(work.plan.segments)
     assert applied.ways == 2  # no codes are out of range; with accel apart from raw_code and not
+
+
+@COMPILERS
+@pytest.mark.parametrize(
+    "name",
+    ["Cortex-M3", *(pytest.param(n, marks=pytest.mark.slow) for n in ("Cortex-M0", "RV32IM"))],
+)
+def test_codes_out_of_range_are_proven_on_every_way(name: str, tmp_path: Path) -> None:
+    """AT-SIM: each code below, inside and above its range, accel apart from raw_code and not."""
+    case = unit_case(UNITS / "AT-SIM")
+    files = {file: text.encode() for file, text in case.files.items()}
+    work = Workspace.create(tmp_path / "work", files, case.plan, prove(case.plan))
+    core = core_of(name)
+    _, applied = proven(work, name, Listing(compiled.disassembled(work, core)))
+    assert applied.ways == 2 * 3**3
+
+
+def test_an_or_is_zero_where_all_its_parts_are() -> None:
+    atoms = Atoms()
+    words = Words(atoms, Facts(atoms))
+    a, b = words.unknown("a"), words.unknown("b")
+    joined = words.floor(words.either(a, b), 24)
+    term = words.facts.term
+    assert not words.follows(term(joined.poly) == 0)
+    words.path.append(words.equal(joined, constant(0)))
+    assert words.follows(term(joined.poly) == 0)
+    assert words.follows(term(a.poly) < 2**24)
+    assert not words.follows(term(a.poly) == 0)
 
 
 # ---- faults ----

@@ -205,4 +205,7 @@ class Words:
         """The bits of either."""
         parts = (*(a.either or (a,)), *(b.either or (b,)))
         name = " or ".join(str(hash(part.poly)) for part in parts)
-        return Value(self.atoms.unknown(name), 0, WORD - 1, either=parts)
+        joined = Value(self.atoms.unknown(name), 0, WORD - 1, either=parts)
+        none = z3.And([self.equal(part, constant(0)) for part in parts])
+        self.facts.know((self.facts.term(joined.poly) == 0) == none)
+        return joined
