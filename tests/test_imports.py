@@ -28,6 +28,7 @@ MAY_IMPORT = {
     "simulation": {"base", "model", "unit", "readings", "dynamic"},
     "design": {"base", "model", "unit", "dynamic", "simulation"},
     "rig": {"base", "model", "unit", "readings", "simulation"},
+    "guide": {"base", "model", "unit", "readings", "dynamic", "rig"},
     "device": {"base", "codegen"},
     "keytable": {"base", "unit", "dynamic", "simulation", "design", "rig"},
     "delivery": {

@@ -67,15 +67,19 @@ def lines(
     channel: str = "can0",
     offset: int = 0,
     late_ns: int = 0,
+    first: int = 0,
+    start_s: float = 0.0,
 ) -> Iterator[str]:
     """Lines of a candump log; samples that are lost, have a flipped bit, or a bad status.
 
-    `late_ns`: frames arrive up to so much late, by chance.
+    `late_ns`: frames arrive up to so much late, by chance. `first`, `start_s`: number and time of
+    the first sample.
     """
     bus = cantools.database.load_file(FOLDER / "imu.dbc")
     force, rate = codes_of(samples)
     late = np.random.default_rng(1).integers(0, late_ns + 1, len(samples))
-    time_ns = np.rint((samples.time_s - samples.time_s[0]) * 1e9).astype(int) + START_NS + late
+    since_s = samples.time_s - samples.time_s[0] + start_s
+    time_ns = np.rint(since_s * 1e9).astype(int) + START_NS + late
     for k in range(len(samples)):
         frames = []
         if k % 50 == 0:
@@ -83,7 +87,9 @@ def lines(
             frames.append(("IMU_TEMP", {"Temperature": temp}))
         for name, codes, kind in (("IMU_FORCE", force, "Force"), ("IMU_RATE", rate, "Rate")):
             signals = {f"{kind}{a}": int(c) for a, c in zip("XYZ", codes[k], strict=True)}
-            frames.append((name, signals | {"Counter": k % 16, "Status": int(k in bad), "Crc": 0}))
+            frames.append(
+                (name, signals | {"Counter": (first + k) % 16, "Status": int(k in bad), "Crc": 0})
+            )
         for place, (name, signals) in enumerate(frames):
             if k in lost and name == "IMU_RATE":
                 continue

@@ -11,6 +11,7 @@ import click
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.cli.options import HELP, example
+from triaxcal.cli.rig_imu import imu
 from triaxcal.cli.rig_options import (
     PLAIN,
     SECONDS,
@@ -276,5 +277,6 @@ def fil(setup: Setup, samples: int, bus: str | None, listen: bool, seed: int) ->
     click.echo(f"{done.samples} samples bit for bit, {rate:.0f} a second{lost}")
 
 
+rig.add_command(imu)
 rig.add_command(signals)
 rig.add_command(status)

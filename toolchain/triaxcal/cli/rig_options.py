@@ -97,7 +97,7 @@ def run_options(command: Callable[..., None]) -> Callable[..., None]:
         with_both,
         _UNIT_OR_PLAN,
         *_SESSION,
-        click.option("--bus", cls=_BusOption),
+        click.option("--bus", cls=BusOption),
         *_SIMULATED,
     )
 
@@ -160,10 +160,11 @@ class BusChoice:
     seed: int
 
 
-class _BusOption(click.Option):
+class BusOption(click.Option):
     """Explained by the registry of sources."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """The kinds of sources."""
         self.help = "; ".join(f"{kind.label}: {kind.doc}" for kind in SOURCES) + "."
         return super().get_help_record(ctx)
 
@@ -177,7 +178,7 @@ def bus_options(command: Callable[..., None]) -> Callable[..., None]:
 
     return _optioned(
         with_bus,
-        click.option("--bus", required=True, cls=_BusOption),
+        click.option("--bus", required=True, cls=BusOption),
         *_SIMULATED,
     )
 

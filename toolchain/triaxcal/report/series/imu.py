@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from triaxcal.delivery.imu import ImuDelivery, deliver_imu
+from triaxcal.dynamic.blocks import north
 from triaxcal.report.dynamic import dynamic_files
 
 IMU = "IMU"
@@ -51,6 +52,7 @@ def imu_record(made: ImuDelivery) -> dict[str, Any]:
                 "sd": float(result.sd[i]) / state.per_unit,
             }
             for block in result.layout.blocks
+            if block is not north.BLOCK  # the place's, not the unit's
             for i, state in enumerate(block.states, result.layout.place(block.name).start)
         ],
     }
