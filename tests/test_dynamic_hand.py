@@ -64,6 +64,7 @@ def test_short_poses_by_hand_give_both_triads(grade: str, seeds: int, rate_hz: f
     for result in results:
         assert result.survey.stages == ()
         assert 0.15 < result.survey.guard_s < 0.75
+        assert result.static.determined
         assert result.static.left_out == ()
         # Nine differences a recording, each below a normal number: 4 sd once in two thousand.
         assert abs(result.static.largest[1]) < 4.0

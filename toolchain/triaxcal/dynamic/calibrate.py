@@ -137,7 +137,7 @@ def calibrate_dynamic(
             covariance = done.root @ done.root.T
             shown = (done.p, sd, covariance, done.stage_p, start.heading_rad, found)
             used = noise, not_stated(stated, noise)
-            beside = compared(static, found, recording.gravity_m_per_s2, done.p, sd)
+            beside = compared(static, found, layout, (done.p, sd), recording.gravity_m_per_s2)
             return DynamicResult(layout, *shown, *used, frame, tuple(passes), beside)
     raise RefusedError(
         recording.name,

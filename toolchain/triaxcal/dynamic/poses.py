@@ -102,6 +102,9 @@ class StaticComparison:
         Root mean square of |a| - g over the rests, by the joint constants.
     left_out : tuple of float
         Starts of the rests that contradict the others, s.
+    determined : bool
+        Whether the rests alone know all nine, and are described by them alone: with further effects
+        on the forces, as of temperature, the joint constants are not those of a mean rest.
     """
 
     names: tuple[str, ...]
@@ -112,6 +115,7 @@ class StaticComparison:
     normalised: FloatArray
     residual_m_per_s2: float
     left_out: tuple[float, ...]
+    determined: bool
 
     @property
     def largest(self) -> tuple[str, float]:
@@ -146,15 +150,18 @@ def static_poses(recording: ImuRecording, found: Survey, noise: DataSheet) -> St
 
 
 def compared(
-    static: StaticPoses, found: Survey, gravity: float, p: FloatArray, sd: FloatArray
-) -> StaticComparison:
-    """The joint solution `p` with deviations `sd` (n,) against the rests alone."""
+    static: StaticPoses, found: Survey, layout: Layout, at: tuple[FloatArray, FloatArray],
+    gravity: float,
+) -> StaticComparison:  # fmt: skip
+    """The joint solution, constants and deviations (n,) of `layout`, against the rests alone."""
+    p, sd = at
+    plain = [block.name for block, _ in layout.columns("force")] == [b.name for b in LAYOUT.blocks]
     joint, joint_sd = p[: len(static.p)], sd[: len(static.p)]
     larger = np.maximum(static.sd, joint_sd)
     residual = _Forces.of(found, 0.0).sizes(joint) - gravity
     return StaticComparison(
         static.names, static.p, static.sd, joint, joint_sd, (joint - static.p) / larger,
-        float(np.sqrt((residual**2).mean())), static.left_out,
+        float(np.sqrt((residual**2).mean())), static.left_out, plain and static.determined,
     )  # fmt: skip
 
 
