@@ -94,6 +94,7 @@ LONG = {
     "test_fit_squares.py",
     "test_guide.py",
     "test_history.py",
+    "test_dynamic_agreement.py",
     "test_dynamic_curves.py",
     "test_imu_delivery.py",
     "test_imu_delivery_thermal.py",

@@ -143,7 +143,9 @@ def calibrate_dynamic(
         recording.name,
         f"after {PASSES_MAX} passes the constants still move by {moved:.1f} standard deviations",
         expected="a recording that the model describes",
-        remedy="check units, axes, conventions and the noise that unit.toml states",
+        remedy="check "
+        + "that all recordings are of one unit, " * bool(recording.starts_s)
+        + "units, axes, conventions and the noise that unit.toml states",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from triaxcal.dynamic.thermalparts import (
 from triaxcal.model.curves import ThermalModel
 from triaxcal.model.thermal.registry import AUTO, THERMAL_FUNCTIONS
 from triaxcal.model.thermal.shape import EDGE_DEGC, ThermalShape
-from triaxcal.model.types import IntArray
+from triaxcal.model.types import FloatArray, IntArray
 from triaxcal.unit.thermal import ThermalChoice
 
 GRID = 17
@@ -93,12 +93,16 @@ class Solved:
     over : OverTemperature
     recording : ImuRecording
         What the filter used: the recordings in which the unit turns.
+    functions : array, shape (n, parameters)
+        The map from the parameters of the chosen functions to all constants and terms, in units
+        of the priors.
     """
 
     full: DynamicResult
     shown: DynamicResult
     over: OverTemperature
     recording: ImuRecording
+    functions: FloatArray = field(repr=False)
 
 
 def solve_over_temperature(
@@ -141,7 +145,8 @@ def solve_over_temperature(
     known = known_at(curves, everything, choice, grid)
     models = thermal_models(choice.fit, nodes.t0_degc)
     over = OverTemperature(nodes, choice, known, *models, _findings(recorded, moved))
-    return Solved(full, _shown(full, curves, choice), over, turning)
+    own = Curves(constants_of(full), basis, curves.seen).map_of(choice.fit.shapes)[0]
+    return Solved(full, _shown(full, curves, choice), over, turning, own)
 
 
 def _seen(nodes: Nodes, moved: Recorded) -> dict[str, Nodes]:

@@ -154,6 +154,8 @@ class ImuRecording:
         One of `MOTIONS` where it is stated how the unit was turned; "": the recording decides.
     starts_s : tuple of float
         When the second and every further one begins, where it is several recordings.
+    names : tuple of str
+        Of each of several recordings.
     force_hz : float or None
         At which the accelerometers were sampled, where that is slower than the samples.
     seen_density : mapping
@@ -172,6 +174,7 @@ class ImuRecording:
     findings: tuple[str, ...] = ()
     motion: str = ""
     starts_s: tuple[float, ...] = ()
+    names: tuple[str, ...] = ()
     force_hz: float | None = None
     seen_density: Mapping[str, float] = field(default_factory=dict)
 

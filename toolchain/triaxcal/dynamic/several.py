@@ -89,6 +89,7 @@ def joined_recordings(found: list[ImuRecording]) -> ImuRecording:
         pieces=pieces,
         findings=tuple(f"{name}: {finding}" for name, finding in words),
         starts_s=tuple(part.start_s for part in placed[1:]),
+        names=tuple(recording.name for recording in found),
     )
 
 

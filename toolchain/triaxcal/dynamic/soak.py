@@ -81,7 +81,8 @@ def split_soaks(recording: ImuRecording) -> tuple[ImuRecording, tuple[Soak, ...]
         return [piece for number, piece in numbers if number in turning]
 
     kept = tuple(float(starts[number - 1]) for number in turning[1:])
-    return replace(recording, pieces=pieces, starts_s=kept), soaks
+    names = tuple(recording.names[number] for number in turning)
+    return replace(recording, pieces=pieces, starts_s=kept, names=names), soaks
 
 
 def _mean(samples: ImuSamples, recording: ImuRecording) -> FloatArray:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.progress import Progress
+from triaxcal.dynamic.agreement import recordings_differ, refuse_others
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.missing import Effect, missing_effects
@@ -86,7 +87,7 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     ------
     RefusedError
         As `read_recordings`, `recorded_temperatures` and `calibrate_dynamic`; where the working
-        range is beyond the temperatures that were recorded.
+        range is beyond the temperatures that were recorded; where recordings are of two units.
     """
     report = progress or (lambda _step, _part: None)
     unit, recording = upright(unit, read_recordings(unit))
@@ -95,12 +96,15 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     full, over = _solve(unit, recording, temperatures, report)
     if over is not None:
         recording, unknown = over.recording, (*unknown, *over.over.findings)
+    functions = None if over is None else over.functions
+    moved = None if temperatures is None else recorded_temperatures(recording)
+    differ = refuse_others(recordings_differ(recording, full, moved, functions))
     result = full if over is None else over.shown
     off = missing_effects(recording, full, lambda part: report("effects off", part))
     seen = observability(result.layout, result.covariance)
     recorded = None if temperatures is None else temperatures.ends_degc
     range_degc = recorded if unit.device is None else unit.device.range_degc
-    findings = (*recording.findings, *result.survey.findings, *unknown)
+    findings = (*recording.findings, *result.survey.findings, *unknown, *differ)
     about = unit, result, seen, off, findings, range_degc, recorded, recording
     return DynamicUnit(*about) if over is None else DynamicUnit(*about, over.over, full)
 
