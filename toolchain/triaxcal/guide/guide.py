@@ -28,7 +28,7 @@ from triaxcal.guide.watch import Motion, Watch
 from triaxcal.model.types import FloatArray
 
 HOLD_S, FIRST_HOLD_S = 5.0, 10.0
-GUARD_S = 0.4
+GUARD_S = 0.3
 """Of a rest, on each side, that is not counted: what lifts the unit starts slowly."""
 EVERY = 8
 """Rests after which the recording is calibrated, whatever the step model says."""

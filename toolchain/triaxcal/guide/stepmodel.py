@@ -23,6 +23,8 @@ from triaxcal.dynamic.noise import DataSheet
 from triaxcal.guide.turns import Turn
 from triaxcal.model.types import FloatArray
 
+PART_S, PARTS_MAX = 0.7, 12
+"""The gyros of a MEMS unit are believed for about a second against its accelerometers at rest."""
 _TILT_SD_RAD = 0.1
 """Before the first rest."""
 _AZIMUTH_SD_RAD = 1e-4
@@ -68,13 +70,15 @@ class StepModel:
         self._measure(across @ self._rows(up), self._force_variance / seconds)
 
     def rest(self, up: FloatArray, seconds: float) -> None:
-        """A rest, in two halves, each with its mean in the middle."""
+        """A rest, in parts of about `PART_S`, each with its mean in the middle."""
         self._begin(up)
         still = self._gains(np.zeros((1, 3)), up[None], np.eye(3)[None], 1.0)
-        for part in (0.25, 0.5):
-            self._drift(np.eye(3), still * (part * seconds), part * seconds)
-            self._measure(self._rows(up), self._force_variance / (seconds / 2))
-        self._drift(np.eye(3), still * (0.25 * seconds), 0.25 * seconds)
+        count = min(max(2, round(seconds / PART_S)), PARTS_MAX)
+        half_s = seconds / count / 2
+        for _ in range(count):
+            self._drift(np.eye(3), still * half_s, half_s)
+            self._measure(self._rows(up), self._force_variance / (2 * half_s))
+            self._drift(np.eye(3), still * half_s, half_s)
 
     def turn(self, turn: Turn, up: FloatArray) -> FloatArray:
         """A turn as it is asked for; returns up after it."""
