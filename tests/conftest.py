@@ -80,6 +80,7 @@ LONG = {
     "test_diagnosis.py",
     "test_diagnosis_blocks.py",
     "test_diagnosis_faults.py",
+    "test_dynamic_bent.py",
     "test_dynamic_calibrate.py",
     "test_dynamic_equations.py",
     "test_dynamic_hand.py",

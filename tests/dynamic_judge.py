@@ -15,6 +15,7 @@ from triaxcal.simulation.imu_motion import ImuMotion
 from triaxcal.simulation.imu_truth import ARCSEC, DEG_PER_H, PPM, ImuNoise, ImuTruth
 
 MM = 1e-3
+DEG = np.pi / 180
 PAIRS = ((1, 2), (1, 3), (2, 1), (2, 3), (3, 1), (3, 2))
 
 
@@ -29,6 +30,13 @@ def true_constants(truth: ImuTruth) -> dict[str, float]:
         true[f"kdf{axis}"] = MM * truth.accel_bias_mm_per_s2_per_k[i]
         true[f"KGamma{axis}{axis}"] = PPM * truth.accel_scale_ppm_per_k[i]
         true[f"knu{axis}"] = DEG_PER_H * truth.gyro_bias_deg_per_h_per_k[i]
+        true[f"aw{axis}"] = PPM * truth.gyro_asymmetry_ppm[i]
+        true[f"qw{axis}"] = PPM / DEG * truth.gyro_even_ppm_per_deg_s[i]
+        true[f"ow{axis}"] = PPM / DEG * truth.gyro_odd_ppm_per_deg_s[i]
+        true[f"cw{axis}"] = PPM / DEG**2 * truth.gyro_cubic_ppm_per_deg2_s2[i]
+        true[f"af{axis}"] = PPM * truth.accel_asymmetry_ppm[i]
+        true[f"qf{axis}"] = MM * truth.accel_square_mm_per_s2_per_g2[i]
+        true[f"cf{axis}"] = MM * truth.accel_cubic_mm_per_s2_per_g3[i]
         true[f"KTheta{axis}{axis}"] = PPM * truth.gyro_scale_ppm_per_k[i]
         for j in range(3):
             true[f"Gamma{axis}{j + 1}"] = float(gamma[i, j])

@@ -93,7 +93,7 @@ def hand_recording(
     rate_hz: float = 100.0,
     minutes: float = 3.0,
     still_s: float = 10.0,
-    gyro_scale_per_rad_s: float = 0.0,
+    bend=None,
 ) -> tuple[dict[str, float], ImuRecording]:
     """True constants by name, SI, and the recording."""
     rng = np.random.default_rng([seed, 16])
@@ -103,7 +103,8 @@ def hand_recording(
     theta = 4e-3 * rng.standard_normal((3, 3))
     gamma = np.tril(4e-3 * rng.standard_normal((3, 3)))
     nu, df = 3e-3 * rng.standard_normal(3), 0.02 * rng.standard_normal(3)
-    gyro = rate + rate @ theta.T + nu + gyro_scale_per_rad_s * rate * np.abs(rate)
+    gyro = rate + rate @ theta.T + nu
+    gyro = gyro if bend is None else gyro + bend(rate)
     accel = force + force @ gamma.T + df
     root = 1 / math.sqrt(step_s)
     gyro = gyro + noise.gyro_n * math.pi / 180 / 60 * root * rng.standard_normal((n, 3))

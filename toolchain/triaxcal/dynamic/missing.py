@@ -3,11 +3,13 @@
 The sum of squared innovations is blunt: an effect far below the noise of one block, in step with
 the motion for an hour, hardly changes it. So every extension that the recording's columns allow is
 switched on for one more pass, about the finished result. If an effect is absent the estimates of
-its k states are noise, and p^T P^-1 p is chi-square with k degrees of freedom.
+its k states are noise, and p^T P^-1 p is chi-square with k degrees of freedom. Each is tested
+beside those that are shown, the strongest first, and with the others absent.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -26,7 +28,7 @@ from triaxcal.dynamic.wander import wander_of
 from triaxcal.model.types import FloatArray, IntArray
 
 SIGNIFICANCE = 1e-3
-"""Some seven tests on each recording: one false alarm in a hundred and forty recordings."""
+"""Some ten tests on each recording: one false alarm in a hundred recordings."""
 
 
 HINT_SD = 4.0
@@ -44,6 +46,7 @@ class Effect:
     ----------
     name, title : str
     chi_square : float
+        Of its states, beside the effects that are shown.
     states : int
     shown : bool
         Whether the recording shows it beyond `SIGNIFICANCE`.
@@ -92,24 +95,81 @@ def missing_effects(
     start = Reference(p, stage_p, result.heading_rad)
     done = run_pass(task, start, first=False, progress=progress)
     covariance = done.root @ done.root.T
-    known_places = np.arange(known)
+    own = {e.name: _places(e, result.layout, layout) for e in candidates}
+    tested = _Tested(done.p - p, covariance, np.arange(known), own)
+    shown = tested.chosen()
     found = []
     for extension in candidates:
-        new = [block for block in extension.blocks if block.name not in result.layout]
-        places = [layout.place(block.name) for block in new]
-        index = np.concatenate([np.arange(len(layout))[place] for place in places])
-        value = float(
-            done.p[index] @ np.linalg.solve(covariance[np.ix_(index, index)], done.p[index])
-        )
-        shown = bool(chi2.sf(value, len(index)) < SIGNIFICANCE)
-        hint = _hint(extension.name, done.p[index], covariance[np.ix_(index, index)], recording)
-        kept = np.concatenate([known_places, index])
-        step, own = without_others(done.p - p, covariance, kept)
-        alone = float(step[known:] @ np.linalg.solve(own[known:, known:], step[known:]))
-        moved, moves_sd = _most_moved(result, step[:known])
-        about = extension.name, extension.label, value, len(index), shown, hint if shown else ""
+        name = extension.name
+        value, new, its = tested.beside(name, [other for other in shown if other != name])
+        alone, _, _ = tested.beside(name, [])
+        moved, moves_sd = _most_moved(result, tested.step_of_constants(name))
+        hint = _hint(name, new, its, recording) if name in shown else ""
+        about = name, extension.label, value, len(new), name in shown, hint
         found.append(Effect(*about, alone, moves_sd, moved))
     return tuple(sorted(found, key=lambda e: -e.chi_square / e.states))
+
+
+def _places(extension: Extension, on: Layout, layout: Layout) -> IntArray:
+    """Where the states of an extension are that are not on."""
+    new = [block for block in extension.blocks if block.name not in on]
+    index = np.arange(len(layout))
+    return np.concatenate([index[layout.place(block.name)] for block in new])
+
+
+@dataclass(frozen=True)
+class _Tested:
+    """Estimates with all effects on, of which some are then taken to be absent.
+
+    Attributes
+    ----------
+    step : array, shape (n,)
+    covariance : array, shape (n, n)
+    constants : array
+        Places of the states that are on.
+    own : dict
+        Places of each effect's states.
+    """
+
+    step: FloatArray
+    covariance: FloatArray
+    constants: IntArray
+    own: dict[str, IntArray]
+
+    def _only(self, names: list[str]) -> tuple[FloatArray, FloatArray]:
+        kept = np.concatenate([self.constants, *(self.own[name] for name in names)])
+        return without_others(self.step, self.covariance, kept)
+
+    def beside(self, name: str, others: list[str]) -> tuple[float, FloatArray, FloatArray]:
+        """Chi-square, estimate and covariance of an effect's states, only `others` being there."""
+        step, covariance = self._only([*others, name])
+        new = slice(len(step) - len(self.own[name]), None)
+        value = float(step[new] @ np.linalg.solve(covariance[new, new], step[new]))
+        return value, step[new], covariance[new, new]
+
+    def step_of_constants(self, name: str) -> FloatArray:
+        """By how much one effect would change the constants."""
+        return self._only([name])[0][: len(self.constants)]
+
+    def chosen(self) -> list[str]:
+        """Effects that are significant beside each other: the strongest, then what is left.
+
+        Several may look alike in a recording (a table has few rates). All of them on, none would
+        be significant.
+        """
+        chosen: list[str] = []
+        while len(chosen) < len(self.own):
+            chance = {}
+            for name, places in self.own.items():
+                if name not in chosen:
+                    value = self.beside(name, chosen)[0]
+                    # Far out the logarithm is -inf for all, and the larger value is the stronger.
+                    chance[name] = float(chi2.logsf(value, len(places))), len(places) - value
+            strongest = min(chance, key=lambda name: chance[name])
+            if chance[strongest][0] > math.log(SIGNIFICANCE):
+                break
+            chosen.append(strongest)
+        return chosen
 
 
 def without_others(

@@ -55,7 +55,7 @@ class Moments:
 
 
 def gyro_readings(truth: ImuTruth, at: Moments) -> FloatArray:
-    """Readings of the gyros, rad/s, shape (3, n): (2), (13), (20), (24)."""
+    """Readings of the gyros, rad/s, shape (3, n): (2), (13), (20), (24), bent characteristics."""
     warm, rate = at.warmer_k(truth), at.body.rate
     bias = DEG_PER_H * _column(truth.gyro_bias_deg_per_h)
     bias = bias + DEG_PER_H * _column(truth.gyro_bias_deg_per_h_per_k) * warm
@@ -66,6 +66,7 @@ def gyro_readings(truth: ImuTruth, at: Moments) -> FloatArray:
     if truth.curved is not None:
         shift, matrix = truth.curved.gyro(warm)
         readings = readings + shift + np.einsum("ijn,jn->in", matrix, rate)
+    readings = readings + _bent_rate(truth, rate)
     if not (drift_per_g.any() or kappa.any()):
         return readings + rate
     force_g = at.force(np.zeros(3)) / at.motion.gravity_m_per_s2
@@ -73,6 +74,29 @@ def gyro_readings(truth: ImuTruth, at: Moments) -> FloatArray:
     for i in range(3):
         readings[i] += _along_bent_axis(i, kappa, rate, force_g)
     return readings
+
+
+def _bent_rate(truth: ImuTruth, rate: FloatArray) -> FloatArray:
+    """What gyros with a bent characteristic read too much, rad/s, shape (3, n)."""
+    deg_s = np.degrees(rate)
+    size = np.abs(deg_s)
+    ppm = _column(truth.gyro_asymmetry_ppm) * size
+    ppm = ppm + _column(truth.gyro_even_ppm_per_deg_s) * deg_s * deg_s
+    ppm = ppm + _column(truth.gyro_odd_ppm_per_deg_s) * size * deg_s
+    ppm = ppm + _column(truth.gyro_cubic_ppm_per_deg2_s2) * deg_s * deg_s * deg_s
+    result: FloatArray = np.radians(PPM * ppm)
+    return result
+
+
+def _bent_force(truth: ImuTruth, force: FloatArray, gravity: float) -> FloatArray:
+    """The same of the accelerometers, m/s^2."""
+    load = force / gravity
+    too_much = PPM * _column(truth.accel_asymmetry_ppm) * np.abs(force)
+    too_much = too_much + 1e-3 * _column(truth.accel_square_mm_per_s2_per_g2) * load * load
+    result: FloatArray = (
+        too_much + 1e-3 * _column(truth.accel_cubic_mm_per_s2_per_g3) * load * load * load
+    )
+    return result
 
 
 def _along_bent_axis(
@@ -99,6 +123,11 @@ def accel_readings(truth: ImuTruth, at: Moments) -> FloatArray:
     if truth.curved is not None:
         shift, change = truth.curved.accel(warm)
         bias, matrix = bias + shift, matrix[:, :, None] + change
+    bent = truth.accel_asymmetry_ppm, truth.accel_square_mm_per_s2_per_g2
+    if np.any((*bent, truth.accel_cubic_mm_per_s2_per_g3)):
+        places = 1e-3 * np.array(truth.accel_position_mm)
+        own = np.stack([at.force(place)[i] for i, place in enumerate(places)])
+        bias = bias + _bent_force(truth, own, at.motion.gravity_m_per_s2)
     return bias + _triad(matrix, scale, truth.accel_position_mm, at)
 
 

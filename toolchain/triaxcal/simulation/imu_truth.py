@@ -172,6 +172,14 @@ class ImuTruth:
         As in `triaxcal.dynamic.recording`.
     curved : Curved, or None
         Further change with temperature.
+    gyro_asymmetry_ppm, gyro_even_ppm_per_deg_s, gyro_odd_ppm_per_deg_s : three floats
+        What a gyro reads too much along its own rate w: e |w|, q w^2, o |w| w.
+    gyro_cubic_ppm_per_deg2_s2 : three floats
+        c w^3.
+    accel_asymmetry_ppm : three floats
+        What an accelerometer reads too much along its own force f: e |f|.
+    accel_square_mm_per_s2_per_g2, accel_cubic_mm_per_s2_per_g3 : three floats
+        Of the force in g.
     """
 
     gyro_bias_deg_per_h: Three = _NONE3
@@ -195,6 +203,13 @@ class ImuTruth:
     rate_convention: str = INCREMENT
     force_convention: str = INCREMENT
     curved: Curved | None = None
+    gyro_asymmetry_ppm: Three = _NONE3
+    gyro_even_ppm_per_deg_s: Three = _NONE3
+    gyro_odd_ppm_per_deg_s: Three = _NONE3
+    gyro_cubic_ppm_per_deg2_s2: Three = _NONE3
+    accel_asymmetry_ppm: Three = _NONE3
+    accel_square_mm_per_s2_per_g2: Three = _NONE3
+    accel_cubic_mm_per_s2_per_g3: Three = _NONE3
 
     def gyro_matrix(self) -> FloatArray:
         """Theta of (2), shape (3, 3)."""

@@ -30,7 +30,7 @@ BLOCK = StateBlock(
     "elastic-gyro",
     "elastic misalignment of the gyros",
     tuple(
-        State(f"K{i}{j}", "arcsec/g", ARCSEC, 60.0, f"turn about own axis {j}, force along {i}")
+        State(f"K{i}{j}", "arcsec/g", ARCSEC, 600.0, f"turn about own axis {j}, force along {i}")
         for i in (1, 2, 3)
         for j in (2, 3)
     ),
