@@ -9,7 +9,7 @@ import pytest
 
 from dynamic_cases import aviation, changed, held, perfect, sheet
 from dynamic_judge import data_sheet, judge
-from test_dynamic_judge import ALL, CENTRES, motion
+from test_dynamic_judge import ALL, CENTRES, LINEAR, motion
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.channels import steady
@@ -17,7 +17,7 @@ from triaxcal.dynamic.missing import missing_effects
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuRecording
 from triaxcal.simulation.imu import simulate_imu
-from triaxcal.simulation.imu_grades import AVIATION, EFFECTS, draw_truth
+from triaxcal.simulation.imu_grades import AVIATION, draw_truth
 from triaxcal.simulation.imu_motion import three_axes
 
 MINUTES = 1.5
@@ -46,7 +46,7 @@ def test_a_delay_beside_lever_arms_leaves_no_bias(convention: str) -> None:
 @pytest.mark.parametrize(("convention", "rate_hz"), [(INCREMENT, 200.0), (INSTANT, 50.0)])
 def test_all_together_leave_no_bias(convention: str, rate_hz: float) -> None:
     """All 85 states. At 200 Hz a table creeping to a stop once cost 8 sd of both delays."""
-    truth = perfect(draw_truth(AVIATION, 6, tuple(EFFECTS)))
+    truth = perfect(draw_truth(AVIATION, 6, LINEAR))
     truth = replace(truth, rate_convention=convention, force_convention=convention)
     verdict = judge(truth, motion(MINUTES, "all"), rate_hz, 6, ALL, noise=AVIATION.noise)
     assert np.abs(verdict.z).max() < LIMIT

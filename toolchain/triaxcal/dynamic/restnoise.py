@@ -16,10 +16,12 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.dynamic.survey import Survey
 from triaxcal.dynamic.windows import WINDOW_S
-from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.model.types import FloatArray
 
 PAIRS_MIN = 9
 """Differences in a rest that counts."""
+EDGE = 3
+"""Windows at each end of a rest that do not count."""
 NOISIER = 3.0
 """Of the median: a rest of 9 differences in three axes is beyond it once in 10^5."""
 
@@ -58,7 +60,7 @@ def rest_noise(name: str, found: Survey) -> tuple[float, float]:
     if not rests:
         raise RefusedError(
             f"{name}, rests",
-            f"none longer than {(PAIRS_MIN + 1) * WINDOW_S:g} s: they do not show the noise",
+            f"none longer than {(PAIRS_MIN + 1 + 2 * EDGE) * WINDOW_S:g} s: they do not show the noise",
             expected="longer rests, or [noise] in unit.toml",
             remedy="state the figures of the data sheet in [noise]",
         )
@@ -79,15 +81,13 @@ def rest_noise(name: str, found: Survey) -> tuple[float, float]:
     return made[0], made[1]
 
 
-def _rests(found: Survey) -> list[IntArray]:
-    """Numbers of the windows of each rest that is long enough."""
-    windows = found.windows
-    rest = found.resting
-    full = np.abs(windows.duration_s - np.median(windows.duration_s)) < 1e-9
-    places = np.flatnonzero(rest & full)
-    cut = (np.diff(places) > 1) | (np.diff(windows.section[places]) != 0)
-    runs = np.split(places.astype(np.int64), np.flatnonzero(cut) + 1)
-    return [run for run in runs if len(run) > PAIRS_MIN]
+def _rests(found: Survey) -> list[slice]:
+    """Windows of the middle of each rest that is long enough.
+
+    A table that starts or stops is taken for one at rest until the gyros resolve it.
+    """
+    inner = [slice(rest.first + EDGE, rest.end - EDGE) for rest in found.rests]
+    return [part for part in inner if part.stop - part.start > PAIRS_MIN]
 
 
 def _allan_variance(rests: list[FloatArray]) -> float:
