@@ -60,7 +60,7 @@ def rest_noise(name: str, found: Survey) -> tuple[float, float]:
     if not rests:
         raise RefusedError(
             f"{name}, rests",
-            f"none longer than {(PAIRS_MIN + 1 + 2 * EDGE) * WINDOW_S:g} s, so the noise is not seen",
+            f"none longer than {(PAIRS_MIN + 1 + 2 * EDGE) * WINDOW_S:g} s: too few for noise",
             expected="longer rests, or [noise] in unit.toml",
             remedy="state the figures of the data sheet in [noise]",
         )
