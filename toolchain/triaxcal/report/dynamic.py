@@ -17,6 +17,7 @@ from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.delivery.imuverdict import ImuVerdict
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Observability
+from triaxcal.dynamic.survey import Survey
 from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.dynamicpage import digits, dynamic_page, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
@@ -63,6 +64,7 @@ def calibration_document(made: ImuDelivery) -> dict[str, Any]:
             "values": result.stage_p.tolist(),
         },
         "heading_rad": None if result.heading_rad is None else result.heading_rad.tolist(),
+        "rests": {"number": len(result.survey.rests), "guard_s": result.survey.guard_s},
         "stages": [asdict(stage) | {"axis": "xyz"[stage.axis]} for stage in result.survey.stages],
         "passes": len(result.passes),
         "noise": noise_document(result),
@@ -111,6 +113,16 @@ def axis_up(result: DynamicResult) -> str:
     return f"{'+' if force[axis] > 0 else '-'}{'xyz'[axis]}"
 
 
+def rests_words(found: Survey) -> str:
+    """Rests, their guards, and that no turn is the table's where none is."""
+    lengths = [rest.duration_s for rest in found.rests]
+    turns = "" if found.stages else "; no turns on a table"
+    return (
+        f"{len(lengths)} rests of {min(lengths):.1f} to {max(lengths):.1f} s, guards of "
+        f"{found.guard_s:.1f} s{turns}"
+    )
+
+
 def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str:
     """Text for the screen; `files` lie in the folder `target`."""
     done = made.done
@@ -125,6 +137,7 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
         *(f"                {finding}" for finding in done.findings),
         f"                first {found.sections[0].still_s:.0f} s at rest, {axis_up(result)} up",
     ]
+    lines.append(" " * 16 + rests_words(found))
     for stage in found.stages:
         lines.append(
             f"  axis {'xyz'[stage.axis]}        {stage.start_s:7.0f} to {stage.end_s:6.0f} s, "
