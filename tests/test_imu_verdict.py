@@ -192,7 +192,11 @@ CONTRADICTIONS: dict[
         {"innovations", "held-out turns"},
         ("more noise than stated: at rest the gyros scatter by 3",),
     ),
-    "biases that jump": (_step, {"innovations", "held-out rests", "held-out turns"}, ()),
+    "biases that jump": (
+        _step,
+        {"innovations", "held-out rests", "held-out turns"},
+        ("biases that change at",),
+    ),
 }
 
 
@@ -296,3 +300,20 @@ def test_a_file_without_a_verdict_is_not_checked(tmp_path: Path) -> None:
     (tmp_path / "old.json").write_text(json.dumps(document), encoding="utf-8")
     old = triaxcal.load_imu(tmp_path / "old.json")
     assert (old.passed, old.verdict.result) == (False, "not checked")
+
+
+def test_recordings_of_two_units_are_refused_with_the_moment(tmp_path: Path) -> None:
+    """Each has constants of its own; both together have none."""
+    first = table_of(mems_short()[1])
+    truth = draw_truth(GRADES["mems"], 77)
+    second = table_of(held(simulate_imu(truth, short_motion(), 50.0, 9)))
+    join_s = first[-1, 0] + 0.02 - second[0, 0]
+    second[:, 0] += join_s
+    folder = write_unit(tmp_path / "IMU-A", np.concatenate([first, second]))
+    with pytest.raises(triaxcal.RefusedError) as refusal:
+        triaxcal.deliver(folder, tmp_path / "build")
+    said = str(refusal.value)
+    assert "explained by constants that change at" in said
+    at_s = float(said.split("change at ")[1].split(" s", maxsplit=1)[0])
+    assert abs(at_s - second[0, 0]) < 5.0
+    assert not (tmp_path / "build").exists()

@@ -18,11 +18,13 @@ from triaxcal.codegen.imu import ImuBuild, build_imu
 from triaxcal.delivery.fittedimu import FittedImu, fitted_imu
 from triaxcal.delivery.imuverdict import ImuVerdict, judge_imu, refusal_of
 from triaxcal.delivery.inputs import files_sha256
+from triaxcal.dynamic.calibrate import NotSettledError
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.device import Device
 from triaxcal.dynamic.unit import DynamicUnit, calibrate_described
 from triaxcal.evidence.check import Evidence
 from triaxcal.evidence.examine import examine
+from triaxcal.evidence.unsettled import explained
 from triaxcal.fixedpoint.gyro import TriadDescription
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.curves import ThermalModel
@@ -135,7 +137,10 @@ def fit_described(unit: DynamicDescription, progress: Progress | None = None) ->
     if unit.device is not None:
         find_compiler()  # before minutes of filtering, not after
     inputs = _inputs_sha256(unit) if all(f.exists() for f in unit.inputs) else ""
-    done = calibrate_described(unit, progress)
+    try:
+        done = calibrate_described(unit, progress)
+    except NotSettledError as refusal:
+        raise explained(unit, refusal) from refusal
     if _inputs_sha256(unit) != inputs:
         raise RefusedError(
             str(unit.path.parent), "changed while it was read", remedy="run it again"

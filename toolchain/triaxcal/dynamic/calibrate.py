@@ -88,6 +88,10 @@ class DynamicResult:
     static: StaticComparison
 
 
+class NotSettledError(RefusedError):
+    """The passes do not settle: no constants describe the recording."""
+
+
 def calibrate_dynamic(
     recording: ImuRecording, noise: DataSheet, blocks: tuple[StateBlock, ...] = (), *,
     reference_degc: float = 20.0, progress: Progress | None = None,
@@ -139,7 +143,7 @@ def calibrate_dynamic(
             used = noise, not_stated(stated, noise)
             beside = compared(static, found, layout, (done.p, sd), recording.gravity_m_per_s2)
             return DynamicResult(layout, *shown, *used, frame, tuple(passes), beside)
-    raise RefusedError(
+    raise NotSettledError(
         recording.name,
         f"after {PASSES_MAX} passes the constants still move by {moved:.1f} standard deviations",
         expected="a recording that the model describes",

@@ -75,7 +75,7 @@ class _Pass:
         self.up_rate = EARTH_RATE_RAD_PER_S * math.sin(latitude)
         self.reset = self.frame.layout.reset_columns()
         self.stage = 0
-        self.cuts_s, self.watch = task.cuts_s, task.watch
+        self.cuts_s, self.watch, self.renewed = task.cuts_s, task.watch, task.renewed
         self.stage_p = start.stage_p.copy()
         if len(self.stage_p):
             self.p[self.reset] = self.stage_p[0]
@@ -177,6 +177,8 @@ class _Pass:
         self._next_stage(time_s)
         if self.cuts_s and time_s >= self.cuts_s[0]:
             self._forget_attitude()
+            if len(self.renewed):
+                self._forget(self.renewed, self.p[self.renewed])
             self.cuts_s = tuple(cut for cut in self.cuts_s if cut > time_s)
         block_s = self.frame.block * self.frame.interval_s
         ahead = self.levels_s[self.levels_s >= time_s + block_s]

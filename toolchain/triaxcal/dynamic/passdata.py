@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Protocol
 
+import numpy as np
+
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.preintegrate import BlockEquations
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.survey import Survey
 from triaxcal.dynamic.wander import Wander
 from triaxcal.dynamic.window import Frame
-from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
 
 class Watch(Protocol):
@@ -34,6 +36,8 @@ class Task:
         Rising times at which the filter forgets the attitude: what lies before and after shares
         the constants alone.
     watch : Watch or None
+    renewed : array
+        Places of states that are new after each cut.
     """
 
     recording: ImuRecording
@@ -43,6 +47,7 @@ class Task:
     wander: Wander
     cuts_s: tuple[float, ...] = ()
     watch: Watch | None = None
+    renewed: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)

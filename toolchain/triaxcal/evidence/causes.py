@@ -21,7 +21,8 @@ from triaxcal.evidence.case import Case
 from triaxcal.evidence.chance import chi_square, largest, lengths, stacked
 from triaxcal.evidence.check import Cause, Evidence
 from triaxcal.evidence.heldout import HeldOut, held_out_every
-from triaxcal.evidence.trials import TRIALS, Suspect
+from triaxcal.evidence.suspect import Suspect
+from triaxcal.evidence.trials import TRIALS
 from triaxcal.model.types import FloatArray
 
 EQUAL = 13.8

@@ -156,6 +156,26 @@ def earth(result: DynamicResult) -> Iterator[Check]:
     )  # fmt: skip
 
 
+def rests_alone(result: DynamicResult) -> Iterator[Check]:
+    """Accelerometers by the rests alone against the joint solution, where they determine them.
+
+    The rests are part of the joint solution, so that a difference over the larger deviation has at
+    most the variance 1; the largest of nine keeps its limit by Boole's inequality.
+    """
+    found = result.static
+    if not found.determined:
+        return
+    name, times = found.largest
+    count = len(found.names)
+    limit = math.sqrt((1 + MODEL_TOLERANCE) * chi2.isf(SHARE / count, 1))
+    yield Check(
+        "rests alone", abs(times) <= limit,
+        f"{name} differs from the joint solution by {abs(times):.2g} standard deviations, more "
+        f"than the others (limit {limit:.2g})",
+        abs(times), limit, "sd", count,
+    )  # fmt: skip
+
+
 def effects_off(off: Sequence[Effect]) -> Iterator[Check]:
     """Effects that are switched off, that show, and that move a constant out of its interval."""
     share = SHARE / max(1, len(off))

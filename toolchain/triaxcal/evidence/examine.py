@@ -21,6 +21,7 @@ from triaxcal.evidence.chance import (
     held_out_checks,
     innovations,
     less_noise,
+    rests_alone,
 )
 from triaxcal.evidence.check import Check, Evidence
 from triaxcal.evidence.heldout import HeldOut, held_out
@@ -42,6 +43,7 @@ def examine_case(
     checks = [
         innovations(result),
         *(() if held is None else held_out_checks(held, limits)),
+        *rests_alone(result),
         *earth(result),
         *effects_off(off),
         *sd_checks(limits, result),

@@ -47,7 +47,10 @@ class Stretch:
 
 
 def rests_of(found: Survey) -> tuple[tuple[Rest, ...], ...]:
-    """Rests of each section without a gap that last `REST_MIN_S` and are used."""
+    """Rests of each section without a gap that last `REST_MIN_S`.
+
+    Their rate is that of rest: where a hand begins to lift slowly, |a| is not g.
+    """
     windows, marked = found.windows, found.still & found.use
     sections = []
     for number in range(len(found.sections)):
@@ -60,6 +63,14 @@ def rests_of(found: Survey) -> tuple[tuple[Rest, ...], ...]:
                 rests.append(Rest(float(windows.start_s[run[0]]), end_s))
         sections.append(tuple(r for r in rests if r.end_s - r.start_s >= REST_MIN_S))
     return tuple(sections)
+
+
+def at_rest(found: Survey) -> BoolArray:
+    """Windows of the rests, shape (w,)."""
+    marked = np.zeros(len(found.windows.first), dtype=bool)
+    for rest in found.rests:
+        marked[rest.first : rest.end] = True
+    return marked & found.use
 
 
 def stretches_of(found: Survey, every: int = EVERY) -> tuple[Stretch, ...]:

@@ -6,27 +6,19 @@ A new one is a class with `name` and `of`, and its line in `TRIALS`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.blocks import north
-from triaxcal.dynamic.blocks.base import BASE
-from triaxcal.dynamic.calibrate import calibrate_dynamic
-from triaxcal.dynamic.filterpass import run_pass
-from triaxcal.dynamic.noise import DataSheet
-from triaxcal.dynamic.passdata import Task
 from triaxcal.dynamic.recording import ImuSamples
 from triaxcal.dynamic.survey import Survey
-from triaxcal.dynamic.wander import wander_of
 from triaxcal.dynamic.windows import WINDOW_S
 from triaxcal.evidence.case import Case
-from triaxcal.evidence.heldout import HeldOut, extended, held_out_every
-from triaxcal.evidence.stretches import rests_of
+from triaxcal.evidence.change import Change
+from triaxcal.evidence.heldout import HeldOut
+from triaxcal.evidence.stretches import at_rest, rests_of
+from triaxcal.evidence.suspect import Suspect, Trial, again, innovations_again
 from triaxcal.model.types import BoolArray, FloatArray
 
 NOISIER = 1.1
@@ -37,57 +29,6 @@ UNEVEN = 1e-3
 """Of an interval: stamps that scatter by less are printed so."""
 CLIPPED_SAMPLES = 3
 """A noisy gyro reads its largest value once, or by rounding twice; a clipped one more often."""
-JUMP_SD = 6.0
-
-
-@dataclass(frozen=True)
-class Suspect:
-    """A cause as if it were allowed for.
-
-    Attributes
-    ----------
-    words, remedy : str
-    innovations : tuple of float and int
-        Their chi-square and its degrees of freedom.
-    held : HeldOut or None
-        Held-out rests and turns.
-    direct : bool
-        Whether the recording shows the cause itself, and the trial leaves a part of it out or
-        changes its noise: its chi-square is none of the same data.
-    """
-
-    words: str
-    remedy: str
-    innovations: tuple[float, int]
-    held: HeldOut | None
-    direct: bool = False
-
-
-class Trial(Protocol):
-    """One cause."""
-
-    name: str
-
-    def of(self, case: Case, held: HeldOut | None, /) -> Suspect | None:
-        """The cause allowed for; None where nothing of the recording speaks for it."""
-
-
-def _again(words: str, remedy: str, case: Case, held: HeldOut | None) -> Suspect:
-    """One more pass about the result, and one without the held-out part."""
-    out = None if held is None else held_out_every(case, held.every)
-    return Suspect(words, remedy, _innovations(case), out)
-
-
-def _innovations(
-    case: Case, found: Survey | None = None, cuts_s: tuple[float, ...] = ()
-) -> tuple[float, int]:
-    """Chi-square and degrees of freedom of one more pass about the result."""
-    result = case.result
-    wander = wander_of(result.layout, case.noise, result.survey.duration_s)
-    frame = replace(result.frame, layout=wander.layout)
-    task = Task(case.recording, found or result.survey, frame, case.noise, wander, cuts_s)
-    done = run_pass(task, extended(result, result.layout), first=False)
-    return done.chi_square, done.freedom
 
 
 class Noise:
@@ -112,7 +53,7 @@ class Noise:
             "from shaking"
         )
         more_noise = replace(case, noise=more)
-        return replace(_again(words, remedy, more_noise, held), direct=True)
+        return replace(again(words, remedy, more_noise, held), direct=True)
 
 
 def noise_at_rest(case: Case) -> tuple[float, float]:
@@ -121,7 +62,7 @@ def noise_at_rest(case: Case) -> tuple[float, float]:
     By differences of windows that follow each other: slow changes take no part in them.
     """
     found, recording, noise = case.result.survey, case.recording, case.noise
-    windows, still = found.windows, found.still & found.use
+    windows, still = found.windows, at_rest(found)
     both = still[1:] & still[:-1] & (np.diff(windows.section) == 0)
     samples = max(1, round(WINDOW_S * recording.rate_hz))
     duration_s = samples / recording.rate_hz
@@ -162,7 +103,7 @@ class Stamps:
         words = f"time stamps that scatter by {scatter:.2g} of an interval: even times fit"
         remedy = "state rate_hz in place of time_column, or record with the sensor's own clock"
         changed = replace(case, recording=replace(recording, pieces=lambda: (even,)))
-        return _again(words, remedy, changed, held)
+        return again(words, remedy, changed, held)
 
 
 class Clipping:
@@ -176,7 +117,7 @@ class Clipping:
         clipped, words = _clipped(samples, survey)
         if not words:
             return None
-        left = _innovations(case, *_without_motions(survey, samples.time_s[clipped]))
+        left = innovations_again(case, *_without_motions(survey, samples.time_s[clipped]))
         remedy = "turn more slowly, or set a wider range"
         return Suspect(words, remedy, left, None, direct=True)
 
@@ -206,75 +147,6 @@ def _without_motions(found: Survey, times_s: FloatArray) -> tuple[Survey, tuple[
                 use &= ~((start > before.end_s - WINDOW_S) & (start < after.start_s))
                 cuts.append(after.start_s)
     return replace(found, use=use), tuple(cuts)
-
-
-class Change:
-    """Constants that change at one moment: two units, a restart, another mounting of a sensor."""
-
-    name = "a change of the constants"
-
-    def of(self, case: Case, _held: HeldOut | None, /) -> Suspect | None:
-        """Both parts as recordings of their own, at the largest jump of the gyros at rest."""
-        recording, result = case.recording, case.result
-        at_s, jump = largest_jump(result.survey, case.noise)
-        if at_s is None:
-            return None
-        samples = recording.all()
-        cut = int((samples.time_s < at_s).sum())
-        blocks = tuple(b for b in result.layout.blocks if b not in (*BASE, north.BLOCK))
-        value, freedom = 0.0, 0
-        degc = result.frame.reference_degc
-        try:
-            for own in (samples[:cut], samples[cut:]):
-                part = replace(recording, pieces=partial(_one, own))
-                done = calibrate_dynamic(part, case.noise, blocks, reference_degc=degc)
-                value += done.passes[-1].chi_square
-                freedom += done.passes[-1].freedom
-        except RefusedError:
-            return None
-        words = (
-            f"constants that change at {at_s:.1f} s, where the gyros at rest jump by "
-            f"{np.degrees(np.abs(jump).max()):.3g} deg/s: two units, a restart or another "
-            "temperature"
-        )
-        return Suspect(
-            words, "calibrate both parts each for itself", (value, freedom), None, direct=True
-        )
-
-
-def _one(samples: ImuSamples) -> tuple[ImuSamples, ...]:
-    return (samples,)
-
-
-def largest_jump(found: Survey, noise: DataSheet) -> tuple[float | None, FloatArray]:
-    """Time at which the gyros' means at rest change most, and the change (3,), rad/s.
-
-    None where they change by less than `JUMP_SD` of their noise.
-    """
-    windows = found.windows
-    rests = [r for rests in rests_of(found) for r in rests]
-    means, variances = [], []
-    for rest in rests:
-        inside = (windows.start_s >= rest.start_s) & (windows.start_s < rest.end_s)
-        means.append(windows.rate[inside].mean(axis=0))
-        variances.append(noise.rate_density**2 / (rest.end_s - rest.start_s))
-    mean, weight = np.array(means), 1 / np.array(variances)[:, None]
-    best, at_s, jump = JUMP_SD**2, None, np.zeros(3)
-    for k in range(2, len(rests) - 1):
-        (a, of_a), (b, of_b) = (
-            _weighted(mean[p], weight[p]) for p in (slice(0, k), slice(k, None))
-        )
-        size = float(((b - a) ** 2).sum() / (of_a + of_b))
-        if size > best:
-            best, at_s, jump = size, rests[k].start_s, b - a
-    return at_s, jump
-
-
-def _weighted(values: FloatArray, weight: FloatArray) -> tuple[FloatArray, float]:
-    """Weighted mean over the first axis, and its variance."""
-    total = float(weight.sum())
-    mean: FloatArray = (values * weight).sum(axis=0) / total
-    return mean, 1 / total
 
 
 TRIALS: tuple[Trial, ...] = (Noise(), Stamps(), Clipping(), Change())
