@@ -35,11 +35,12 @@ HEADING_SD_MAX_RAD = 0.3
 TOO_FAST_SD = 4.0
 """A rate beyond the Earth's by so many standard deviations has no direction of the north."""
 PASSES_MAX = 12
+"""To settle once; where the noise is found on the way, the passes settle twice."""
 SETTLED_SD = 0.05
 """A pass that moves no constant by more than this part of its standard deviation is the last."""
-DAMPED = 0.5
-"""Part of a step that is taken once steps turn back on themselves: where the heading is known to
-some ten degrees only, whole ones may swing wider and wider about the minimum."""
+LEAST_PART = 0.5
+"""Least part of a step that is taken: where the heading is known to some ten degrees only, whole
+steps may swing wider and wider about the minimum."""
 MOVES = 100
 """Of the fastest wandering states, in a recording whose bias instability is still looked for."""
 
@@ -116,7 +117,8 @@ def calibrate_dynamic(
     start = _first_reference(searching, recording, found, static)
     passes: list[PassResult] = []
     part_of_step, step = 1.0, np.zeros(0)
-    for number in range(PASSES_MAX):
+    allowed = PASSES_MAX if decided else 2 * PASSES_MAX
+    for number in range(allowed):
         layout = searching if start.heading_rad is None else wanted
         wander = wander_of(layout, noise, duration_s, 0.0 if decided else duration_s / MOVES)
         frame = _frame(wander.layout, recording, size, reference_degc)
@@ -129,8 +131,8 @@ def calibrate_dynamic(
         last_step, step = step, (done.p - start.p)[:n] / sd[:n]
         moved = float(np.abs(step).max())
         before = start.heading_rad
-        if number >= 2 and before is not None and step @ last_step < -0.25 * last_step @ last_step:
-            part_of_step = DAMPED
+        if number >= 2 and before is not None:
+            part_of_step = _part_of_step(part_of_step, step, last_step)
         start = _next_reference(start, done, n, recording, part_of_step)
         same_kind = (before is None) == (start.heading_rad is None)
         settled = number >= 2 and moved < SETTLED_SD and same_kind
@@ -145,12 +147,22 @@ def calibrate_dynamic(
             return DynamicResult(layout, *shown, *used, frame, tuple(passes), beside)
     raise NotSettledError(
         recording.name,
-        f"after {PASSES_MAX} passes the constants still move by {moved:.1f} standard deviations",
+        f"after {allowed} passes the constants still move by {moved:.1f} standard deviations",
         expected="a recording that the model describes",
         remedy="check "
         + "that all recordings are of one unit, " * bool(recording.starts_s)
         + "units, axes, conventions and the noise that unit.toml states",
     )
+
+
+def _part_of_step(part: float, step: FloatArray, last: FloatArray) -> float:
+    """Part of `step` to take after the `part` of the `last` one was taken.
+
+    Steps in proportion to the distance from the minimum change by 1 - part mu from one to the next,
+    so that 1/mu is the part that arrives there: the method of secants.
+    """
+    ratio = float(step @ last / (last @ last))
+    return 1.0 if ratio >= 1.0 - LEAST_PART else max(LEAST_PART, min(1.0, part / (1.0 - ratio)))
 
 
 def _no_report(part: float) -> None:
