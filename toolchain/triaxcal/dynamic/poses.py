@@ -118,11 +118,6 @@ class StaticComparison:
     determined: bool
 
     @property
-    def determined(self) -> bool:
-        """Whether the rests alone know all nine constants."""
-        return bool((self.static_sd < DETERMINED * LAYOUT.prior_sd).all())
-
-    @property
     def largest(self) -> tuple[str, float]:
         """Name and normalised difference of the constant that disagrees most."""
         worst = int(np.argmax(np.abs(self.normalised)))
