@@ -47,7 +47,8 @@ def _order_lines(guide: Guide) -> list[str]:
     else:
         lines.append("  it moves")
     if guide.refusal:
-        lines += ["  the recording so far cannot be calibrated:", f"    {guide.refusal}"[:WIDTH]]
+        lines.append("  the recording so far cannot be calibrated:")
+        lines += [f"    {line[: WIDTH - 4]}" for line in textwrap.wrap(guide.refusal, WIDTH - 4)]
     return lines
 
 

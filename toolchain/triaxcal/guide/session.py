@@ -174,11 +174,15 @@ class GuidedRecording:
         layout = Layout((*BASE, *unit.state_blocks()))
         goals = goals_of(unit.limits, layout)
         setting = Setting(layout, noise, unit.gravity_m_per_s2, rate_hz, goals)
-        return Guide(setting, self._calibrate, self._submit)
+        return Guide(setting, self._calibrate, self._begin)
+
+    def _begin(self, work: Callable[[], DynamicResult]) -> Future[DynamicResult]:
+        """Begin a calibration of what the log holds; only this thread writes into it."""
+        self.log.flush()
+        return self._submit(work)
 
     def _calibrate(self) -> DynamicResult:
         """Calibrate the log as it is: what `triaxcal dynamic` would do now."""
-        self.log.flush()
         unit = read_dynamic(self._folder)
         return calibrate_dynamic(
             read_recordings(unit),

@@ -18,7 +18,7 @@ import numpy as np
 from triaxcal.dynamic.blocks.attitude import rotation_of
 from triaxcal.model.types import FloatArray
 
-ANGLES_DEG = (45, 90, 180, 360)
+ANGLES_DEG = (45, 90, 180, 360, 720)
 RATE_DEG_PER_S = 60.0
 """How fast a hand turns, about."""
 HANDLING_S = 1.5
@@ -26,6 +26,7 @@ HANDLING_S = 1.5
 HORIZONTAL = 0.9
 """An axis that leans more to the vertical is not turned about: gravity would not show it."""
 _STEP_DEG = 5.0
+_AROUND = {360: "once", 720: "twice"}
 _FACE = math.cos(math.radians(20.0))
 _PART = math.sin(math.radians(20.0))
 
@@ -73,9 +74,10 @@ class Turn:
         if not self.angle_deg:
             return "do not move it"
         axis, end = "xyz"[self.axis], up_words(self.end(up))
-        if abs(self.angle_deg) == 360:
-            first = up_words(Turn(self.axis, self.angle_deg // 4).end(up))
-            return f"turn it once around {axis}: until {first}, and on until {end} again"
+        if abs(self.angle_deg) in _AROUND:
+            first = up_words(Turn(self.axis, int(math.copysign(90, self.angle_deg))).end(up))
+            times = _AROUND[abs(self.angle_deg)]
+            return f"turn it {times} around {axis}: until {first}, and on until {end} again"
         return f"turn it by {abs(self.angle_deg)} deg around {axis}, until {end}"
 
 
@@ -99,7 +101,7 @@ def candidates(up: FloatArray, missing: Sequence[int] = ()) -> tuple[Turn, ...]:
     axes = [axis for axis in range(3) if abs(up[axis]) < HORIZONTAL]
     turns = [Turn(axis, sign * angle) for angle in ANGLES_DEG for axis in axes for sign in (1, -1)]
     if missing:
-        whole = [turn for turn in turns if turn.axis in missing and abs(turn.angle_deg) == 360]
+        whole = [turn for turn in turns if turn.axis in missing and abs(turn.angle_deg) in _AROUND]
         return tuple(whole or [t for t in turns if abs(t.end(up)[missing[0]]) < HORIZONTAL])
     simple = [turn for turn in turns if np.abs(turn.end(up)).min() < _PART]
     return (*(simple or turns), Turn(0, 0))
