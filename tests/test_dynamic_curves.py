@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from thermal_cases import Judged, five_points, judged, solved, three_ramps, truth_of
+from dynamic_cases import held
+from thermal_cases import TURNS, Judged, five_points, judged, solved, three_ramps, true_at, truth_of
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.blocks.base import GYRO_MATRIX
 from triaxcal.dynamic.blocks.block import Signals
@@ -17,6 +19,11 @@ from triaxcal.dynamic.thermalcurves import thermal_models, values_at
 from triaxcal.dynamic.thermalnodes import nodes_of
 from triaxcal.model.curves import PiecewisePolynomial, on_common_breaks
 from triaxcal.model.thermal.registry import THERMAL_FUNCTIONS
+from triaxcal.simulation.imu import simulate_imu
+from triaxcal.simulation.imu_grades import MEMS, draw_truth
+from triaxcal.simulation.imu_motion import ImuMotion, Mounting
+from triaxcal.simulation.imu_temperature import TemperatureRamp
+from triaxcal.simulation.imu_truth import Curved
 from triaxcal.unit.thermal import ThermalChoice
 
 NODES = np.array([-40.0, -10.0, 20.0, 50.0, 85.0])
@@ -141,3 +148,22 @@ def test_an_order_that_the_temperatures_do_not_determine_is_refused() -> None:
     truth = truth_of(1)
     with pytest.raises(RefusedError, match="order 5 with 5 calibrated temperatures"):
         solved(truth, five_points(truth, 1), ThermalChoice("polynomial", {"order": 5}))
+
+
+def test_a_quadratic_bias_in_a_few_degrees_is_found_or_bounded() -> None:
+    """0.01 mm/s^2/K^2 from 20 to 28 degC: 0.64 mm/s^2 at the end, with 0.1 mm/s^2 of noise."""
+    truth = draw_truth(MEMS, 5)
+    bend = (0.01 * 60**2, 0.0, 0.0)
+    zero3, zero9 = (0.0,) * 3, (0.0,) * 9
+    curved = Curved((zero3, bend, zero3), (zero3,) * 3, (zero9,) * 3, (zero9,) * 3)  # type: ignore[arg-type]
+    truth = replace(truth, curved=curved)
+    mountings = tuple(Mounting(TURNS * 2, 12.0) for _ in range(3))
+    flat = ImuMotion(mountings)
+    motion = ImuMotion(mountings, temperature=TemperatureRamp(19.9, 28.1, flat.duration_s))
+    recording = held(simulate_imu(truth, motion, 25.0, 5))
+    known = solved(truth, recording).over.known
+    z = (known.value - true_at(truth, known.temps_degc)) / known.sd
+    # 21 constants over 8 K: 50 independent values, beyond 4.5 once in 3000.
+    assert np.abs(z).max() < 4.5
+    change = known.value[-1, 0] - known.value[0, 0]
+    assert abs(change - 1e-3 * 0.01 * (8.1**2 - 0.1**2)) < 4.5 * np.hypot(*known.sd[[0, -1], 0])

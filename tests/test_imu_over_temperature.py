@@ -17,6 +17,8 @@ from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
 from triaxcal.delivery.imu import ImuDelivery, deliver_imu
 from triaxcal.dynamic.blocks.base import LOWER
 from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.unit import calibrate_unit
+from triaxcal.evidence.examine import examine
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
 from triaxcal.simulation.imu_truth import ImuTruth
 
@@ -158,6 +160,23 @@ def test_a_range_beyond_the_points_is_refused(tmp_path: Path) -> None:
     unit = folder_of(tmp_path, [at_point(truth, t, 300 + k) for k, t in enumerate((20.0, 50.0))])
     with pytest.raises(RefusedError, match=r"the temperatures recorded are 19\.7 to 50\.0 degC"):
         deliver_imu(unit)
+
+
+def test_a_demand_holds_over_the_whole_range(tmp_path: Path) -> None:
+    """Scale factors of accelerometers have 10 ppm at 20 degC, and 22 ppm between two points."""
+    truth = truth_of(3)
+    points = [at_point(truth, t, 300 + k) for k, t in enumerate(POINTS)]
+    done = calibrate_unit(folder_of(tmp_path, points, more="[limits]\naccel_scale_sd_ppm = 17\n"))
+    assert done.over is not None
+    scales = [done.over.known.names.index(f"Gamma{i}{i}") for i in (1, 2, 3)]
+    sd = done.over.known.sd[:, scales] / 1e-6
+    at_t0 = [done.result.sd[i] / 1e-6 for i in scales]
+    assert max(at_t0) < 17 < sd.max()
+    found = examine(done, lambda _step, _part: None)
+    (check,) = [c for c in found.checks if c.name == "[limits] accel_scale_sd_ppm"]
+    assert not check.held
+    assert check.value == pytest.approx(sd.max())
+    assert "at its worst temperature (limit 17)" in check.words
 
 
 def test_a_soak_without_turns_gives_the_biases(tmp_path: Path) -> None:

@@ -7,12 +7,23 @@ from dataclasses import dataclass
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.model.types import FloatArray
 
 
 @dataclass(frozen=True)
 class Case:
-    """A recording and its solution."""
+    """A recording and its solution.
+
+    Attributes
+    ----------
+    recording : ImuRecording
+    noise : DataSheet
+    result : DynamicResult
+    worst_sd : array, shape (n,), or None
+        Of the states, the largest over the working range, where constants follow the temperature.
+    """
 
     recording: ImuRecording
     noise: DataSheet
     result: DynamicResult
+    worst_sd: FloatArray | None = None

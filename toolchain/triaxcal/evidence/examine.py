@@ -25,13 +25,25 @@ from triaxcal.evidence.chance import (
 )
 from triaxcal.evidence.check import Check, Evidence
 from triaxcal.evidence.heldout import HeldOut, held_out
+from triaxcal.model.types import FloatArray
 
 
 def examine(done: DynamicUnit, report: Progress) -> Evidence:
     """Test a calibrated unit against its recording."""
     assert done.recording is not None
-    case = Case(done.recording, done.result.noise, done.filtered)
+    case = Case(done.recording, done.result.noise, done.filtered, _worst_sd(done))
     return examine_case(case, done.unit.limits, done.seen, done.off, report)
+
+
+def _worst_sd(done: DynamicUnit) -> FloatArray | None:
+    """Deviations of the states; of base constants the largest over the working range."""
+    if done.over is None or done.range_degc is None:
+        return None
+    known, (low, high) = done.over.known, done.range_degc
+    inside = (known.temps_degc >= low) & (known.temps_degc <= high)
+    worst = done.filtered.sd.copy()
+    worst[: len(known.names)] = known.sd[inside | ~inside.any()].max(axis=0)
+    return worst
 
 
 def examine_case(
@@ -46,7 +58,7 @@ def examine_case(
         *rests_alone(result),
         *earth(result),
         *effects_off(off),
-        *sd_checks(limits, result),
+        *sd_checks(limits, result, case.worst_sd),
         *_unseen_of_the_base(result, seen),
     ]
     found = Evidence(
@@ -60,15 +72,19 @@ def examine_case(
     return causes_of(found, case, off, held, report)
 
 
-def sd_checks(limits: ImuLimits, result: DynamicResult) -> Iterator[Check]:
-    """Standard deviations of the constants against what is demanded."""
+def sd_checks(
+    limits: ImuLimits, result: DynamicResult, worst_sd: FloatArray | None = None
+) -> Iterator[Check]:
+    """Standard deviations of the constants against what is demanded, over the working range."""
     states = result.layout.states
+    deviations = result.sd if worst_sd is None else worst_sd
+    where = "" if worst_sd is None else " at its worst temperature"
     for demand, limit, index in demanded(limits, result.layout):
-        sd = {i: float(result.sd[i]) / states[i].per_unit for i in index}
+        sd = {i: float(deviations[i]) / states[i].per_unit for i in index}
         worst = max(sd, key=lambda i: sd[i])
         yield Check(
             f"[limits] {demand.key}", sd[worst] <= limit,
-            f"{states[worst].name} has {sd[worst]:.3g} {demand.unit} (limit {limit:g})",
+            f"{states[worst].name} has {sd[worst]:.3g} {demand.unit}{where} (limit {limit:g})",
             sd[worst], limit, demand.unit, len(index),
         )  # fmt: skip
 
