@@ -15,7 +15,7 @@ from triaxcal.dynamic.quantities import FORCES, offsets_of, offsets_told
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording, ImuSamples
 from triaxcal.dynamic.repair import UNEVEN, repaired
 from triaxcal.model.types import FloatArray
-from triaxcal.readings.evenclock import step_of
+from triaxcal.readings.beats import step_of
 from triaxcal.readings.format import PIECE
 from triaxcal.readings.held import stuck
 from triaxcal.readings.opened import RecordingFile

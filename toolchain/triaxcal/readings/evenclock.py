@@ -6,30 +6,22 @@ had other things to do. So the stamps t of the rows are numbered by the beats of
     t = offset + step * number + drift + jitter
 
 is fitted robustly: `offset`, `step` and a slow drift of the rate. Rows that are absent leave beats
-without a row. A beat is missing where the stamps stay late by a whole step, and not where one of
-them is late.
+without a row.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
+from triaxcal.readings.beats import CLEAN, PAUSE_S, REACH, SPAN, numbered
 
 EXACT = 1e-3
 """Of a step: stamps that are nearer to the even clock than this stay as they are."""
-PAUSE_S = 0.25
-"""After a longer pause a clock need not go on with the same beats."""
-_CLEAN = 0.25
-"""Of a step: where all steps are so near to whole ones, rounding numbers them."""
-_REACH = 8
-"""Rows on each side whose median says how late the stamps are there."""
-_SPAN = 100
-"""Rows over which a step is measured: few enough that most spans have lost none."""
+_ROUNDS = 5
 _BIN = 200
 _ORDER_MAX = 5
 _FASTEST = 0.9
@@ -43,10 +35,17 @@ _FAR = 4.0
 _RESTART = 0.05
 """Of a step: a clock that is off by less may as well drift."""
 _SURELY = 10.0
-"""Deviations of a median of `_REACH` stamps that are no chance in millions of rows."""
+"""Deviations of a median of `REACH` stamps that are no chance in millions of rows."""
 _RESTARTS_MAX = 0.05
-_WANDERS = 2.0
-"""Mean square of stamps about a slow curve, over that of jitter as large from row to row."""
+_SAME = 0.01
+"""Of a step: rounded steps are nearer than this to each other, or a tick apart."""
+_FEW = 6
+_ROUNDED = 0.75
+"""Of a tick: what rounding and a slow curve leave."""
+_LAGS = (16, 64)
+"""Rows over which differences are taken, to tell what adds up."""
+_STEADY = 2e-3
+"""Of the jitter's variance: steps that add up to less over 500 rows are seen by the slow curve."""
 _LOOSE = 4.0
 """Mean square of the bins' means about a curve over that of their noise, where it is enough:
 what is less than two deviations of a bin is not worth more bends."""
@@ -80,19 +79,15 @@ class EvenClock:
         return int(self.number[-1]) + 1 - len(self.number)
 
 
-def step_of(stamps_s: FloatArray) -> float:
-    """Step of most rows in the order of the file, s."""
-    span = max(1, min(_SPAN, len(stamps_s) // 4))
-    about = float(np.median(stamps_s[span:] - stamps_s[:-span])) / span
-    steps = np.diff(stamps_s)
-    near = np.abs(steps - about) < 0.5 * about
-    # Spans hold lost rows, steps do not; of a clock coarser than the rows no step says anything.
-    return float(steps[near].mean()) if near.sum() > 0.5 * len(steps) else about
-
-
 def even_clock(stamps_s: FloatArray, step_s: float) -> EvenClock:
     """Number rising stamps, shape (n,) with n > 1, of a clock of about `step_s`."""
     number = numbered(stamps_s, step_s)
+    for _ in range(_ROUNDS):  # lost rows that are not yet found make the step too long
+        last = number
+        step_s = float(stamps_s[-1] - stamps_s[0]) / float(number[-1])
+        number = numbered(stamps_s, step_s)
+        if number[-1] == last[-1]:
+            break
     time_s, residual_s = smoothed(stamps_s, number, step_s)
     rms_s = float(np.sqrt(np.mean(residual_s**2)))
     step_s = float(np.median(np.diff(time_s) / np.diff(number)))
@@ -110,7 +105,7 @@ def taken_at_stamps(stamps_s: FloatArray, clock: EvenClock, values: FloatArray) 
     if not clock.smoothed:
         return False
     index = np.flatnonzero(clock.number[4:] - clock.number[:-4] == 4) + 2
-    close = np.diff(stamps_s) < _CLEAN * clock.step_s
+    close = np.diff(stamps_s) < CLEAN * clock.step_s
     index = index[~(close[index - 2] | close[index - 1] | close[index] | close[index + 1])]
     if len(index) == 0:
         return False
@@ -130,41 +125,6 @@ def taken_at_stamps(stamps_s: FloatArray, clock: EvenClock, values: FloatArray) 
     return missed[0] < _BETTER * missed[1]
 
 
-def numbered(stamps_s: FloatArray, step_s: float) -> IntArray:
-    """Beats since the first row, shape (n,)."""
-    steps = np.diff(stamps_s) / step_s
-    whole = np.maximum(np.rint(steps), 1.0)
-    pause = steps * step_s > PAUSE_S
-    if np.all(np.abs(steps - whole)[~pause] < _CLEAN):
-        return np.concatenate([[0], np.cumsum(whole)]).astype(np.int64)
-    beats = np.where(pause, whole, 1.0)
-    edges = [0, *(np.flatnonzero(pause) + 1).tolist(), len(stamps_s)]
-    for first, last in pairwise(edges):
-        beats[first : last - 1] += _lost_after(stamps_s[first:last], step_s)
-    return np.concatenate([[0], np.cumsum(beats)]).astype(np.int64)
-
-
-def _lost_after(stamps_s: FloatArray, step_s: float) -> FloatArray:
-    """Beats without a row after each row but the last, where the stamps are jittered."""
-    count = len(stamps_s)
-    lost = np.zeros(max(count - 1, 0))
-    if count < 2 * _REACH:
-        return lost
-    late = stamps_s / step_s - np.arange(count)
-    middle = median_filter(late, 2 * _REACH + 1, mode="nearest")
-    before = np.concatenate([np.full(_REACH, middle[0]), middle[:-_REACH]])[: count - 1]
-    after = np.concatenate([middle[_REACH:], np.full(_REACH, middle[-1])])[1:]
-    stays = np.flatnonzero(after - before > 0.5)
-    steps = np.diff(stamps_s) / step_s - 1.0
-    for run in np.split(stays, np.flatnonzero(np.diff(stays) > 1) + 1) if len(stays) else ():
-        beats = int(np.rint(after[run[-1]] - before[run[0]]))
-        for _ in range(beats):
-            # One after the other at the longest step that is left: several may be lost close by.
-            worst = run[int(np.argmax(steps[run] - lost[run]))]
-            lost[worst] += 1.0
-    return lost
-
-
 def smoothed(
     stamps_s: FloatArray, number: IntArray, step_s: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -175,45 +135,61 @@ def smoothed(
     for part in np.split(np.arange(len(stamps_s)), starts):
         beat = (number[part] - number[part[0]]).astype(np.float64)
         since = stamps_s[part] - stamps_s[part[0]]
-        own_s = float(since[-1] / beat[-1]) if beat[-1] >= _SPAN else step_s
+        own_s = float(since[-1] / beat[-1]) if beat[-1] >= SPAN else step_s
         late = since - own_s * beat
         drift = _curve(beat, late)
-        drift = drift + _wandering(late - drift)
+        if np.abs(late - drift).max() > _ROUNDED * _tick_s(stamps_s[part]):
+            drift = drift + _wandering(late - drift)
         time_s[part] = stamps_s[part[0]] + own_s * beat + drift
         residual[part] = late - drift
     return time_s, residual
 
 
+def _tick_s(stamps_s: FloatArray) -> float:
+    """Smallest difference of two steps: what rounded stamps are rounded to."""
+    steps = np.sort(np.diff(stamps_s))
+    if len(steps) < _FEW:
+        return 0.0
+    ends = np.flatnonzero(np.diff(steps) > _SAME * steps[len(steps) // 2])
+    if not 0 < len(ends) < _FEW:
+        return 0.0
+    middles = [float(np.median(part)) for part in np.split(steps, ends + 1)]
+    return float(np.diff(middles).min())
+
+
 def _wandering(left: FloatArray) -> FloatArray:
     """What of the rest (n,) about a slow curve is no jitter: the samples themselves are uneven.
 
-    Of white jitter of variance r and steps of variance q that add up, the differences have the
-    variance q + 2 r and the covariance -r with the next one.
+    Of white jitter of variance r and steps of variance q that add up, differences over m rows have
+    the variance m q + 2 r. Jitter of rows that were sorted, or rounding, is not white, but does not
+    add up either.
     """
-    if len(left) < _SPAN:
+    if len(left) < 4 * _LAGS[-1]:
         return np.zeros(len(left))
-    step = np.diff(left)
-    step = np.where(_near(step), step, 0.0)
-    variance, next_to = float(np.mean(step**2)), float(np.mean(step[1:] * step[:-1]))
-    own = left[_near(left)]
-    if float(np.mean((own - own.mean()) ** 2)) <= _WANDERS * variance / 2:
+    one, some, many = (_mean_square(left[lag:] - left[:-lag]) for lag in (1, *_LAGS))
+    wander = max(many - some, 0.0) / (_LAGS[1] - _LAGS[0])
+    jitter = max(one - wander, 0.0) / 2
+    if wander <= _STEADY * jitter:
         return np.zeros(len(left))
-    jitter, wander = max(-next_to, 0.0), max(variance + 2 * next_to, 1e-30)
     if wander >= jitter / 4:
         return left
     return np.asarray(uniform_filter1d(left, 2 * round(np.sqrt(jitter / wander)) + 1))
 
 
+def _mean_square(values: FloatArray) -> float:
+    return float(np.mean(values[_near(values)] ** 2))
+
+
 def _restarts(stamps_s: FloatArray, number: IntArray, step_s: float) -> IntArray:
     """Rows (m,) from which on the stamps stay off by a part of a step: the clock started anew."""
     late = stamps_s / step_s - number
-    if len(late) < 4 * _REACH:
+    if len(late) < 4 * REACH:
         return np.zeros(0, dtype=np.int64)
-    middle = median_filter(late, 2 * _REACH + 1, mode="nearest")
+    middle = median_filter(late, 2 * REACH + 1, mode="nearest")
     stays = np.zeros(len(late))
-    stays[_REACH + 1 : -_REACH] = middle[2 * _REACH + 1 :] - middle[: -2 * _REACH - 1]
+    stays[REACH + 1 : -REACH] = middle[2 * REACH + 1 :] - middle[: -2 * REACH - 1]
     low, high = np.quantile(late - middle, [0.16, 0.84])
-    limit = max(_RESTART, _SURELY * (high - low) / 2 / np.sqrt(_REACH))
+    limit = max(_RESTART, _SURELY * (high - low) / 2 / np.sqrt(REACH))
     rows = np.flatnonzero(np.abs(stays) > limit)
     if len(rows) > _RESTARTS_MAX * len(late):
         return np.zeros(0, dtype=np.int64)  # it drifts all the time

@@ -12,9 +12,9 @@ from scipy.ndimage import median_filter
 from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.readings.evenclock import EvenClock, smoothed
 
-CLOSE = 0.25
+CLOSE = 0.1
 """Of the mean step: rows that follow so fast were not sampled so."""
-SHARE = 0.25
+SHARE = 0.4
 """Of the rows: fewer are late stamps, and no packets."""
 PACKETS_MIN = 16
 _REACH = 4

@@ -18,12 +18,15 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
-from triaxcal.readings.evenclock import EvenClock, even_clock, step_of
+from triaxcal.readings.beats import step_of
+from triaxcal.readings.evenclock import EvenClock, even_clock
 from triaxcal.readings.order import LEFT_OUT_MAX, rising
 from triaxcal.readings.packets import packet_clock
 
 _HOLE = 0.7
 """Of a step: so far from both neighbours a stamp has a beat of its own."""
+_NEAR_WHOLE = 0.25
+"""Of a step: stamps that are nearer to whole steps are not jittered."""
 _LATEST = 8
 """Exchanged rows that one more is compared with."""
 PLACED_MAX = 0.25
@@ -90,33 +93,36 @@ def sequence(stamps_s: FloatArray, same: BoolArray, numbers: FloatArray, place: 
     step_s = max(step_of(stamps_s[single]), 1e-12)
     kept = rising(stamps_s[single], -np.inf)
     odd, rows = single[~kept], single[kept]
-    moved = _exchanged(stamps_s, rows, odd, step_s)
-    if len(moved) > PLACED_MAX * len(stamps_s):
-        raise _runs_back(f"{place} {int(numbers[moved[0]])}", stamps_s, moved)
-    if len(moved):
-        rows = np.concatenate([rows, moved])
-        rows = rows[np.argsort(stamps_s[rows], kind="stable")]
-        odd = odd[~np.isin(odd, moved)]
-        found.append(f"{_rows(len(moved))} out of order in time put in order, {first(moved)}")
-    clock = even_clock(stamps_s[rows], step_s)
-    placed, beats = _in_their_place(rows, clock.number, odd, same)
-    odd = odd[~np.isin(odd, placed)]
+    if _is_clean(stamps_s[rows], step_s):
+        # Of jittered stamps it is not known whose place a hole is.
+        moved = _exchanged(stamps_s, rows, odd, step_s)
+        if len(moved) > PLACED_MAX * len(stamps_s):
+            raise _runs_back(f"{place} {int(numbers[moved[0]])}", stamps_s, moved)
+        if len(moved):
+            rows = np.concatenate([rows, moved])
+            rows = rows[np.argsort(stamps_s[rows], kind="stable")]
+            odd = odd[~np.isin(odd, moved)]
+            found.append(f"{_rows(len(moved))} out of order in time put in order, {first(moved)}")
+        placed = _with_room(stamps_s, rows, odd, same, step_s)
+    else:
+        placed = odd[(odd > rows[0]) & (odd < rows[-1])]
+    out = odd[~np.isin(odd, placed)]
     if len(placed) > PLACED_MAX * len(stamps_s):
         raise _no_clock(place, len(placed), len(stamps_s))
+    if len(out) > LEFT_OUT_MAX * len(stamps_s):
+        raise _runs_back(f"{place} {int(numbers[out[0]])}", stamps_s, out)
     if len(placed):
-        rows, clock = _with(rows, clock, placed, beats)
         found.append(
             f"{_rows(len(placed))} with a stamp that does not fit kept in the place that the rows "
             f"before and after leave, {first(placed)}"
         )
-    if len(odd) > LEFT_OUT_MAX * len(stamps_s):
-        raise _runs_back(f"{place} {int(numbers[odd[0]])}", stamps_s, odd)
-    if len(odd):
+    if len(out):
         found.append(
-            f"{_rows(len(odd))} with a time that another row has or that runs back left out, "
-            f"{first(odd)}"
+            f"{_rows(len(out))} with a time that another row has or that runs back left out, "
+            f"{first(out)}"
         )
-    return Sequence(rows, clock, tuple(found), len(odd))
+    rows, times = _placed(stamps_s, rows, placed)
+    return Sequence(rows, even_clock(times, step_s), tuple(found), len(out))
 
 
 def _rows(count: int) -> str:
@@ -137,41 +143,43 @@ def _exchanged(stamps_s: FloatArray, rows: IntArray, odd: IntArray, step_s: floa
     return np.array(found, dtype=np.int64)
 
 
-def _in_their_place(
-    rows: IntArray, number: IntArray, odd: IntArray, same: BoolArray
-) -> tuple[IntArray, IntArray]:
-    """Odd rows for which the rows before and after in the file leave a beat, and their beats."""
-    by_file = np.argsort(rows)
-    rows, number = rows[by_file], number[by_file]
-    places = np.searchsorted(rows, odd)
-    taken: dict[int, int] = {}
-    found, beats = [], []
-    for k, after in zip(odd.tolist(), places.tolist(), strict=True):
-        if not 0 < after < len(rows) or same[k]:
+def _is_clean(stamps_s: FloatArray, step_s: float) -> bool:
+    """Whether rising stamps are whole steps apart, but for few."""
+    steps = np.diff(stamps_s) / step_s
+    return bool(np.mean(np.abs(steps - np.rint(steps)) < _NEAR_WHOLE) > 1 - LEFT_OUT_MAX)
+
+
+def _with_room(
+    stamps_s: FloatArray, rows: IntArray, odd: IntArray, same: BoolArray, step_s: float
+) -> IntArray:
+    """Odd rows for which the rows before and after in the file leave a beat."""
+    by_file = np.sort(rows)
+    left: dict[int, int] = {}
+    found = []
+    for k, after in zip(odd.tolist(), np.searchsorted(by_file, odd).tolist(), strict=True):
+        if not 0 < after < len(by_file) or same[k]:
             continue
-        beat = taken.get(after, int(number[after - 1])) + 1
-        if beat < number[after]:
-            taken[after] = beat
+        way = stamps_s[by_file[after]] - stamps_s[by_file[after - 1]]
+        room = left.setdefault(after, round(way / step_s) - 1)
+        if room > 0:
+            left[after] = room - 1
             found.append(k)
-            beats.append(beat)
-    return np.array(found, dtype=np.int64), np.array(beats, dtype=np.int64)
+    return np.array(found, dtype=np.int64)
 
 
-def _with(
-    rows: IntArray, clock: EvenClock, placed: IntArray, beats: IntArray
-) -> tuple[IntArray, EvenClock]:
-    """Rows and clock with those that have no usable stamp, at the times of their beats."""
-    time_s = np.interp(beats, clock.number, clock.time_s)
-    number = np.concatenate([clock.number, beats])
-    order = np.argsort(number, kind="stable")
-    made = EvenClock(
-        number[order],
-        np.concatenate([clock.time_s, time_s])[order],
-        clock.step_s,
-        clock.rms_s,
-        clock.smoothed,
-    )
-    return np.concatenate([rows, placed])[order], made
+def _placed(stamps_s: FloatArray, rows: IntArray, placed: IntArray) -> tuple[IntArray, FloatArray]:
+    """Rows with those that have no usable stamp, and times; theirs lie between their neighbours."""
+    if not len(placed):
+        return rows, stamps_s[rows]
+    # After the row that stands before them in the file, wherever that one was put.
+    place = np.argsort(rows, kind="stable")
+    before = place[np.searchsorted(rows[place], placed) - 1]
+    every = np.concatenate([rows, placed])
+    order = np.lexsort((every, np.concatenate([np.arange(len(rows)), before])))
+    good = np.concatenate([np.ones(len(rows), dtype=bool), np.zeros(len(placed), dtype=bool)])
+    good, every = good[order], every[order]
+    index = np.arange(len(every))
+    return every, np.interp(index, index[good], stamps_s[every[good]])
 
 
 def _no_clock(place: str, count: int, of: int) -> RefusedError:
