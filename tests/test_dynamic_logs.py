@@ -80,4 +80,5 @@ def test_one_sample_lost_in_a_turn_is_as_if_nothing_was_lost() -> None:
     true = json.loads((folder / "truth.json").read_text(encoding="utf-8"))["truth"]
     assert LIMITS[0] < nees(result, true) < LIMITS[1]
     for state, value, sd in zip(result.layout.states, result.p, result.sd, strict=True):
-        assert state.name not in true or abs(value - true[state.name]) < 3 * sd, state.name
+        # One of 21 errors is beyond 3.5 deviations once in a hundred recordings.
+        assert state.name not in true or abs(value - true[state.name]) < 3.5 * sd, state.name

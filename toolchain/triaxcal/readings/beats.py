@@ -19,6 +19,8 @@ CLEAN = 0.25
 REACH = 8
 """Rows on each side whose median says how late the stamps are there."""
 _REACH_MAX = 200
+_SURELY = 5.0
+"""Deviations of a median at the ends of a log that are a lost row."""
 SPAN = 100
 """Rows over which a step is measured: few enough that most spans have lost none."""
 
@@ -54,14 +56,19 @@ def _lost_after(stamps_s: FloatArray, step_s: float) -> FloatArray:
     if count < 4 * REACH:
         return lost
     late = stamps_s / step_s - np.arange(count)
-    low, high = np.quantile(late - median_filter(late, 2 * SPAN + 1, mode="nearest"), [0.16, 0.84])
+    low, high = np.quantile(late - median_filter(late, 2 * SPAN + 1, mode="mirror"), [0.16, 0.84])
+    sd = (high - low) / 2
     # Medians on both sides are to be known to a tenth of a step; 1.25 sd / sqrt(n) each.
-    needed = 2 * (1.25 * (high - low) / 2 / 0.1) ** 2
+    needed = 2 * (1.25 * sd / 0.1) ** 2
     reach = int(np.clip(needed, REACH, min(_REACH_MAX, count // 4)))
-    middle = median_filter(late, 2 * reach + 1, mode="nearest")
-    before = np.concatenate([np.full(reach, middle[0]), middle[:-reach]])[: count - 1]
-    after = np.concatenate([middle[reach:], np.full(reach, middle[-1])])[1:]
-    stays = np.flatnonzero(after - before > 0.5)
+    middle = median_filter(late, 2 * reach + 1, mode="mirror")
+    before, after = np.empty((2, count - 1))
+    before[reach:], after[: count - 1 - reach] = middle[: -reach - 1], middle[reach + 1 :]
+    limit = np.full(count - 1, 0.5)
+    for k in range(reach):  # at the ends there are fewer rows, and they have to say more
+        before[k], after[count - 2 - k] = np.median(late[: k + 1]), np.median(late[count - 1 - k :])
+        limit[[k, count - 2 - k]] = max(0.5, _SURELY * 1.25 * sd / np.sqrt(k + 1))
+    stays = np.flatnonzero(after - before > limit)
     steps = np.diff(stamps_s) / step_s - 1.0
     for run in np.split(stays, np.flatnonzero(np.diff(stays) > 1) + 1) if len(stays) else ():
         beats = int(np.rint(after[run[-1]] - before[run[0]]))

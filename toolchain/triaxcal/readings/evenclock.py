@@ -185,7 +185,7 @@ def _restarts(stamps_s: FloatArray, number: IntArray, step_s: float) -> IntArray
     late = stamps_s / step_s - number
     if len(late) < 4 * REACH:
         return np.zeros(0, dtype=np.int64)
-    middle = median_filter(late, 2 * REACH + 1, mode="nearest")
+    middle = median_filter(late, 2 * REACH + 1, mode="mirror")
     stays = np.zeros(len(late))
     stays[REACH + 1 : -REACH] = middle[2 * REACH + 1 :] - middle[: -2 * REACH - 1]
     low, high = np.quantile(late - middle, [0.16, 0.84])

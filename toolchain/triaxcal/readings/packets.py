@@ -40,7 +40,7 @@ def packet_clock(stamps_s: FloatArray, same: BoolArray) -> EvenClock | None:
     span = len(newest) // 4
     step_s = float(np.median((at[span:] - at[:-span]) / (newest[span:] - newest[:-span])))
     late = at / step_s - newest
-    middle = median_filter(late, 2 * _REACH + 1, mode="nearest")
+    middle = median_filter(late, 2 * _REACH + 1, mode="mirror")
     low, high = np.quantile(late - middle, [0.16, 0.84])
     limit = max(0.5, _SURELY * (high - low) / 2 / np.sqrt(_REACH))
     lost = np.zeros(count, dtype=np.int64)
