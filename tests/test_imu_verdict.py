@@ -186,7 +186,11 @@ CONTRADICTIONS: dict[
         {"innovations", "effects that are off"},
         ("delay of the accelerometers behind the gyros, which is switched off",),
     ),
-    "scale nonlinearity of 1e-3": (_nonlinear, {"innovations", "held-out turns"}, ()),
+    "scale nonlinearity of 1e-3": (
+        _nonlinear,
+        {"innovations", "held-out turns"},
+        ("nonlinearity of the gyros, which is switched off",),
+    ),
     "noise stated too small": (
         _noisier,
         {"innovations", "held-out turns"},
