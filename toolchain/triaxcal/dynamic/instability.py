@@ -93,8 +93,10 @@ def _expected(deviance: Callable[[float], float]) -> float:
     x = np.array(sorted(found))
     prior = np.exp(-_surprise(x) / 2)
     likely = prior * np.exp(-(np.array([found[o] for o in x]) - min(found.values())) / 2)
-    odds = _integral(likely, x) / _integral(prior, x) * math.exp((none - min(found.values())) / 2)
-    if odds < 1 / AGAINST:
+    # In logarithms: a recording that the model does not describe has odds beyond any float.
+    log_odds = math.log(_integral(likely, x) / _integral(prior, x))
+    log_odds += (none - min(found.values())) / 2
+    if log_odds < -math.log(AGAINST):
         return 0.0
     return math.sqrt(_integral(likely * 4.0**x, x) / _integral(likely, x))
 
