@@ -7,6 +7,7 @@ from pathlib import Path
 
 from triaxcal.api.study import Study
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.tomltable import has_table
 from triaxcal.noise.stretch import even_stretch
 from triaxcal.noise.study import NoiseStudy
 from triaxcal.noise.study import study_noise as study
@@ -20,7 +21,7 @@ from triaxcal.unit.thermometer import TemperatureSensor
 
 def study_noise(
     recorded: str | Path, layout: str | Path, *, longest_tau_s: float | None = None
-) -> Study[NoiseStudy]:
+) -> Study[NoiseStudy] | Study[tuple[NoiseStudy, NoiseStudy]]:
     """Allan deviation of a recording at rest, and the five coefficients of IEEE Std 952.
 
     Parameters
@@ -28,7 +29,8 @@ def study_noise(
     recorded : path
         The recording.
     layout : path
-        TOML file whose table [recording] says what its columns are, as a unit.toml.
+        TOML file whose table [recording] says what its columns are, as a unit.toml; or the
+        unit.toml of an IMU, whose [dynamic] does.
     longest_tau_s : float or None
         The longest averaging time that is wanted; None is what the recording allows.
 
@@ -36,7 +38,9 @@ def study_noise(
     -------
     Study
         Its `result` has the coefficients with their intervals, in the unit of the recording, or in
-        g where that is one of acceleration; its picture is the Allan deviation.
+        g where that is one of acceleration; its picture is the Allan deviation. Of an IMU there are
+        two results, gyros in deg/h and accelerometers in micro-g, and the text has a [noise] for
+        its unit.toml.
 
     Raises
     ------
@@ -44,6 +48,10 @@ def study_noise(
         When the recording cannot be read, its clock is uneven, or it is too short.
     """
     path = Path(recorded)
+    if has_table(Path(layout), "dynamic"):
+        from triaxcal.api.imunoise import study_imu_noise  # noqa: PLC0415
+
+        return study_imu_noise(path, Path(layout), longest_tau_s)
     found = replace(read_layout(Path(layout)), file=(path.name,), temperature=None)
     samples = read_samples(path.parent, found, TemperatureSensor(1.0, 0.0))
     part = even_stretch(samples)

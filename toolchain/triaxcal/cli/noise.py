@@ -20,7 +20,7 @@ from triaxcal.cli.options import PICTURE, command, example, show
     "--layout",
     required=True,
     type=click.Path(path_type=Path),
-    help="TOML file with the [recording] of FILE, as a unit.toml.",
+    help="TOML file with the [recording] of FILE, or the unit.toml of an IMU.",
 )
 @click.option("--tau", type=float, help="Longest averaging time that is wanted, s.")
 @PICTURE
@@ -28,7 +28,8 @@ def noise(file: Path, layout: Path, tau: float | None, picture: Path | None) -> 
     """Noise of a recording at rest.
 
     The five coefficients of IEEE Std 952 with 95 % intervals, and the lowest Allan deviation, of
-    each output. The picture is the Allan deviation.
+    each output. The picture is the Allan deviation. With the unit.toml of an IMU, of both triads,
+    and its [noise] to paste.
     """
     import triaxcal  # noqa: PLC0415
 
