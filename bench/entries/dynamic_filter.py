@@ -127,7 +127,7 @@ def measure(size: str) -> list[Figure]:
 
 def _calibration(size: str) -> Figure:
     """Processor time from samples in memory to constants: survey and all passes."""
-    minutes = pick(size, 0.5, 2.0, 40.0)
+    minutes = pick(size, 2.0, 2.0, 40.0)
     motion = three_axes(minutes, still_s=15.0)
     recording = simulate_imu(draw_truth(GRADES["aviation"], 1), motion, 200.0, 1)
     samples = recording.all()
