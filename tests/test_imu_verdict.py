@@ -127,7 +127,7 @@ def test_false_alarms(grade: str) -> None:
     assert refused <= binom.isf(1e-3, 40, ALARM)
 
 
-def _sound(motion: ImuMotion | None = None, **other: float) -> tuple[ImuRecording, DataSheet]:
+def _sound(motion: ImuMotion | None = None, **other: object) -> tuple[ImuRecording, DataSheet]:
     truth = draw_truth(GRADES["mems"], 3)
     motion = motion or three_axes(2.0, still_s=20.0)
     recording = held(simulate_imu(replace(truth, **other), motion, 50.0, 3))
@@ -142,6 +142,11 @@ def _fast() -> tuple[ImuRecording, DataSheet]:
 
 def _delayed() -> tuple[ImuRecording, DataSheet]:
     return _sound(accel_delay_ms=5.0)
+
+
+def _two_effects() -> tuple[ImuRecording, DataSheet]:
+    drift = ((30.0, 60.0, -50.0), (70.0, -40.0, 55.0), (-60.0, 45.0, 35.0))
+    return _sound(accel_delay_ms=5.0, gyro_g_deg_per_h_per_g=drift)
 
 
 def _nonlinear() -> tuple[ImuRecording, DataSheet]:
@@ -185,6 +190,11 @@ CONTRADICTIONS: dict[
         _delayed,
         {"innovations", "effects that are off"},
         ("delay of the accelerometers behind the gyros, which is switched off",),
+    ),
+    "two effects without their blocks": (
+        _two_effects,
+        {"innovations", "effects that are off"},
+        ("delay of the accelerometers behind the gyros and g-dependent gyro drift together",),
     ),
     "scale nonlinearity of 1e-3": (
         _nonlinear,

@@ -21,7 +21,7 @@ from triaxcal.evidence.case import Case
 from triaxcal.evidence.chance import chi_square, largest, lengths, stacked
 from triaxcal.evidence.check import Cause, Evidence
 from triaxcal.evidence.heldout import HeldOut, held_out_every
-from triaxcal.evidence.suspect import Suspect
+from triaxcal.evidence.suspect import Suspect, innovations_again
 from triaxcal.evidence.trials import TRIALS
 from triaxcal.model.types import FloatArray
 
@@ -53,11 +53,27 @@ def causes_of(
             names.append(trial.name)
             tried.append(_of_suspect(suspect))
     explains = [t for t in tried if t.cause.left <= EXPLAINED]
+    together = [e for e in off if e.shown]
+    if not explains and len(together) > 1:
+        names.append(" with ".join(f'"{e.name}"' for e in together))
+        explains = [t for t in [_together(case, together, held)] if t.cause.left <= EXPLAINED]
     direct = [t for t in explains if t.direct]
     likely = sorted((t for t in explains if not t.direct), key=lambda t: t.total)
     likely = [t for t in likely if t.total - likely[0].total < EQUAL]
     named = tuple(t.cause for t in (*direct, *likely))
     return replace(found, causes=named, tried=tuple(names))
+
+
+def _together(case: Case, shown: Sequence[Effect], held: HeldOut | None) -> _Tried:
+    """All effects that are off and shown, where none of them explains it alone."""
+    blocks = (block for effect in shown for block in EXTENSIONS[effect.name].blocks)
+    layout = Layout((*case.result.layout.blocks, *blocks))
+    out = None if held is None else held_out_every(case, held.every, layout=layout)
+    titles = " and ".join(effect.title for effect in shown)
+    names = ", ".join(f'"{effect.name}"' for effect in shown)
+    words = f"{titles} together, which are switched off"
+    remedy = f"switch on {names} in [dynamic] blocks"
+    return _of_suspect(Suspect(words, remedy, innovations_again(case, layout=layout), out))
 
 
 _CHI_SQUARES = ("innovations", "held-out rests", "held-out turns")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from triaxcal.dynamic.filterpass import run_pass
+from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.passdata import Task
 from triaxcal.dynamic.survey import Survey
 from triaxcal.dynamic.wander import wander_of
@@ -57,13 +58,18 @@ def innovations_again(
     found: Survey | None = None,
     cuts_s: tuple[float, ...] = (),
     renewed: IntArray | None = None,
+    layout: Layout | None = None,
 ) -> tuple[float, int]:
-    """Chi-square and degrees of freedom of one more pass about the result."""
+    """Chi-square and degrees of freedom of one more pass about the result.
+
+    `layout` may have further blocks after those of the result.
+    """
     result = case.result
-    wander = wander_of(result.layout, case.noise, result.survey.duration_s)
+    layout = layout or result.layout
+    wander = wander_of(layout, case.noise, result.survey.duration_s)
     frame = replace(result.frame, layout=wander.layout)
     task = Task(case.recording, found or result.survey, frame, case.noise, wander, cuts_s)
     if renewed is not None:
         task = replace(task, renewed=renewed)
-    done = run_pass(task, extended(result, result.layout), first=False)
+    done = run_pass(task, extended(result, layout), first=False)
     return done.chi_square, done.freedom
