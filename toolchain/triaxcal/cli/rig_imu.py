@@ -27,7 +27,7 @@ _REFRESH_S = 0.25
 
 @click.command(
     epilog=example(
-        "triaxcal rig imu IMU-7 --bus can0 --rig my-rig/rig.toml --latitude 50 --gravity 9.81",
+        "triaxcal rig imu IMU-7 --bus can0 --rig can-imu --latitude 50 --gravity 9.81",
         "triaxcal rig imu IMU-7 --bus can0",
         "triaxcal rig imu IMU-7 --bus replay:drive.blf --plain",
     )
