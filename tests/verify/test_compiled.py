@@ -14,6 +14,7 @@ import pytest
 from conftest import needs
 from triaxcal.codegen.forms import row_words
 from triaxcal.codegen.names import names_of
+from triaxcal.codegen.render import arithmetic_of
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.verify.campaign import CHECKS
@@ -110,7 +111,8 @@ def core_of(name: str):
 
 def proven(work: Workspace, name: str, listing: Listing):
     core = core_of(name)
-    words = row_words(work.plan.shape, best_form(core))
+    form = arithmetic_of(replace(work.plan, arithmetic=best_form(core)))
+    words = row_words(work.plan.shape, form)
     return prove_routine(
         work.plan.shape, words, compiled.instructions(core), listing, functions(work)
     )
@@ -191,6 +193,43 @@ def test_codes_out_of_range_are_proven_on_every_way(name: str, tmp_path: Path) -
     core = core_of(name)
     _, applied = proven(work, name, Listing(compiled.disassembled(work, core)))
     assert applied.ways == 2 * 3**3
+
+
+@COMPILERS
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["Cortex-M3", "RV32IM"])
+def test_a_gyro_is_proven_for_any_force(subjects, name: str, tmp_path: Path) -> None:
+    """Each code below, inside and above its range; rate apart, in place of raw_code, of force."""
+    made = subjects["gyro"]
+    work = Workspace.create(tmp_path / "work", made.files, made.plan, made.bound)
+    _, applied = proven(work, name, Listing(compiled.disassembled(work, core_of(name))))
+    assert applied.ways == 3 * 3**3
+
+
+@COMPILERS
+def test_a_wrong_sensitivity_is_not_proven(subjects, tmp_path: Path) -> None:
+    """A word of k of another row: the words of the state are in order, the results are not."""
+    made = subjects["gyro"]
+    work = Workspace.create(tmp_path / "work", made.files, made.plan, made.bound)
+    listing = Listing(compiled.disassembled(work, core_of("Cortex-M3")))
+    code = listing.of(functions(work)[1])
+    last = next(i.operands[-1] for i in code if "#80]" in i.operands[-1])  # k of z by z
+    wanted = last.replace("#80]", "#48]")
+    changed = next(i for i in code if i.operands[-1] == wanted)
+    operands = (*changed.operands[:-1], last.replace("#80]", "#60]"))
+    listing.replace(replace(changed, operands=operands))
+    with pytest.raises(UnprovenError, match=r"is not the specified floor|may leave its type"):
+        proven(work, "Cortex-M3", listing)
+
+
+def test_a_core_whose_products_are_a_librarys_is_not_done(subjects, tmp_path, monkeypatch) -> None:
+    made = subjects["gyro"]
+    work = Workspace.create(tmp_path / "work", made.files, made.plan, made.bound)
+    monkeypatch.setattr(compiled, "proven", lambda _work, core: {"name": core.name})
+    monkeypatch.setattr(compiled, "missing_tools", lambda _tools: [])
+    outcome = compiled.check(work)
+    assert outcome.finding.startswith("5 of 6 cores: ")
+    assert outcome.finding.endswith("; Cortex-M0 not done: a library forms its products")
 
 
 def test_an_or_is_zero_where_all_its_parts_are() -> None:

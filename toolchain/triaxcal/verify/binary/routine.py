@@ -12,14 +12,16 @@ from dataclasses import dataclass
 import z3
 
 from triaxcal.fixedpoint.arithmetic import INT32_MAX
-from triaxcal.fixedpoint.shape import ROW_LIMIT, Shape
+from triaxcal.fixedpoint.gyro import SENSITIVITY_LIMIT
+from triaxcal.fixedpoint.shape import Shape
 from triaxcal.verify.binary.facts import Facts
 from triaxcal.verify.binary.listing import Listing
 from triaxcal.verify.binary.machine import Core, State, ways
-from triaxcal.verify.binary.terms import Atoms, Poly
+from triaxcal.verify.binary.terms import Atoms, Poly, poly
 from triaxcal.verify.binary.values import UnprovenError, Value, Words, constant
 
 STATE, CALIB, RAW, ACCEL = 0x2000_0000, 0x2000_1000, 0x2000_4000, 0x2000_5000
+FORCE = 0x2000_6000
 """Where the arguments stand."""
 TEMP_LOW, TEMP_HIGH, RAW_RANGE = 1, 2, 4
 """Status bits."""
@@ -61,6 +63,19 @@ class Routine:
         self.codes = [self.words.unknown(f"u{axis}") for axis in "xyz"]
         for row in range(3):
             self._limit_row(self.values[4 * row : 4 * row + 4])
+        self.forces = [self.words.unknown(f"f{axis}") for axis in "xyz" if shape.gyro]
+        self.sensitivity = [self._sensitivity(row) for row in range(3 if shape.gyro else 0)]
+
+    @property
+    def state_words(self) -> int:
+        """Words that `set_temperature` leaves."""
+        return 3 * self.row_words + 9 * self.shape.gyro
+
+    @property
+    def arguments(self) -> dict[str, Value]:
+        """Of `apply`, without the last."""
+        force = {"force": constant(FORCE)} if self.shape.gyro else {}
+        return {"state": constant(STATE), "raw_code": constant(RAW), **force}
 
     def _word(self, address: int, name: str) -> Value:
         value = self.words.unknown(name)
@@ -94,12 +109,25 @@ class Routine:
     def _limit_row(self, row: list[Value]) -> None:
         """The loader's limit of a row, and what it says of products with codes in range."""
         sizes = [z3.If(self._term(v) >= 0, self._term(v), -self._term(v)) for v in row]
-        self._know(z3.Sum(*sizes[:3], 2 * sizes[3]) < ROW_LIMIT)
+        self._know(z3.Sum(*sizes[:3], 2 * sizes[3]) < self.shape.row_limit)
         least, most = self.shape.raw_min, self.shape.raw_max
         for value, size, code in zip(row[:3], sizes[:3], self.codes, strict=True):
             u, c = self._term(code), self.facts.term(value.poly * code.poly)
             reach = max(abs(least), abs(most)) * size
             self._know(z3.Implies(z3.And(u >= least, u <= most), z3.And(c >= -reach, c <= reach)))
+
+    def _sensitivity(self, row: int) -> list[Value]:
+        """A row of a gyro's g-sensitivity, step G: its limit, and products with any force."""
+        at = CALIB + 8 + 4 * ((3 + 12 * (self.shape.order + 1)) * self.shape.segments + 3 * row)
+        words = [self._word(at + 4 * j, f"k{row}{j}") for j in range(3)]
+        sizes = [z3.If(self._term(k) >= 0, self._term(k), -self._term(k)) for k in words]
+        self._know(z3.Sum(*sizes) <= SENSITIVITY_LIMIT)
+        total = sum((k.poly * f.poly for k, f in zip(words, self.forces, strict=True)), poly(0))
+        self._know(z3.And(self.facts.term(total) >= -(2**60), self.facts.term(total) <= 2**60))
+        for k, size_of, force in zip(words, sizes, self.forces, strict=True):
+            c, reach = self.facts.term(k.poly * force.poly), 2**31 * size_of
+            self._know(z3.And(c >= -reach, c <= reach))
+        return words
 
     # ---- what is expected ----
 
@@ -176,7 +204,7 @@ def _start(routine: Routine, results: dict[int, str]) -> State:
 def _set_temperature(
     routine: Routine, core: Core, listing: Listing, function: str
 ) -> tuple[Proven, list[Value]]:
-    results = {STATE + 4 * i: "state" for i in range(3 * routine.row_words)}
+    results = {STATE + 4 * i: "state" for i in range(routine.state_words)}
     arguments = constant(STATE), constant(CALIB), routine.temp
     left: list[Value] | None = None
     count = 0
@@ -189,7 +217,8 @@ def _set_temperature(
         elif [w.poly for w in words] != [w.poly for w in left]:
             raise UnprovenError(f"{function}: two ways through it leave different words")
     assert left is not None
-    allowed = {m for value in routine.values for m, _ in value.poly}
+    sensitivity = [k for row in routine.sensitivity for k in row]
+    allowed = {m for value in (*routine.values, *sensitivity) for m, _ in value.poly}
     for index, word in enumerate(left):
         if not _atoms_of(routine.atoms, word.poly) <= {m[0] for m in allowed if m}:
             raise UnprovenError(f"{function}: word {index} is not a function of N and b")
@@ -219,13 +248,13 @@ def _apply(
     shape, facts = routine.shape, routine.facts
     asked = facts.questions
     count = 0
-    for accel in (ACCEL, RAW):  # the docs allow both to be one array
+    for accel in (ACCEL, RAW, *([FORCE] if shape.gyro else [])):  # the docs allow one array
         start = _start(routine, {accel + 4 * i: "accel" for i in range(3)})
         start.memory |= {STATE + 4 * i: value for i, value in enumerate(state)}
         start.memory |= {RAW + 4 * j: code for j, code in enumerate(routine.codes)}
-        for end in ways(
-            core, listing, function, start, (constant(STATE), constant(RAW), constant(accel))
-        ):
+        start.memory |= {FORCE + 4 * j: force for j, force in enumerate(routine.forces)}
+        arguments = (*routine.arguments.values(), constant(accel))
+        for end in ways(core, listing, function, start, arguments):
             count += 1
             used = tuple(_clamped(shape, end.words, code) for code in routine.codes)
             outside = z3.Or([_outside(shape, end.words, code) for code in routine.codes])
@@ -262,6 +291,8 @@ def _refuse_result(
     total = row[3].poly * (1 << 32)
     for n, u in zip(row[:3], used, strict=True):
         total = total + n.poly * u.poly * (1 << shape.raw_shift)
+    for k, force in zip(routine.sensitivity[i] if shape.gyro else (), routine.forces, strict=True):
+        total = total + k.poly * force.poly
     wanted = routine.atoms.floor(total, shape.output_shift)
     if end.words.signed(found).poly != wanted and not end.words.follows(
         routine.facts.term(found.poly) == routine.facts.term(wanted)

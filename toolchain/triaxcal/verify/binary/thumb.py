@@ -17,6 +17,8 @@ _OPPOSITE = {
     "eq": "ne", "ne": "eq", "cs": "cc", "cc": "cs", "mi": "pl", "pl": "mi", "hi": "ls", "ls": "hi",
     "ge": "lt", "lt": "ge", "gt": "le", "le": "gt",
 }  # fmt: skip
+_FLAGS = {"sub": "difference", "add": "sum"}
+"""What the flags stand for after these; after others, the result alone is known."""
 _SHIFT = re.compile(r"^(asr|lsl|lsr) (#\d+)$")
 _IT = re.compile(r"^it[te]{0,3}$")
 
@@ -65,8 +67,8 @@ class Thumb:
         put(state, operands[0], result)
         if setting and not conditional:
             state.compared = "result", result, constant(0)
-            if name == "sub":
-                state.compared = "difference", sources[0], sources[1]
+            if name in _FLAGS:
+                state.compared = _FLAGS[name], sources[0], sources[1]
 
 
 def _shifted(name: str, operands: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:

@@ -139,6 +139,14 @@ def _clamp(state: State, operands: tuple[str, ...]) -> None:
     put(state, operands[0], value)
 
 
+def _add_with_carry(state: State, a: Value, b: Value) -> Value:
+    """Adc, where the carry is that of a sum."""
+    if state.compared is None or state.compared[0] != "sum":
+        raise UnprovenError("a carry that the proof does not follow")
+    words, (_, *parts) = state.words, state.compared
+    return words.add(words.add(a, b), words.carry(words.add(*parts)))
+
+
 DO: dict[str, Callable[[State, tuple[str, ...]], None]] = {
     "ldr": _load,
     "str": _store,
@@ -166,6 +174,7 @@ COMPUTE: dict[str, Callable[..., Value]] = {
     "mov": lambda _, a: a,
     "movw": lambda _, a: a,
     "add": lambda s, a, b: s.words.add(a, b),
+    "adc": _add_with_carry,
     "sub": lambda s, a, b: s.words.subtract(a, b),
     "rsb": lambda s, a, b: s.words.subtract(b, a),
     "neg": lambda s, a: s.words.subtract(constant(0), a),

@@ -86,7 +86,9 @@ def holds(state: State, condition: str) -> bool:
         raise UnprovenError("flags that nothing has set")
     kind, a, b = state.compared
     words = state.words
-    if kind == "result" and condition not in ("eq", "ne", "mi", "pl"):
+    if kind == "sum":
+        a, b = words.add(a, b), constant(0)
+    if kind in ("result", "sum") and condition not in ("eq", "ne", "mi", "pl"):
         raise UnprovenError("flags that the proof does not follow")
     formulas: dict[str, Callable[[], z3.BoolRef]] = {
         "eq": lambda: words.equal(a, b),
