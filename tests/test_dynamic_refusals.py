@@ -57,6 +57,28 @@ def _driven(size: float, rests: slice) -> ImuRecording:
     return changed(recording, force=force)
 
 
+def _driven_throughout() -> ImuRecording:
+    """A vehicle that swings by 0.7 m/s^2, in 8 s."""
+    recording, samples = hand_short()[1], hand_short()[1].all()
+    swing = 0.7 * np.sin(2 * np.pi * 0.13 * samples.time_s)[:, None] * [1.0, 0.3, 0.5]
+    return changed(recording, force=samples.force + swing)
+
+
+def _clipped(limit_deg_per_s: float) -> ImuRecording:
+    recording, samples = hand_short()[1], hand_short()[1].all()
+    limit = np.radians(limit_deg_per_s)
+    held_back = np.clip(samples.rate, -limit, limit)
+    fastest = np.abs(samples.rate).argmax(axis=0), np.arange(3)
+    held_back[fastest] = samples.rate[fastest]  # a mended log may hold larger values
+    return changed(recording, rate=held_back)
+
+
+def _few_rests() -> ImuRecording:
+    recording = hand_short()[1]
+    fourth = survey(recording).rests[4]
+    return part(recording, recording.all().time_s < fourth.start_s)
+
+
 def _shaken() -> ImuRecording:
     """An engine of 23 Hz."""
     recording, samples = hand_short()[1], hand_short()[1].all()
@@ -78,6 +100,14 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
     "no rest at all": (
         _without_rests,
         ("the unit never rests", "rests of a second and more", "put the unit down"),
+    ),
+    "clips in every turn": (
+        lambda: _clipped(60.0),
+        ("a gyro clips in 2", "it is saturated", "turn more slowly"),
+    ),
+    "four rests by hand": (
+        _few_rests,
+        ("the unit rests 4 times only", "at least 6 rests in different attitudes"),
     ),
     "deg/h for deg/s": (
         lambda: _with(rate=_samples().rate / 36000),
@@ -153,8 +183,12 @@ def test_refused(case: str) -> None:
             _shaken,
             ("forces of the rests scatter by 0.", "times the noise of [noise]", "shaken"),
         ),
+        (
+            _driven_throughout,
+            ("rests differ from gravity by 0.", "m/s^2 rms", "was accelerated"),
+        ),
     ],
-    ids=["driven at the start", "driven in some rests", "an engine"],
+    ids=["driven at the start", "driven in some rests", "an engine", "driven throughout"],
 )
 def test_a_rest_in_a_moving_vehicle_is_refused(
     make: Callable[[], ImuRecording], words: tuple[str, ...]

@@ -1,8 +1,8 @@
 """Where a gyro met its full scale for a moment: the attitude is lost there, and only there.
 
-A gyro that clips reads its largest value many times, and the next smaller one seldom; noise in an
-even turn does the reverse. The turn of that moment is unknown, so that the recording is cut: what
-follows begins with the next rest.
+A gyro that clips reads its full scale many times, and the next smaller value seldom; noise in an
+even turn does the reverse. Larger values may be there, where a log was mended. The turn of that
+moment is unknown, so that the recording is cut: what follows begins with the next rest.
 """
 
 from __future__ import annotations
@@ -17,25 +17,26 @@ from triaxcal.model.types import BoolArray
 SAME = 1e-4
 """Full scales of both signs differ by one count."""
 SAMPLES, TIMES = 5, 3
-"""At the largest value: at least so many, and so many times those at the next smaller value."""
+"""At full scale: at least so many, and so many times those at the next smaller value or above."""
 LEAST_RAD_PER_S = np.radians(50.0)
 """No full scale of a gyro for motion is smaller."""
 
 
 def clipped(windows: Windows) -> BoolArray:
-    """Windows, shape (w,), in which a gyro stays at the largest value of its recording."""
+    """Windows, shape (w,), in which a gyro stays at its full scale."""
     found = np.zeros(len(windows.first), dtype=bool)
     for axis in range(3):
-        peak = windows.rate_peak[:, axis]
-        largest = float(peak.max())
-        at_largest = peak >= (1 - SAME) * largest
-        held = at_largest & (windows.at_peak[:, axis] > 1)
-        if largest < LEAST_RAD_PER_S or not held.any():
+        peak, count = windows.rate_peak[:, axis], windows.at_peak[:, axis]
+        held = (count > 1) & (peak > LEAST_RAD_PER_S)
+        if not held.any():
             continue
-        samples = int(windows.at_peak[at_largest, axis].sum())
-        below = peak == peak[~at_largest].max(initial=0.0)
-        if samples >= max(SAMPLES, TIMES * int(windows.at_peak[below, axis].sum())):
-            found |= at_largest
+        values, place = np.unique(peak[held], return_inverse=True)
+        scale = float(values[np.argmax(np.bincount(place, weights=count[held]))])
+        at_scale = np.abs(peak - scale) <= SAME * scale
+        below = peak == peak[peak < (1 - SAME) * scale].max(initial=0.0)
+        others = int(count[below].sum()), int(count[peak > (1 + SAME) * scale].sum())
+        if count[at_scale].sum() >= max(SAMPLES, TIMES * max(others)):
+            found |= peak >= (1 - SAME) * scale
     return found
 
 

@@ -20,6 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.dynamic.accelerated import (
+    OUTLIER_M_PER_S2,
+    changing,
+    never_at_rest,
+    refuse_shaken,
+)
 from triaxcal.dynamic.blocks.base import ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX, LOWER
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
@@ -35,18 +41,12 @@ DETERMINED = 0.01
 STEPS = 20
 OUTLIER_SD = 6.0
 """Of the scatter of the others: never in a thousand sound recordings."""
-OUTLIER_M_PER_S2 = 0.05
-"""A steady acceleration of less is that of a hand: 0.3 deg of tilt."""
-OUTLIER_M_PER_S2_PER_K = 5e-3
-"""Half a mg a degree, for coarse accelerometers whose temperature changed in the recording."""
 RESTS_MIN = 2 * len(LAYOUT)
 """With fewer, one that is wrong bends the constants instead of standing out."""
 SMALL_M_PER_S2 = 1e-3
 """Residuals below count as equal: an absolute value has no slope at zero."""
 MOST_LEFT_OUT = 0.1
 """Of the rests: when more contradict the others, it is not known which are right."""
-SHAKEN_TIMES, SHAKEN_M_PER_S2 = 10.0, 0.1
-"""Samples of a rest that scatter so many times as stated, and by so much, are shaken."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,8 @@ def static_poses(recording: ImuRecording, found: Survey, noise: DataSheet) -> St
     RefusedError
         When the rests shake, or contradict each other: by more than a few, or at the start.
     """
-    _refuse_shaken(recording, found, noise)
+    stated = _variance(noise, recording, 1 / recording.rate_hz) ** 0.5
+    refuse_shaken(recording.name, [rest.force_scatter for rest in found.rests], stated)
     gravity = recording.gravity_m_per_s2
     variance = [_variance(noise, recording, rest.duration_s) for rest in found.rests]
     window = _variance(noise, recording, WINDOW_S)
@@ -143,6 +144,9 @@ def static_poses(recording: ImuRecording, found: Survey, noise: DataSheet) -> St
     residual = rests.sizes(p) - gravity
     freedom = max(1, int(keep.sum()) - len(p))
     scatter = float(np.sqrt(((residual / sd)[keep] ** 2).sum() / freedom))
+    rms = float(np.sqrt((residual[keep] ** 2).sum() / freedom))
+    if keep.sum() >= RESTS_MIN and scatter > OUTLIER_SD and rms > changing(recording):
+        raise never_at_rest(recording.name, int(keep.sum()), rms)
     names = tuple(state.name for state in LAYOUT.states)
     left_out = tuple(found.rests[k].start_s for k in np.flatnonzero(~keep))
     covariance = covariance * max(1.0, scatter) ** 2
@@ -251,8 +255,7 @@ def _refused_or_kept(recording: ImuRecording, found: Survey, rests: _Forces) -> 
         residual = rests.sizes(_solved(rests, weight, gravity)[0]) - gravity
     usual = 1.4826 * float(np.median(np.abs(residual)))
     size = np.abs(residual)
-    least = OUTLIER_M_PER_S2 + OUTLIER_M_PER_S2_PER_K * _span_k(recording)
-    keep[:] = size < max(least, OUTLIER_SD * usual)
+    keep[:] = size < max(changing(recording), OUTLIER_SD * usual)
     firsts = {section.start_s for section in found.sections}
     begins = np.array([rest.start_s in firsts for rest in found.rests])
     many = int((~keep).sum()) > MOST_LEFT_OUT * count
@@ -266,23 +269,3 @@ def _refused_or_kept(recording: ImuRecording, found: Survey, rests: _Forces) -> 
             remedy="record where nothing drives, swings or is leaned on",
         )
     return keep
-
-
-def _span_k(recording: ImuRecording) -> float:
-    """How far the recorded temperature changes; 0 where there is none."""
-    temps = [piece.temp_degc for piece in recording.pieces()]
-    ends = [e for t in temps if t is not None and len(t) for e in (t.min(), t.max())]
-    return float(max(ends) - min(ends)) if ends else 0.0
-
-
-def _refuse_shaken(recording: ImuRecording, found: Survey, noise: DataSheet) -> None:
-    scatter = float(np.median([rest.force_scatter for rest in found.rests]))
-    stated = _variance(noise, recording, 1 / recording.rate_hz) ** 0.5
-    if scatter > max(SHAKEN_M_PER_S2, SHAKEN_TIMES * stated):
-        raise RefusedError(
-            recording.name,
-            f"the forces of the rests scatter by {scatter:.2g} m/s^2, {scatter / stated:.0f} "
-            "times the noise of [noise]: the unit is shaken",
-            expected="rests on something that does not move",
-            remedy="record where no engine runs, or correct [noise]",
-        )

@@ -10,17 +10,14 @@ from functools import cached_property
 
 import numpy as np
 
-from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.clipping import cut_at_clips
 from triaxcal.dynamic.plausibility import refuse_wrong_units
 from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.restless import no_rest, refuse_few_rests, refuse_missing_axis
 from triaxcal.dynamic.rests import REST_MIN_S, Quiet, guard_of, quiet_windows, runs_of
 from triaxcal.dynamic.stages import Stage, find_stages
 from triaxcal.dynamic.windows import WINDOW_S, Windows, read_windows
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
-
-AXIS_TURN_MIN_RAD = 2 * np.pi
-"""An axis that turned less in all was never put on the table."""
 
 
 @dataclass(frozen=True)
@@ -162,29 +159,19 @@ def survey(recording: ImuRecording) -> Survey:
     refuse_wrong_units(recording, windows)
     quiet = quiet_windows(windows, recording.starts_s)
     if quiet is None:
-        raise _no_rest(recording.name, windows)
+        raise no_rest(recording.name, windows)
     stages, turning = find_stages(windows, quiet, recording)
     use, guard = _used(windows, quiet, turning)
     rests = _rests(windows, use & quiet.calm)
     if not rests:
-        raise _no_rest(recording.name, windows)
+        raise no_rest(recording.name, windows)
     sections, numbers, findings = _sections(windows, edges, use, rests)
+    refuse_few_rests(recording.name, len(rests), bool(stages), len(sections) if clips else 1)
     windows = replace(windows, section=numbers[windows.section])
-    _refuse_missing_axis(recording.name, windows, quiet)
+    refuse_missing_axis(recording.name, windows, quiet)
     rate_max = float(np.linalg.norm(windows.rate, axis=1).max())
     found = (tuple(sections), stages, rests, use, quiet.still, rate_max)
     return Survey(windows, *found, guard * WINDOW_S, (*clips, *findings))
-
-
-def _no_rest(name: str, windows: Windows) -> RefusedError:
-    speed = np.linalg.norm(windows.rate, axis=1)
-    return RefusedError(
-        name,
-        f"the unit never rests: half of the time its gyros read more than "
-        f"{np.degrees(np.median(speed)):.1f} deg/s",
-        expected="rests of a second and more between the turns, in which rate and force stay",
-        remedy="put the unit down between the turns, on something that does not move",
-    )
 
 
 def _used(windows: Windows, quiet: Quiet, turning: BoolArray) -> tuple[BoolArray, int]:
@@ -269,15 +256,3 @@ def _told(lost_s: list[tuple[float, float]]) -> list[str]:
     total_s = sum(length for _, length in lost_s)
     told = f"{total_s:.1f} s{places} are not used, the first at {lost_s[0][0]:.1f} s"
     return [f"{told}: what is before the first rest, and between a gap and the next one"]
-
-
-def _refuse_missing_axis(name: str, windows: Windows, quiet: Quiet) -> None:
-    turns = np.abs(windows.rate - quiet.bias) * windows.duration_s[:, None]
-    for axis, turn in enumerate(turns[~quiet.still].sum(axis=0)):
-        if turn < AXIS_TURN_MIN_RAD:
-            raise RefusedError(
-                name,
-                f"turns about axis {'xyz'[axis]} by {turn / (2 * np.pi):.2f} revolutions in all",
-                expected="some revolutions about each axis x, y, z in turn",
-                remedy="put that axis along the table's and rotate",
-            )
