@@ -102,8 +102,8 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
         ("the unit never rests", "rests of a second and more", "put the unit down"),
     ),
     "clips in every turn": (
-        lambda: _clipped(60.0),
-        ("a gyro clips in 2", "it is saturated", "turn more slowly"),
+        lambda: _clipped(75.0),
+        ("a gyro clips in ", "of the turns between 2", "it is saturated", "turn more slowly"),
     ),
     "four rests by hand": (
         _few_rests,
