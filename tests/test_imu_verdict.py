@@ -301,6 +301,7 @@ def test_a_demand_that_is_missed_points_to_the_plan(tmp_path: Path) -> None:
     with pytest.raises(triaxcal.RefusedError) as refusal:
         triaxcal.deliver(folder, tmp_path / "build")
     assert "[limits] gyro_scale_sd_ppm: Theta" in str(refusal.value)
+    assert "% of its variance from gyro noise" in str(refusal.value)
     assert f"`triaxcal dynamic {folder} --plan` says" in str(refusal.value)
     assert not (tmp_path / "build").exists()
 

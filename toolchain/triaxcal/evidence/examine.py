@@ -11,6 +11,7 @@ from triaxcal.dynamic.imumodel import IN_MODEL
 from triaxcal.dynamic.limits import ImuLimits, demanded
 from triaxcal.dynamic.missing import Effect
 from triaxcal.dynamic.observability import Observability
+from triaxcal.dynamic.shares import variance_shares
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.evidence.case import Case
 from triaxcal.evidence.causes import causes_of
@@ -58,7 +59,7 @@ def examine_case(
         *rests_alone(result),
         *earth(result),
         *effects_off(off),
-        *sd_checks(limits, result, case.worst_sd),
+        *sd_checks(limits, case),
         *_unseen_of_the_base(result, seen),
     ]
     found = Evidence(
@@ -72,19 +73,26 @@ def examine_case(
     return causes_of(found, case, off, held, report)
 
 
-def sd_checks(
-    limits: ImuLimits, result: DynamicResult, worst_sd: FloatArray | None = None
-) -> Iterator[Check]:
-    """Standard deviations of the constants against what is demanded, over the working range."""
+def sd_checks(limits: ImuLimits, case: Case) -> Iterator[Check]:
+    """Standard deviations of the constants against what is demanded, over the working range.
+
+    With the largest source of the variance, at the reference temperature.
+    """
+    result, worst_sd = case.result, case.worst_sd
+    demands = demanded(limits, result.layout)
+    shares = variance_shares(case.recording, result) if demands else {}
     states = result.layout.states
     deviations = result.sd if worst_sd is None else worst_sd
     where = "" if worst_sd is None else " at its worst temperature"
-    for demand, limit, index in demanded(limits, result.layout):
+    for demand, limit, index in demands:
         sd = {i: float(deviations[i]) / states[i].per_unit for i in index}
         worst = max(sd, key=lambda i: sd[i])
+        parts = {name: float(share[worst]) for name, share in shares.items()}
+        source = max(parts, key=lambda name: parts[name])
         yield Check(
             f"[limits] {demand.key}", sd[worst] <= limit,
-            f"{states[worst].name} has {sd[worst]:.3g} {demand.unit}{where} (limit {limit:g})",
+            f"{states[worst].name} has {sd[worst]:.3g} {demand.unit}{where} (limit {limit:g}), "
+            f"{100 * parts[source]:.0f} % of its variance from {source}",
             sd[worst], limit, demand.unit, len(index),
         )  # fmt: skip
 
