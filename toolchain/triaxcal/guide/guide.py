@@ -20,7 +20,7 @@ from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import ImuSamples
-from triaxcal.dynamic.survey import AXIS_TURN_MIN_RAD
+from triaxcal.dynamic.restless import AXIS_TURN_MIN_RAD
 from triaxcal.guide.goals import Goal, Standing, standings
 from triaxcal.guide.stepmodel import StepModel
 from triaxcal.guide.turns import Turn, candidates, up_words
