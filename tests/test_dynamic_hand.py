@@ -142,6 +142,19 @@ def test_poses_of_two_seconds_by_hand_are_within_their_deviations() -> None:
     assert len(result.passes) <= 8  # four, and three with the bias instability that it shows
 
 
+@pytest.mark.parametrize("stated", [True, False])
+def test_biases_that_flicker_are_within_their_deviations(stated: bool) -> None:
+    """White noise stated alone, and nothing at all; 4.8 and 39 are 1e-4 and 0.99 of chi-square."""
+    made, noise, truth = case("flicker0")
+    result = calibrate_dynamic(made, noise if stated else DataSheet())
+    error = np.array(
+        [p - truth[s.name] for p, s in zip(result.p[:21], result.layout.states[:21], strict=True)]
+    )
+    assert 4.8 < error @ np.linalg.solve(result.covariance[:21, :21], error) < 39
+    assert {"gyro_bias_instability_deg_per_h", "accel_bias_instability_ug"} <= set(result.estimated)
+    assert result.noise.gyro_bias_instability_deg_per_h
+
+
 def white_noise(samples: ImuSamples, found: Survey, rate_hz: float) -> DataSheet:
     """Of the rests, by the differences of samples that follow each other; the noisiest axis."""
     values = np.column_stack([samples.rate, samples.force])
