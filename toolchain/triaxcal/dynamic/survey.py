@@ -161,6 +161,8 @@ def survey(recording: ImuRecording) -> Survey:
     if quiet is None:
         raise no_rest(recording.name, windows)
     stages, turning = find_stages(windows, quiet, recording)
+    if stages:  # no hand holds the unit: what moves as slowly as one is the start of handling
+        quiet = replace(quiet, calm=quiet.calm & quiet.still)
     use, guard = _used(windows, quiet, turning)
     rests = _rests(windows, use & quiet.calm)
     if not rests:
