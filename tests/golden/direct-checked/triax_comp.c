@@ -54,15 +54,21 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
     return p;
 }
 
+static void evaluate_column(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment, uint32_t j,
+                            int32_t x_q31)
+{
+    row[0][j] = evaluate(segment->coefficient[j], x_q31);
+    row[1][j] = evaluate(segment->coefficient[4u + j], x_q31);
+    row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
+}
+
 /* A column at a time: the loop's overhead is shared by three functions. */
 static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
                           int32_t x_q31)
 {
     uint32_t j;
     for (j = 0u; j < 4u; j++) {
-        row[0][j] = evaluate(segment->coefficient[j], x_q31);
-        row[1][j] = evaluate(segment->coefficient[4u + j], x_q31);
-        row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
+        evaluate_column(row, segment, j, x_q31);
     }
 }
 
@@ -78,11 +84,17 @@ static int32_t clamp_raw(int32_t code)
     return result;
 }
 
+static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)
+{
+    return (code - segment->origin_code) * segment->gain;
+}
+
 uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib, int32_t temp_code)
 {
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
+    int32_t x_q31;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -92,8 +104,14 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
+    x_q31 = x_q31_of(segment, code);
+    evaluate_rows(state->row, segment, x_q31);
     return status;
+}
+
+static int32_t rounded(int64_t sum, int32_t offset)
+{
+    return asr32_3(high_word(sum) + offset);
 }
 
 /* The offset holds half an output LSB; floor(floor(v / 2^32) / 2^3) = floor(v / 2^35). */
@@ -101,13 +119,13 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
 {
     const int64_t sum_x = times(state->row[0][0], ux) + times(state->row[0][1], uy) +
             times(state->row[0][2], uz);
-    accel[0] = asr32_3(high_word(sum_x) + state->row[0][3]);
+    accel[0] = rounded(sum_x, state->row[0][3]);
     const int64_t sum_y = times(state->row[1][0], ux) + times(state->row[1][1], uy) +
             times(state->row[1][2], uz);
-    accel[1] = asr32_3(high_word(sum_y) + state->row[1][3]);
+    accel[1] = rounded(sum_y, state->row[1][3]);
     const int64_t sum_z = times(state->row[2][0], ux) + times(state->row[2][1], uy) +
             times(state->row[2][2], uz);
-    accel[2] = asr32_3(high_word(sum_z) + state->row[2][3]);
+    accel[2] = rounded(sum_z, state->row[2][3]);
 }
 
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3])

@@ -122,6 +122,11 @@ static int32_t clamp_raw(int32_t code)
     return result;
 }
 
+static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)
+{
+    return (code - segment->origin_code) * segment->gain;
+}
+
 uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib, int32_t temp_code)
 {
     const triax_segment_t *segment = &calib->segment[0];
@@ -136,7 +141,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    evaluate_state(state, segment, (code - segment->origin_code) * segment->gain);
+    evaluate_state(state, segment, x_q31_of(segment, code));
     return status;
 }
 

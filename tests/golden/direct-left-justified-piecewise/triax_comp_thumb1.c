@@ -386,6 +386,11 @@ static void apply_rows(const triax_state_t *state, const int32_t raw_code[3],
         : "r3", "r4", "r5", "r6", "r12", "cc", "memory");
 }
 
+static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)
+{
+    return (code - segment->origin_code) * segment->gain;
+}
+
 uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib, int32_t temp_code)
 {
     const triax_segment_t *segment = &calib->segment[0];
@@ -406,7 +411,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
             segment = &calib->segment[i];
         }
     }
-    evaluate_state(state, segment, (code - segment->origin_code) * segment->gain);
+    evaluate_state(state, segment, x_q31_of(segment, code));
     return status;
 }
 

@@ -148,11 +148,17 @@ static void copy_terms(triax_state_t *state, const triax_calib_t *calib)
     }
 }
 
+static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)
+{
+    return (code - segment->origin_code) * segment->gain;
+}
+
 uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib, int32_t temp_code)
 {
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
+    int32_t x_q31;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -162,7 +168,8 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
+    x_q31 = x_q31_of(segment, code);
+    evaluate_rows(state->row, segment, x_q31);
     copy_terms(state, calib);
     return status;
 }

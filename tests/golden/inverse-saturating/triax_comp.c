@@ -84,15 +84,21 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
     return p;
 }
 
+static void evaluate_column(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment, uint32_t j,
+                            int32_t x_q31)
+{
+    row[0][j] = evaluate(segment->coefficient[j], x_q31);
+    row[1][j] = evaluate(segment->coefficient[4u + j], x_q31);
+    row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
+}
+
 /* A column at a time: the loop's overhead is shared by three functions. */
 static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
                           int32_t x_q31)
 {
     uint32_t j;
     for (j = 0u; j < 4u; j++) {
-        row[0][j] = evaluate(segment->coefficient[j], x_q31);
-        row[1][j] = evaluate(segment->coefficient[4u + j], x_q31);
-        row[2][j] = evaluate(segment->coefficient[8u + j], x_q31);
+        evaluate_column(row, segment, j, x_q31);
     }
 }
 
@@ -181,11 +187,17 @@ static void clear_rows(int32_t row[3][TRIAX_ROW_WORDS])
     }
 }
 
+static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)
+{
+    return (code - segment->origin_code) * segment->gain;
+}
+
 uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib, int32_t temp_code)
 {
     const triax_segment_t *segment = &calib->segment[0];
     uint32_t status = TRIAX_STATUS_OK;
     int32_t code = temp_code;
+    int32_t x_q31;
 
     if (code < calib->temp_min_code) {
         code = calib->temp_min_code;
@@ -195,7 +207,8 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         code = calib->temp_max_code;
         status = TRIAX_STATUS_TEMP_HIGH;
     }
-    evaluate_rows(state->row, segment, (code - segment->origin_code) * segment->gain);
+    x_q31 = x_q31_of(segment, code);
+    evaluate_rows(state->row, segment, x_q31);
     if (invert(state->row) == 0u) {
         clear_rows(state->row);
         status |= TRIAX_STATUS_BAD_IMAGE;

@@ -83,6 +83,7 @@ class Tool:
 
 _GCC = "compiles the C of a unit for the cross-check"
 _PROOF = "verify: proves the error bound a second time"
+_WP = "verify: proves that the C is its specification, with frama-c"
 _CORE = "target: the C on another core"
 _QEMU = "target: runs the C of another core"
 _LLVM = {"darwin": "llvm"}
@@ -94,6 +95,9 @@ _TOOLS = (
     Tool("gappa", "gappa", _PROOF),
     Tool("coqc", "coq libcoq-gappa libcoq-flocq", "certify: checks the proof of the bound"),
     Tool("frama-c", "frama-c-base", "verify: no undefined behaviour in the C", "-version"),
+    Tool("why3", "why3", _WP),
+    Tool("cvc4", "cvc4", _WP),
+    Tool("z3", "z3", _WP),
     Tool(
         "cppcheck", "cppcheck", "verify: rules of MISRA C",
         elsewhere={"darwin": "cppcheck", "win32": "cppcheck"},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from triaxcal.codegen.annotations import not_covered, with_contracts, without_annotations
 from triaxcal.codegen.forms import (
     assembly,
     form_of,
@@ -15,7 +16,7 @@ from triaxcal.codegen.forms import (
 from triaxcal.codegen.identity import FIELDS, IDENTITY_SIZE, MAGIC, VERSION
 from triaxcal.codegen.image import header_names, header_words, image_size
 from triaxcal.codegen.names import names_of
-from triaxcal.codegen.templates import macro_literal, render
+from triaxcal.codegen.templates import environment, macro_literal, render
 from triaxcal.fixedpoint.formats import FUNCTION_NAMES
 from triaxcal.fixedpoint.gyro import SENSITIVITY_LIMIT
 from triaxcal.fixedpoint.plan import Plan
@@ -47,19 +48,54 @@ def render_routine(plan: Plan) -> dict[str, str]:
     Where the plan asks for another arithmetic and its shape has it, the file of that is the last.
     """
     names = names_of(plan)
-    context = {**_routine_context(plan), "row_words": row_words(plan.shape, arithmetic_of(plan))}
+    words = {"row_words": row_words(plan.shape, arithmetic_of(plan))}
+    context = {**_routine_context(plan), **words}
     texts = dict([render(ROUTINE_FILES[0], f"shape {names.shape}", names, **context)])
     for form in dict.fromkeys((PORTABLE, arithmetic_of(plan))):
-        file = routine_file(plan, form)
-        own = {
-            "form": form,
-            "form_note": FORM_NOTES[form],
-            "uses": helpers(plan.shape, form),
-        }
-        _, texts[file] = render(
-            ROUTINE_FILES[1], f"shape {names.shape}", names, file=file, **context, **own
-        )
+        text = _annotated(plan, form, context)
+        proven = form == PORTABLE and not not_covered(plan.shape)
+        kept = with_contracts if proven else without_annotations
+        texts[routine_file(plan, form)] = kept(text)
     return texts
+
+
+def annotated_routine(plan: Plan) -> str:
+    """The portable C with its contracts and every step of the proof."""
+    return _annotated(plan, PORTABLE, _portable_context(plan))
+
+
+def specification(plan: Plan, *, opaque: bool) -> str:
+    """What the contracts mean, as a header of ACSL.
+
+    Parameters
+    ----------
+    opaque : bool
+        Without the definitions of products, floors and polynomials; the lemmas about them stay.
+    """
+    spare = plan.shape.output_shift - 32
+    floors = {32, plan.shape.output_shift, *([spare] if spare > 0 else [])}
+    context = {
+        **names_of(plan).context,
+        **_portable_context(plan),
+        "file": routine_file(plan, PORTABLE),
+        "opaque": opaque,
+        "floors": sorted(floors),
+        "last_shift": 32,
+    }
+    return environment().get_template("verify/specification.h.j2").render(context)
+
+
+def _portable_context(plan: Plan) -> dict[str, Any]:
+    return {**_routine_context(plan), "row_words": row_words(plan.shape, PORTABLE)}
+
+
+def _annotated(plan: Plan, form: str, context: dict[str, Any]) -> str:
+    """The C file of a form with all annotations."""
+    names = names_of(plan)
+    own = {"form": form, "form_note": FORM_NOTES[form], "uses": helpers(plan.shape, form)}
+    file = routine_file(plan, form)
+    _, text = render(ROUTINE_FILES[1], f"shape {names.shape}", names, file=file, **context, **own)
+    return text
 
 
 def arithmetic_of(plan: Plan) -> str:

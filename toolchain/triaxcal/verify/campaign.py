@@ -11,7 +11,7 @@ from triaxcal.codegen.crosscheck import CrossCheck
 from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
-from triaxcal.verify import analyzers, compiled, cost, cppcheck, eva, gappa
+from triaxcal.verify import analyzers, compiled, cost, cppcheck, eva, gappa, wp
 from triaxcal.verify import angles as angle_checks
 from triaxcal.verify.outcome import FAILED, NOT_DONE, Outcome, judged
 from triaxcal.verify.tools import BrokenToolError
@@ -24,6 +24,7 @@ CHECKS: tuple[tuple[str, str, Check], ...] = (
     ("eva_codes", "Eva: any int32 codes", eva.check_codes),
     ("eva_codes_limbs", "Eva: any codes, limbs", eva.check_codes_limbs),
     ("eva_image", "Eva: any image", eva.check_image),
+    ("wp", "WP: C = specification", wp.check),
     ("cppcheck", "cppcheck: MISRA C:2012", cppcheck.check),
     ("gcc_analyzer", "gcc -fanalyzer", analyzers.check_gcc_analyzer),
     ("gcc_sanitizers", "gcc address, undefined", analyzers.check_gcc_sanitizers),

@@ -1,0 +1,132 @@
+"""WP proves the C of a covered shape, and proves no planted mistake; other shapes are not done."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from triaxcal.base.tools import MissingToolError
+from triaxcal.codegen.annotations import not_covered, with_contracts, without_annotations
+from triaxcal.codegen.render import annotated_routine, render_routine, specification
+from triaxcal.verify import wp
+from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED
+from triaxcal.verify.shapes import ALL_SHAPES, Subject
+from verify.conftest import Planter, needs
+
+COVERED = "direct-two-segments"
+PROVERS = needs("frama-c", "why3", "cvc4", "z3")
+
+
+@pytest.fixture(autouse=True)
+def nothing_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test takes a proof of an earlier run for its own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+@pytest.mark.parametrize("shape", list(ALL_SHAPES))
+def test_annotations_are_comments_only(subjects: dict[str, Subject], shape: str) -> None:
+    plan = subjects[shape].plan
+    full = annotated_routine(plan)
+    delivered = next(t for n, t in render_routine(plan).items() if n.endswith("comp.c"))
+    assert "/*@" in full
+    assert "loop invariant" not in delivered
+    assert without_annotations(full) == without_annotations(delivered)
+    assert "@*/" not in without_annotations(full)
+    assert ("/*@" in delivered) == (not not_covered(plan.shape))
+
+
+def test_steps_and_contracts_are_told_apart() -> None:
+    contract = "/*@ requires a;\n    ensures b; */\n"
+    text = contract + "int f(void)\n{\n    /*@ assert c;\n      */\n    x();\n}\n"
+    assert with_contracts(text) == contract + "int f(void)\n{\n    x();\n}\n"
+    assert without_annotations(text) == "int f(void)\n{\n    x();\n}\n"
+
+
+def test_opaque_specification_defines_no_product(subjects: dict[str, Subject]) -> None:
+    plan = subjects[COVERED].plan
+    known, opaque = (specification(plan, opaque=flag) for flag in (False, True))
+    assert "prod(integer a, integer b) = a * b;" in known
+    assert "prod(integer a, integer b);" in opaque
+    lemmas = set(re.findall(r"lemma (\w+)", known))
+    assert {"within", "value_bounded", "floors_nest"} <= lemmas
+    # What is taken without a definition is proven with it, except what follows from other lemmas.
+    assert set(re.findall(r"lemma (\w+)", opaque)) - lemmas == {"row_bounded_of"}
+
+
+@pytest.mark.parametrize("shape", [name for name in ALL_SHAPES if name != COVERED])
+def test_a_shape_without_contracts_is_not_done(
+    plant: Planter, subjects: dict[str, Subject], shape: str
+) -> None:
+    if subjects[shape].plan.shape.gyro:
+        pytest.skip("the planter writes an accelerometer's files")
+    outcome = wp.check(plant(shape))
+    assert outcome.result == NOT_DONE
+    assert outcome.finding.startswith("not done for ")
+
+
+@PROVERS
+def test_another_version_of_a_prover_is_not_done(
+    plant: Planter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(wp.KNOWN, "cvc4", "1.9")
+    with pytest.raises(MissingToolError, match=r"cvc4 1\.9 is known, found: .*1\.8"):
+        wp.check(plant(COVERED))
+
+
+@PROVERS
+@pytest.mark.slow
+def test_every_goal_is_proven_and_known_the_next_time(
+    plant: Planter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work = plant(COVERED)
+    outcome = wp.check(work)
+    assert outcome.result == PASSED, outcome
+    goals = outcome.figures["goals"]
+    assert {"set_temperature", "apply", "lemmas", "evaluate_rows"} <= set(goals)
+    monkeypatch.setattr(wp, "_prove", lambda *_: pytest.fail("the same texts are proven again"))
+    assert wp.check(work) == outcome
+
+
+FAULTS = {
+    "high_word of a negative": ("high_word", "(-1 - value) >> 32", "(-2 - value) >> 32"),
+    "high_word shifts less": ("high_word", "(int32_t)(value >> 32)", "(int32_t)(value >> 33)"),
+    "the spare shift": ("asr32", ": (value >> 3)", ": (value >> 2)"),
+    "a product without its sign": ("times", "(int64_t)a * b", "-(int64_t)a * b"),
+    "a step that subtracts": ("horner_step", "return c + high", "return c - high"),
+    "a coefficient taken twice": ("evaluate", "horner_step(c[0]", "horner_step(c[1]"),
+    "the row of another axis": ("evaluate_column", "coefficient[4u + j]", "coefficient[3u + j]"),
+    "one column too few": ("evaluate_rows", "j < 4u", "j < 3u"),
+    "x from the wrong side": ("x_q31_of", "(code - segment", "(-code - segment"),
+    "a clamp at the other end": (
+        "set_temperature", "code = calib->temp_max_code", "code = calib->temp_min_code",
+    ),
+    "a segment too late": ("set_temperature", "(code >= calib", "(code > calib"),
+    "a status of the other end": ("set_temperature", "_TEMP_LOW;", "_TEMP_HIGH;"),
+    "another axis's offset": ("apply_rows", "(sum_y, state->row[1]", "(sum_y, state->row[0]"),
+    "an offset subtracted": ("rounded", "high_word(sum) + offset", "high_word(sum) - offset"),
+    "x and y exchanged": ("apply", "uy = raw_code[1]", "uy = raw_code[0]"),
+    "x and y of the result exchanged": ("apply_rows", "accel[0] = x", "accel[0] = y"),
+}  # fmt: skip
+"""Function whose goals fail, and the mistake."""
+
+
+@PROVERS
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(FAULTS))
+def test_a_planted_mistake_is_not_proven(
+    plant: Planter, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    function, old, new = FAULTS[name]
+    work = plant(COVERED)
+    text = annotated_routine(work.plan)
+    assert text.count(old) == 1, old
+    monkeypatch.setattr(wp, "annotated_routine", lambda _: text.replace(old, new))
+    monkeypatch.setattr(wp, "GOAL_S", 5)
+    for group in ("OF_VALUES", "OF_MEMORY", "WRAPPING"):
+        monkeypatch.setattr(wp, group, tuple(n for n in getattr(wp, group) if n == function))
+    monkeypatch.setattr(wp, "_LEMMAS", ())
+    outcome = wp.check(work)
+    assert outcome.result == FAILED
+    assert "not proven: " in outcome.finding

@@ -1,0 +1,38 @@
+"""ACSL in the C: contracts before functions, and steps of the proof inside them.
+
+The delivered portable C keeps the contracts of a shape whose contracts are proven. Loop
+invariants and assertions are for the prover: they stay in the text that it reads. The other forms
+and shapes have none, since a contract that nobody proves may be wrong.
+"""
+
+from __future__ import annotations
+
+import re
+
+from triaxcal.fixedpoint.shape import Shape
+
+_STEP = re.compile(r"^ +/\*@.*?\*/\n", re.MULTILINE | re.DOTALL)
+_CONTRACT = re.compile(r"^/\*@.*?\*/\n", re.MULTILINE | re.DOTALL)
+
+
+def with_contracts(text: str) -> str:
+    """The C without the steps of the proof."""
+    return _STEP.sub("", text)
+
+
+def without_annotations(text: str) -> str:
+    """The C without contracts and steps."""
+    return _CONTRACT.sub("", with_contracts(text))
+
+
+def not_covered(shape: Shape) -> str:
+    """Which part of a shape has no complete contracts; "" where all have them."""
+    parts = {
+        "the inverse form": shape.inverse is not None,
+        "saturating results": shape.saturates,
+        "terms added to the sums": shape.adds_to_sums,
+        "a term in dT/dt": shape.rate,
+        "functions that do not depend on temperature": not shape.order,
+        "the raw range by one test": shape.raw_max - shape.raw_min != 2**32 - 1,
+    }
+    return next((name for name, has in parts.items() if has), "")
