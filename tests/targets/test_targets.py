@@ -131,7 +131,7 @@ def test_host_prints_what_python_expects(case: Case, arithmetic: str, tmp_path: 
 @pytest.mark.parametrize(
     ("old", "new", "line"),
     [
-        ("rounded(sum_z", "rounded(sum_z + 4294967296", "generated"),
+        ("rounded(sum,", "rounded(sum + 4294967296,", "generated"),
         ("status = TRIAX_STATUS_RAW_RANGE;", ";", "generated"),
         ("if (crc32(image, TRIAX_IMAGE_SIZE", "if (0u && crc32(image, TRIAX_IMAGE_SIZE", "refused"),
     ],

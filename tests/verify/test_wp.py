@@ -104,10 +104,10 @@ FAULTS = {
     ),
     "a segment too late": ("set_temperature", "(code >= calib", "(code > calib"),
     "a status of the other end": ("set_temperature", "_TEMP_LOW;", "_TEMP_HIGH;"),
-    "another axis's offset": ("apply_rows", "(sum_y, state->row[1]", "(sum_y, state->row[0]"),
+    "another axis's row": ("apply_rows", "apply_row(state->row[1]", "apply_row(state->row[0]"),
     "an offset subtracted": ("rounded", "high_word(sum) + offset", "high_word(sum) - offset"),
     "x and y exchanged": ("apply", "uy = raw_code[1]", "uy = raw_code[0]"),
-    "x and y of the result exchanged": ("apply_rows", "accel[0] = x", "accel[0] = y"),
+    "a gain of another code": ("apply_row", "times(row[1], uy)", "times(row[1], ux)"),
 }  # fmt: skip
 """Function whose goals fail, and the mistake."""
 

@@ -143,6 +143,14 @@ static int32_t rounded(int64_t sum, int32_t offset)
 }
 
 /* The offset holds half an output LSB; floor(floor(v / 2^32) / 2^3) = floor(v / 2^35). */
+/*@ requires \valid_read(row + (0 .. 3)) && row_bounded(row[0], row[1], row[2], row[3]); assigns \nothing;
+    ensures \result == result(row, ux, uy, uz); */
+static int32_t apply_row(const int32_t row[TRIAX_ROW_WORDS], int32_t ux, int32_t uy, int32_t uz)
+{
+    const int64_t sum = times(row[0], ux) + times(row[1], uy) + times(row[2], uz);
+    return rounded(sum, row[3]);
+}
+
 /*@ requires \valid_read(state) && \valid(accel + (0 .. 2)) && state_fits(&state->row[0]);
     requires \separated(state, accel + (0 .. 2));
     assigns accel[0 .. 2];
@@ -152,15 +160,9 @@ static int32_t rounded(int64_t sum, int32_t offset)
  */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz, int32_t accel[3])
 {
-    const int64_t sum_x = times(state->row[0][0], ux) + times(state->row[0][1], uy) +
-            times(state->row[0][2], uz);
-    accel[0] = rounded(sum_x, state->row[0][3]);
-    const int64_t sum_y = times(state->row[1][0], ux) + times(state->row[1][1], uy) +
-            times(state->row[1][2], uz);
-    accel[1] = rounded(sum_y, state->row[1][3]);
-    const int64_t sum_z = times(state->row[2][0], ux) + times(state->row[2][1], uy) +
-            times(state->row[2][2], uz);
-    accel[2] = rounded(sum_z, state->row[2][3]);
+    accel[0] = apply_row(state->row[0], ux, uy, uz);
+    accel[1] = apply_row(state->row[1], ux, uy, uz);
+    accel[2] = apply_row(state->row[2], ux, uy, uz);
 }
 
 /*@ requires \valid_read(state) && \valid_read(raw_code + (0 .. 2)) && \valid(accel + (0 .. 2)) && state_fits(&state->row[0]);

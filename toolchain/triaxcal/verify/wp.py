@@ -37,8 +37,8 @@ OPTIONS = (
 OF_VALUES = ("s32", "high_word", "asr32", "magnitude", "times", "evaluate", "x_q31_of")
 """Functions proven with every definition."""
 OF_MEMORY = (
-    "horner_step", "evaluate_column", "evaluate_rows", "rounded", "clamp_raw", "apply_rows",
-    "set_temperature",
+    "horner_step", "evaluate_column", "evaluate_rows", "rounded", "clamp_raw", "apply_row",
+    "apply_rows", "set_temperature",
 )  # fmt: skip
 WRAPPING = ("apply",)
 """Its test of the raw range subtracts modulo 2^32, as C defines."""
