@@ -157,7 +157,7 @@ def _functions(text: str, linked: str) -> list[str]:
 
 def _parts(present: Sequence[str]) -> list[Part]:
     def of(names: Sequence[str]) -> tuple[str, ...]:
-        return tuple(p for p in present if p in names or p.rpartition("_")[0] in names)
+        return tuple(p for p in present if re.sub(r"_\d+$", "", p) in names)
 
     no_wrap = ("-warn-unsigned-overflow",)
     functions = ("-wp-prop=-@lemma",)
