@@ -25,6 +25,11 @@ def without_annotations(text: str) -> str:
     return _CONTRACT.sub("", with_contracts(text))
 
 
+def blanked_contracts(text: str) -> str:
+    """Delivered C with empty lines where its contracts are."""
+    return _CONTRACT.sub(lambda found: "\n" * found[0].count("\n"), text)
+
+
 def not_covered(shape: Shape) -> str:
     """Which part of a shape has no complete contracts; "" where all have them."""
     parts = {
