@@ -497,6 +497,10 @@ def test_a_recording_does_not_depend_on_its_pieces(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(imu, "PIECE", 777)
     cut = recording.all()
     for name in ImuSamples.__dataclass_fields__:
+        if getattr(first, name) is None:  # what only a repaired log has
+            assert getattr(again, name) is None
+            assert getattr(cut, name) is None
+            continue
         assert np.array_equal(getattr(first, name), getattr(again, name)), name
         # A sum is continued from its remainder in another order: one count at a border of rounding.
         assert np.abs(getattr(first, name) - getattr(cut, name)).max() < 1.01e-5, name

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from triaxcal.dynamic.blocks.attitude import rotation_of
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording, ImuSamples
 from triaxcal.model.types import FloatArray
 
@@ -64,7 +64,7 @@ class HandMotion:
         found = [np.eye(3)]
         for k in range(self.poses - 1):
             axis, angle_deg = _TURNS[k % len(_TURNS)]
-            found.append(found[-1] @ rotation_of(np.array(axis) * math.radians(angle_deg)))
+            found.append(found[-1] @ _rotation(np.array(axis) * math.radians(angle_deg)))
         return np.array(found)
 
     def at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -78,12 +78,18 @@ class HandMotion:
         angle = np.where(turn < self.poses - 1, angle, 0.0)
         done = part**3 * (10 - 15 * part + 6 * part**2)
         speed = angle * 30 * part**2 * (1 - part) ** 2 / TURN_S
-        attitude = self.attitudes()[turn] @ rotation_of(axis * (angle * done)[:, None])
+        attitude = self.attitudes()[turn] @ _rotation(axis * (angle * done)[:, None])
         latitude = math.radians(self.latitude_deg)
         earth = EARTH_RATE_RAD_PER_S * np.array([0.0, math.cos(latitude), math.sin(latitude)])
         rate: FloatArray = axis * speed[:, None] + np.einsum("nji,j->ni", attitude, earth)
         force: FloatArray = attitude[:, 2, :] * self.gravity_m_per_s2
         return rate, force
+
+
+def _rotation(vector_rad: FloatArray) -> FloatArray:
+    """Matrix, shape (..., 3, 3), of a rotation vector, shape (..., 3)."""
+    matrix: FloatArray = Rotation.from_rotvec(vector_rad).as_matrix()
+    return matrix
 
 
 def hand_recording(
