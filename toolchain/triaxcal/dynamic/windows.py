@@ -34,8 +34,10 @@ class Windows:
         rad/s, m/s^2, as measured.
     force_scatter : array, shape (w,)
         Standard deviation of the samples within the window, of the noisiest accelerometer, m/s^2.
-    rate_peak, at_peak : arrays, shape (w, 3)
-        Largest absolute rate of a sample, rad/s, and how many samples read it.
+    rate_peak, rate_next, rate_low : arrays, shape (w, 3)
+        Largest absolute rate of a sample, the next smaller one, and the smallest, rad/s.
+    at_peak, at_next : arrays, shape (w, 3)
+        How many samples read the largest, and the next smaller one.
     section : array, shape (w,)
         Number of the section without a gap.
     """
@@ -47,7 +49,10 @@ class Windows:
     force: FloatArray
     force_scatter: FloatArray
     rate_peak: FloatArray
+    rate_next: FloatArray
+    rate_low: FloatArray
     at_peak: IntArray
+    at_next: IntArray
     section: IntArray
 
     def part(self, marked: BoolArray) -> Windows:
@@ -97,17 +102,28 @@ def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]
             section = np.full(len(starts), len(edges) - 1)
             at_s, duration_s = chunk.time_s[starts], sizes * interval
             scatter = np.sqrt(variance.max(axis=1))
-            size = np.abs(rate[begin : int(b)])
-            peak = np.maximum.reduceat(size, starts - begin)
-            held = size >= np.repeat(peak, sizes, axis=0)
-            at_peak = np.add.reduceat(held.astype(np.int64), starts - begin)
-            of_forces = (*means, scatter)
-            rows.append((at_s, duration_s, count + starts, *of_forces, peak, at_peak, section))
+            peaks = _peaks(np.abs(rate[begin : int(b)]), starts - begin, sizes)
+            rows.append((at_s, duration_s, count + starts, *means, scatter, *peaks, section))
         count += len(chunk)
         previous_s = float(chunk.time_s[-1])
     edges[-1] = (edges[-1][0], count - 1)
     columns = [np.concatenate(column) for column in zip(*rows, strict=True)]
     return Windows(*columns), edges
+
+
+def _peaks(
+    size: FloatArray, starts: IntArray, sizes: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
+    """Largest value, the next and the smallest of each window, and how many are the first two."""
+    peak, low = np.maximum.reduceat(size, starts), np.minimum.reduceat(size, starts)
+    held = size == np.repeat(peak, sizes, axis=0)
+    less = np.where(held, -1.0, size)
+    following = np.maximum.reduceat(less, starts)
+    second = less == np.repeat(following, sizes, axis=0)
+    at_peak, at_next = (
+        np.add.reduceat(marked.astype(np.int64), starts) for marked in (held, second & ~held)
+    )
+    return peak, following, low, at_peak, at_next
 
 
 def _per_second(values: FloatArray, step_s: FloatArray, convention: str) -> FloatArray:
