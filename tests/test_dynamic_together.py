@@ -9,13 +9,14 @@ import pytest
 
 from dynamic_cases import aviation, changed, held, perfect, sheet
 from dynamic_judge import data_sheet, judge
-from test_dynamic_judge import ALL, CENTRES, LINEAR, motion
+from test_dynamic_judge import ALL, CENTRES, LINEAR, assert_honest, motion
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.channels import steady
 from triaxcal.dynamic.missing import missing_effects
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuRecording
+from triaxcal.dynamic.survey import survey
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import AVIATION, draw_truth
 from triaxcal.simulation.imu_motion import three_axes
@@ -52,6 +53,27 @@ def test_all_together_leave_no_bias(convention: str, rate_hz: float) -> None:
     assert np.abs(verdict.z).max() < LIMIT
     last = verdict.result.passes[-1]
     assert last.chi_square < 1e-3 * last.freedom
+
+
+def test_all_together_settle_with_noise() -> None:
+    """Counts of 0.1", coarser than the noise: a table's even turn is no gyro that clips.
+
+    Taken for clips, its turns cut the recording, and the heading stayed unknown for ten passes.
+    """
+    truth = draw_truth(AVIATION, 1, LINEAR)
+    verdict = judge(truth, motion(3.0, "all"), 200.0, 1, ALL)
+    assert verdict.result.survey.findings == ()
+    assert len(verdict.result.survey.sections) == 1
+    assert_honest(verdict)
+
+
+@pytest.mark.parametrize("effect", ["", "all"])
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0, 200.0])
+def test_an_even_turn_is_no_clip(effect: str, rate_hz: float) -> None:
+    """On a rough table and on a precise one: steps of the rate there are counts."""
+    truth = draw_truth(AVIATION, 16, LINEAR)
+    recording = held(simulate_imu(truth, motion(1.5, effect), rate_hz, 16))
+    assert survey(recording).findings == ()
 
 
 def test_a_table_that_creeps_does_not_rest() -> None:

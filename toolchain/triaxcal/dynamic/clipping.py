@@ -44,7 +44,7 @@ def clipped(windows: Windows) -> BoolArray:
         less = np.r_[peak[below], windows.rate_next[following, axis]]
         times = np.r_[count[below], windows.at_next[following, axis]]
         others = _most(less, times), int(count[peak > (1 + SAME) * scale].sum())
-        many = count[at_scale].sum() >= max(SAMPLES, TIMES * max(others))
+        many = count[peak == scale].sum() >= max(SAMPLES, TIMES * max(others))
         low = windows.rate_low[:, axis]
         if many and not _even(at_scale, low >= near, low < peak, windows.section):
             found |= peak >= (1 - SAME) * scale

@@ -87,6 +87,8 @@ def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]
         rate = _per_second(chunk.rate, step, recording.rate_convention)
         force = _per_second(chunk.force, step, recording.force_convention)
         _refuse_saturation(recording, chunk.time_s, chunk.rate, rate)
+        # Steps of time differ in their last digits, and equal counts with them.
+        read = np.abs(chunk.rate) / (interval if recording.rate_convention == INCREMENT else 1.0)
         for number, (a, b) in enumerate(pairwise(cuts)):
             if number > 0:
                 edges[-1] = (edges[-1][0], count + int(a) - 1)
@@ -102,7 +104,7 @@ def read_windows(recording: ImuRecording) -> tuple[Windows, list[tuple[int, int]
             section = np.full(len(starts), len(edges) - 1)
             at_s, duration_s = chunk.time_s[starts], sizes * interval
             scatter = np.sqrt(variance.max(axis=1))
-            peaks = _peaks(np.abs(rate[begin : int(b)]), starts - begin, sizes)
+            peaks = _peaks(read[begin : int(b)], starts - begin, sizes)
             rows.append((at_s, duration_s, count + starts, *means, scatter, *peaks, section))
         count += len(chunk)
         previous_s = float(chunk.time_s[-1])
