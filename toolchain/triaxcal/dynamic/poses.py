@@ -39,6 +39,7 @@ LAYOUT = Layout((ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX))
 DETERMINED = 0.01
 """Of the prior's deviation: constants that the rests know so well are worth beginning with."""
 STEPS = 20
+HALVINGS = 10
 OUTLIER_SD = 6.0
 """Of the scatter of the others: never in a thousand sound recordings."""
 RESTS_MIN = 2 * len(LAYOUT)
@@ -219,7 +220,11 @@ class _Forces:
 
 
 def _solved(rests: _Forces, weight: FloatArray, gravity: float) -> tuple[FloatArray, FloatArray]:
-    """Constants (9,) and covariance, by Gauss-Newton with the priors of the filter."""
+    """Constants (9,) and covariance, by Gauss-Newton with the priors of the filter.
+
+    On a table the rests leave some constants almost free, and whole steps may run away along them:
+    a step is halved until it makes the sum of squares smaller.
+    """
     prior = 1 / LAYOUT.prior_sd
     p = np.zeros(len(LAYOUT))
     for _ in range(STEPS):
@@ -230,7 +235,12 @@ def _solved(rests: _Forces, weight: FloatArray, gravity: float) -> tuple[FloatAr
         rows = np.concatenate([own, np.diag(prior)])
         rest = np.concatenate([(rests.sizes(p) - gravity) * weight, -p * prior])
         step = np.linalg.lstsq(rows, rest, rcond=None)[0]
-        p = p + step
+        for _ in range(HALVINGS):
+            tried = np.r_[(rests.sizes(p + step) - gravity) * weight, -(p + step) * prior]
+            if tried @ tried <= rest @ rest:
+                p = p + step
+                break
+            step = step / 2
         root = np.linalg.inv(np.linalg.qr(rows, mode="r"))
         covariance: FloatArray = root @ root.T
         if (np.abs(step) < 1e-4 * np.sqrt(np.diag(covariance))).all():
