@@ -15,6 +15,7 @@ from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.channels import steady
 from triaxcal.dynamic.missing import missing_effects
 from triaxcal.dynamic.noise import DataSheet
+from triaxcal.dynamic.poses import static_poses
 from triaxcal.dynamic.recording import INCREMENT, INSTANT, ImuRecording
 from triaxcal.dynamic.survey import survey
 from triaxcal.simulation.imu import simulate_imu
@@ -65,6 +66,20 @@ def test_all_together_settle_with_noise() -> None:
     assert verdict.result.survey.findings == ()
     assert len(verdict.result.survey.sections) == 1
     assert_honest(verdict)
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_rests_on_a_table_are_of_gravity_alone(seed: int) -> None:
+    """They hardly see some constants. Their solution is no worse than none: 150 m/s^2 once."""
+    truth = draw_truth(AVIATION, seed, LINEAR)
+    recording = held(simulate_imu(truth, motion(5.0, "all"), 50.0, seed))
+    found = survey(recording)
+    static = static_poses(recording, found, data_sheet(truth.noise))
+    measured = np.array([np.linalg.norm(rest.force) for rest in found.rests])
+    without = np.linalg.norm(measured - recording.gravity_m_per_s2)
+    assert np.linalg.norm(static.residual) < without
+    assert not static.determined
+    assert static.left_out == ()
 
 
 @pytest.mark.parametrize("effect", ["", "all"])
