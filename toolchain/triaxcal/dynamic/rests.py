@@ -127,6 +127,18 @@ def quiet_windows(windows: Windows, starts_s: tuple[float, ...] = ()) -> Quiet |
     return Quiet(rate < limit, calm, bias, limit, noise)
 
 
+def even_in_runs(windows: Windows, quiet: Quiet) -> BoolArray:
+    """Calm windows, shape (w,), whose rate is that of their run, which need not be the bias.
+
+    A unit whose bias changed rests as well.
+    """
+    even = quiet.calm.copy()
+    for a, b in runs_of(quiet.calm, windows.section):
+        rate = windows.rate[a:b]
+        even[a:b] = np.abs(rate - np.median(rate, axis=0)).max(axis=1) < quiet.limit
+    return even
+
+
 def _noise(windows: Windows) -> Noise:
     """Of the quietest seconds, by differences of windows that follow each other."""
     length = round(QUIET_S / WINDOW_S)

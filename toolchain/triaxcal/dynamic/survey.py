@@ -14,7 +14,7 @@ from triaxcal.dynamic.clipping import cut_at_clips
 from triaxcal.dynamic.plausibility import refuse_wrong_units
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.restless import no_rest, refuse_few_rests, refuse_missing_axis
-from triaxcal.dynamic.rests import REST_MIN_S, Quiet, guard_of, quiet_windows, runs_of
+from triaxcal.dynamic.rests import REST_MIN_S, Quiet, even_in_runs, guard_of, quiet_windows, runs_of
 from triaxcal.dynamic.stages import Stage, find_stages
 from triaxcal.dynamic.windows import WINDOW_S, Windows, read_windows
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
@@ -162,7 +162,7 @@ def survey(recording: ImuRecording) -> Survey:
         raise no_rest(recording.name, windows)
     stages, turning = find_stages(windows, quiet, recording)
     if stages:  # no hand holds the unit: what moves as slowly as one is the start of handling
-        quiet = replace(quiet, calm=quiet.calm & quiet.still)
+        quiet = replace(quiet, calm=even_in_runs(windows, quiet))
     use, guard = _used(windows, quiet, turning)
     rests = _rests(windows, use & quiet.calm)
     if not rests:
