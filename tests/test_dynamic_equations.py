@@ -57,8 +57,9 @@ def made(convention: str, p: np.ndarray) -> BlockEquations:
     return equations(Window(samples, 0, blocks, About(C, p, EARTH), frame))
 
 
-def test_every_block_together_makes_eighty_five_states() -> None:
-    assert 3 + len(LAYOUT) == 85
+def test_every_block_together_makes_a_hundred_and_six_states() -> None:
+    """85 of P2, and 6, 3, 9 and 3 of nonlinearity and asymmetry of both triads."""
+    assert 3 + len(LAYOUT) == 106
     assert 3 + len(Layout(BASE)) == 24
 
 

@@ -59,13 +59,14 @@ def test_a_plan_tells_the_deviations_of_its_recording(tmp_path: Path) -> None:
     """The same but for what the unit's errors change in the rows, and the noise in the heading.
 
     The errors are below 0.1 %. The heading is known to 0.004 rad and better: no row changes by 2 %.
+    Without noise a rest of 3.2 s may be longer by a window of 0.1 s at each end: 3.1 %.
     """
     folder = unit(tmp_path)
     planned = plan_unit(folder, lambda _step, _part: None)
     assert not (folder / "recording.csv").exists()
     write_simulated_recording(folder)
     recorded = calibrate_unit(folder)
-    np.testing.assert_allclose(planned.result.sd, recorded.result.sd, rtol=0.02)
+    np.testing.assert_allclose(planned.result.sd, recorded.result.sd, rtol=0.031)
     told = CliRunner().invoke(main, ["dynamic", str(folder), "--plan"])
     assert told.exit_code == 0
     assert "expected standard deviations from a recording of this motion" in told.output

@@ -67,9 +67,12 @@ def test_what_is_lost_or_bad_is_left_out_and_said(tmp_path: Path) -> None:
     recording = read(folder)
     kept = recording.all()
     gone = {100, 101, 200, 300, 301, 302}
-    assert len(kept) == len(sent) - len(gone)
-    numbers = np.rint((kept.time_s - kept.time_s[0]) * 50.0).astype(int)
-    assert set(range(900)) - set(numbers.tolist()) == gone
+    assert len(kept) == len(sent)
+    assert kept.turn_variance is not None
+    # Filled by interpolation: its uncertainty is more than nothing at these samples and beside them.
+    filled = set(np.flatnonzero(kept.turn_variance).tolist())
+    assert gone <= filled
+    assert len(filled) < 3 * len(gone)
     said = "; ".join(recording.findings)
     for text in (
         "1 frames with a wrong CRC", "3 samples with a status that is not good, left out",
