@@ -69,7 +69,7 @@ def test_what_is_lost_or_bad_is_left_out_and_said(tmp_path: Path) -> None:
     gone = {100, 101, 200, 300, 301, 302}
     assert len(kept) == len(sent)
     assert kept.turn_variance is not None
-    # Filled by interpolation: its uncertainty is more than nothing at these samples and beside them.
+    # Filled by interpolation, with an uncertainty that also touches the samples beside.
     filled = set(np.flatnonzero(kept.turn_variance).tolist())
     assert gone <= filled
     assert len(filled) < 3 * len(gone)

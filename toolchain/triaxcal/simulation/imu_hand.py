@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording, ImuSamples
 from triaxcal.model.types import FloatArray
@@ -87,8 +86,17 @@ class HandMotion:
 
 
 def _rotation(vector_rad: FloatArray) -> FloatArray:
-    """Matrix, shape (..., 3, 3), of a rotation vector, shape (..., 3)."""
-    matrix: FloatArray = Rotation.from_rotvec(vector_rad).as_matrix()
+    """Matrix, shape (..., 3, 3), of a rotation vector, shape (..., 3), by Rodrigues' formula."""
+    angle = np.linalg.norm(vector_rad, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vector_rad, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1)
+    cross = cross.reshape(*vector_rad.shape, 3)
+    matrix: FloatArray = (
+        np.eye(3)
+        + np.sinc(angle / np.pi) * cross
+        + 0.5 * np.sinc(angle / 2 / np.pi) ** 2 * (cross @ cross)
+    )
     return matrix
 
 
