@@ -37,7 +37,11 @@ def test_delivered_c_is_clean(plant: Planter, shape: str, check: object) -> None
     ("old", "new", "says"),
     [
         ("ux *= 256;", "ux *= 512;", "signed integer overflow"),
-        ("accel[0] = x;", "accel[0] = y;", "answers differ"),
+        (
+            "accel[0] = apply_row(state->row[0]",
+            "accel[0] = apply_row(state->row[1]",
+            "answers differ",
+        ),
     ],
 )
 def test_a_planted_mistake_is_found(
