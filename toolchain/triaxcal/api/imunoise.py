@@ -14,7 +14,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.columns import RecordedFile
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.noise import DEG_PER_H, MICRO_G, DataSheet, noise_section
-from triaxcal.dynamic.recording import ImuSamples
+from triaxcal.dynamic.recording import INCREMENT, ImuSamples
 from triaxcal.dynamic.several import read_recordings
 from triaxcal.noise.allan import FLICKER
 from triaxcal.noise.stretch import SAMPLES_MIN
@@ -43,8 +43,8 @@ def study_imu_noise(
     )
     samples = _longest(recorded.name, recording.all(), 1 / recording.rate_hz)
     step_s = 1 / recording.rate_hz
-    rate = samples.rate / (step_s if recording.rate_convention == "increment" else 1.0)
-    force = samples.force / (step_s if recording.force_convention == "increment" else 1.0)
+    rate = samples.rate / (step_s if recording.rate_convention == INCREMENT else 1.0)
+    force = samples.force / (step_s if recording.force_convention == INCREMENT else 1.0)
     gyro = study_noise(recorded.name, rate / DEG_PER_H, step_s, longest_tau_s)
     accel = study_noise(recorded.name, force / MICRO_G, step_s, longest_tau_s)
     head = f"{recorded.name}: {len(samples)} samples, one every {step_s:.6g} s; 95 % intervals"

@@ -90,6 +90,14 @@ SD_DEMANDS = (
 )  # fmt: skip
 
 
+def places_of(demand: SdDemand, layout: Layout) -> list[int]:
+    """Places of the states that a demand is about; none where their block is off."""
+    if demand.block not in layout:
+        return []
+    place, states = layout.place(demand.block), layout.states
+    return [i for i in range(place.start, place.stop) if states[i].unit == demand.unit]
+
+
 def demanded(limits: ImuLimits, layout: Layout) -> tuple[tuple[SdDemand, float, list[int]], ...]:
     """Demands of standard deviations that are stated: limit, and the places of their states.
 
@@ -98,12 +106,9 @@ def demanded(limits: ImuLimits, layout: Layout) -> tuple[tuple[SdDemand, float, 
     found = []
     for demand in SD_DEMANDS:
         limit = getattr(limits, demand.key)
-        if limit is None or demand.block not in layout:
-            continue
-        place = layout.place(demand.block)
-        states = layout.states
-        index = [i for i in range(place.start, place.stop) if states[i].unit == demand.unit]
-        found.append((demand, float(limit), index))
+        index = places_of(demand, layout)
+        if limit is not None and index:
+            found.append((demand, float(limit), index))
     return tuple(found)
 
 

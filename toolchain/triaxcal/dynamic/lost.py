@@ -67,7 +67,7 @@ def fill(known: IntArray, values: FloatArray, first: int, count: int) -> Hole | 
         if after < sides or after + sides > len(known):
             continue
         near = slice(after - sides, after + sides)
-        weights = _weights(known[near], hole)
+        weights = lagrange_weights(known[near], hole)
         variance = _tried(known, values, known[near], hole, weights.sum(axis=0))
         if variance is None:
             continue
@@ -83,8 +83,8 @@ def fill(known: IntArray, values: FloatArray, first: int, count: int) -> Hole | 
     return best
 
 
-def _weights(known: IntArray, wanted: IntArray) -> FloatArray:
-    """Lagrange's weights (wanted, known) of the polynomial through the known beats."""
+def lagrange_weights(known: IntArray, wanted: IntArray | FloatArray) -> FloatArray:
+    """Weights (wanted, known) of the polynomial through the known places, by Lagrange."""
     weights = np.ones((len(wanted), len(known)))
     for j, at in enumerate(known.tolist()):
         others = np.delete(known, j)

@@ -11,20 +11,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
+from triaxcal.dynamic.again import extended, task_again
 from triaxcal.dynamic.blocks.block import Extension
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.filterpass import EARTH_RATE_RAD_PER_S, run_pass
 from triaxcal.dynamic.imumodel import IN_MODEL
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.passdata import Reference, Task
 from triaxcal.dynamic.recording import ImuRecording
-from triaxcal.dynamic.wander import wander_of
 from triaxcal.model.types import FloatArray, IntArray
 
 SIGNIFICANCE = 1e-3
@@ -85,18 +84,11 @@ def missing_effects(
     added = tuple(block for extension in candidates for block in extension.blocks)
     layout = Layout((*result.layout.blocks, *added))
     known = len(result.layout)
-    p = np.concatenate([result.p, np.zeros(len(layout) - known)])
-    resets = layout.reset_columns()
-    stage_p = np.zeros((len(result.survey.stages), len(resets)))
-    stage_p[:, np.isin(resets, result.layout.reset_columns())] = result.stage_p
-    wander = wander_of(layout, result.noise, result.survey.duration_s)
-    frame = replace(result.frame, layout=wander.layout)
-    task = Task(recording, result.survey, frame, result.noise, wander)
-    start = Reference(p, stage_p, result.heading_rad)
+    start, task = extended(result, layout), task_again(recording, result, layout)
     done = run_pass(task, start, first=False, progress=progress)
     covariance = done.root @ done.root.T
     own = {e.name: _places(e, result.layout, layout) for e in candidates}
-    tested = _Tested(done.p - p, covariance, np.arange(known), own)
+    tested = _Tested(done.p - start.p, covariance, np.arange(known), own)
     shown = tested.chosen()
     found = []
     for extension in candidates:

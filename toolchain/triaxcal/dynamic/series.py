@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from triaxcal.dynamic.lost import LONGEST_S, Hole, fill, holes
+from triaxcal.dynamic.lost import LONGEST_S, Hole, fill, holes, lagrange_weights
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 from triaxcal.readings.evenclock import EvenClock, even_clock
 from triaxcal.readings.held import changed, moving
@@ -151,11 +151,7 @@ def at_times(series: Series, time_s: FloatArray) -> tuple[FloatArray, FloatArray
     start = series.time_s[first]
     x = (time_s - start) / ((series.time_s[first + _POINTS - 1] - start) / (_POINTS - 1))
     inside = in_row & (x >= -0.5) & (x <= _POINTS - 0.5)
-    weights = np.ones((len(time_s), _POINTS))
-    for j in range(_POINTS):
-        for other in range(_POINTS):
-            if other != j:
-                weights[:, j] *= (x - other) / (j - other)
+    weights = lagrange_weights(np.arange(_POINTS), x)
     values = np.einsum("nj,njc->nc", weights, series.values[index])
     variance = np.einsum("nj,njc->nc", np.abs(weights), series.variance[index])
     return values, variance, inside

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from triaxcal.dynamic.rests import runs_of
 from triaxcal.dynamic.survey import Section, Survey
 from triaxcal.dynamic.temperatures import Recorded
 from triaxcal.dynamic.windows import WINDOW_S
@@ -87,21 +88,19 @@ def _parts(
 ) -> Iterator[Section]:
     windows = found.windows
     own = (windows.section == number) & (windows.first >= section.first)
-    still = np.flatnonzero(own & found.still & found.use)
-    runs = np.split(still, np.flatnonzero(np.diff(still) > 1) + 1)
     start = section
     at = int(nodes.nearest(float(np.interp(section.start_s, recorded.start_s, recorded.degc))))
-    for run in runs:
-        if len(run) < round(REST_S / WINDOW_S):
+    for a, b in runs_of(own & found.still & found.use, windows.section):
+        if b - a < round(REST_S / WINDOW_S):
             continue
-        begin_s = float(windows.start_s[run[0]])
+        begin_s = float(windows.start_s[a])
         node = int(nodes.nearest(float(np.interp(begin_s, recorded.start_s, recorded.degc))))
-        if node == at or windows.first[run[0]] <= start.first:
+        if node == at or windows.first[a] <= start.first:
             continue
-        first = int(windows.first[run[0]])
+        first = int(windows.first[a])
         yield replace(start, last=first - 1)
-        rate, force = windows.rate[run].mean(axis=0), windows.force[run].mean(axis=0)
-        still_s = float(windows.duration_s[run].sum())
+        rate, force = windows.rate[a:b].mean(axis=0), windows.force[a:b].mean(axis=0)
+        still_s = float(windows.duration_s[a:b].sum())
         start = Section(first, section.last, begin_s, still_s, rate, force)
         at = node
     yield start

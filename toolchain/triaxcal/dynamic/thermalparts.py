@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from triaxcal.dynamic.again import task_again
 from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.filterpass import run_pass
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.passdata import Reference, Task
+from triaxcal.dynamic.passdata import Reference
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.survey import Section
-from triaxcal.dynamic.wander import wander_of
 from triaxcal.model.types import FloatArray
 
 
@@ -74,12 +74,10 @@ def information_of_parts(
     layout = constants_of(result)
     searching = Layout((*layout.blocks, north.BLOCK))
     p = np.concatenate([result.p[: len(layout)], np.zeros(len(searching) - len(layout))])
-    wander = wander_of(searching, result.noise, result.survey.duration_s)
-    frame = replace(result.frame, layout=wander.layout)
+    whole = task_again(recording, result, searching)
     found = []
     for number, sections in enumerate(parts):
-        survey = replace(result.survey, sections=sections)
-        task = Task(recording, survey, frame, result.noise, wander)
+        task = replace(whole, survey=replace(result.survey, sections=sections))
         done = run_pass(task, Reference(p, result.stage_p, None), first=False)
         found.append(_information(layout, done.p, done.root @ done.root.T))
         if progress is not None:

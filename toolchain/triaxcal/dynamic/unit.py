@@ -90,14 +90,14 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
         range is beyond the temperatures that were recorded; where recordings are of two units.
     """
     report = progress or (lambda _step, _part: None)
-    unit, recording = upright(unit, read_recordings(unit))
-    temperatures = recorded_temperatures(recording)
+    unit, whole = upright(unit, read_recordings(unit))
+    recording, temperatures = whole, recorded_temperatures(whole)
     unknown = refuse_beyond(unit, temperatures)
     full, over = _solve(unit, recording, temperatures, report)
     if over is not None:
         recording, unknown = over.recording, (*unknown, *over.over.findings)
     functions = None if over is None else over.functions
-    moved = None if temperatures is None else recorded_temperatures(recording)
+    moved = temperatures if recording is whole else recorded_temperatures(recording)
     differ = refuse_others(recordings_differ(recording, full, moved, functions))
     result = full if over is None else over.shown
     off = missing_effects(recording, full, lambda part: report("effects off", part))

@@ -11,14 +11,14 @@ from scipy.stats import chi2
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.limits import ImuLimits
 from triaxcal.dynamic.missing import Effect
+from triaxcal.dynamic.noise import DEG_PER_H
 from triaxcal.evidence.check import MODEL_TOLERANCE, SHARE, Check
 from triaxcal.evidence.heldout import HeldOut
 from triaxcal.evidence.prediction import LENGTH, ROWS
 from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
 
 EARTH_DEG_PER_H = 15.04
-DEG_PER_H = math.pi / 180 / 3600
-STANDARD_G = 9.80665
 MOVES_SD = 1.96
 """An effect that is off matters where it moves a constant out of its own 95 % interval."""
 LESS_NOISE = 0.5
@@ -96,13 +96,16 @@ def held_out_checks(held: HeldOut, limits: ImuLimits) -> Iterator[Check]:
     angle = np.linalg.norm(y[turn].reshape(-1, 2), axis=1)
     angle_sd = np.sqrt((sd[turn].reshape(-1, 2) ** 2).mean(axis=1))
     yield _turns(np.degrees(angle), np.degrees(angle_sd), chi_square(y, covariance, turn))
-    yield from _demanded(np.abs(y[rest]) / STANDARD_G, np.degrees(angle), limits)
+    yield from _demanded(np.abs(y[rest]) / STANDARD_GRAVITY_M_PER_S2, np.degrees(angle), limits)
 
 
 def _rests(error: FloatArray, sd: FloatArray, value: float) -> Check:
     """| |a| - g |, m/s^2."""
     limit, worst = largest(len(error)), int(np.argmax(np.abs(error) / sd))
-    size, its = abs(error[worst]) / STANDARD_G * 1e6, sd[worst] / STANDARD_G * 1e6
+    size, its = (
+        abs(error[worst]) / STANDARD_GRAVITY_M_PER_S2 * 1e6,
+        sd[worst] / STANDARD_GRAVITY_M_PER_S2 * 1e6,
+    )
     return Check(
         "held-out rests", value <= limit,
         f"|a| - g of {counted(len(error), 'rest')}: {size:.3g} micro-g at the worst, where "

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from triaxcal.dynamic.again import extended, task_again
 from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.filterpass import Progress, run_pass
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.passdata import Reference, Task
-from triaxcal.dynamic.wander import wander_of
+from triaxcal.dynamic.passdata import Reference
 from triaxcal.evidence.case import Case
 from triaxcal.evidence.prediction import Predicted, StretchWatch
 from triaxcal.evidence.stretches import EVERY, stretches_of, without
@@ -79,19 +79,18 @@ def held_out_every(
     `layout` may have further blocks after those of the result; the pass is linear about zero in
     their states.
     """
-    recording, noise, result = case.recording, case.noise, case.result
+    result = case.result
     layout = layout or result.layout
     start = extended(result, layout)
     if north_of_each(result):
         start.p[layout.place(north.BLOCK.name)] = 0.0
     stretches = stretches_of(result.survey, every)
-    wander = wander_of(layout, noise, result.survey.duration_s)
-    frame = replace(result.frame, layout=wander.layout)
+    whole = task_again(case.recording, result, layout, case.noise)
     found = without(result.survey, stretches)
     cuts = tuple(stretch.after.start_s for stretch in stretches)
     for _ in range(PASSES_MAX if layout is result.layout else 1):
-        watch = StretchWatch(stretches, frame, noise, wander, _end_s(result))
-        task = Task(recording, found, frame, noise, wander, cuts, watch)
+        watch = StretchWatch(stretches, whole.frame, whole.noise, whole.wander, _end_s(result))
+        task = replace(whole, survey=found, cuts_s=cuts, watch=watch)
         done = run_pass(task, start, first=False, progress=progress)
         predicted = watch.end()
         if not predicted:
@@ -131,12 +130,3 @@ def unseen_north(result: DynamicResult) -> Callable[[Predicted], Predicted]:
 def _end_s(result: DynamicResult) -> float:
     windows = result.survey.windows
     return float(windows.start_s[-1] + windows.duration_s[-1])
-
-
-def extended(result: DynamicResult, layout: Layout) -> Reference:
-    """The result as the reference of a pass with further blocks, whose states are zero."""
-    p = np.concatenate([result.p, np.zeros(len(layout) - len(result.layout))])
-    resets = layout.reset_columns()
-    stage_p = np.zeros((max(1, len(result.survey.stages)), len(resets)))
-    stage_p[:, np.isin(resets, result.layout.reset_columns())] = result.stage_p
-    return Reference(p, stage_p, result.heading_rad)

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
+from triaxcal.dynamic.rests import runs_of
 from triaxcal.dynamic.survey import Survey
 from triaxcal.model.types import BoolArray, FloatArray
 
@@ -51,26 +50,19 @@ def rests_of(found: Survey) -> tuple[tuple[Rest, ...], ...]:
 
     Their rate is that of rest: where a hand begins to lift slowly, |a| is not g.
     """
-    windows, marked = found.windows, found.still & found.use
-    sections = []
-    for number in range(len(found.sections)):
-        inside = np.flatnonzero(windows.section == number)
-        runs = np.split(inside, np.flatnonzero(np.diff(marked[inside].astype(int))) + 1)
-        rests = []
-        for run in runs:
-            if len(run) and marked[run[0]]:
-                end_s = float(windows.start_s[run[-1]] + windows.duration_s[run[-1]])
-                rests.append(Rest(float(windows.start_s[run[0]]), end_s))
-        sections.append(tuple(r for r in rests if r.end_s - r.start_s >= REST_MIN_S))
-    return tuple(sections)
+    windows = found.windows
+    sections: list[list[Rest]] = [[] for _ in found.sections]
+    for a, b in runs_of(found.still & found.use & (windows.section >= 0), windows.section):
+        end_s = float(windows.start_s[b - 1] + windows.duration_s[b - 1])
+        rest = Rest(float(windows.start_s[a]), end_s)
+        if rest.end_s - rest.start_s >= REST_MIN_S:
+            sections[windows.section[a]].append(rest)
+    return tuple(map(tuple, sections))
 
 
 def at_rest(found: Survey) -> BoolArray:
     """Windows of the rests, shape (w,)."""
-    marked = np.zeros(len(found.windows.first), dtype=bool)
-    for rest in found.rests:
-        marked[rest.first : rest.end] = True
-    return marked & found.use
+    return found.resting & found.use
 
 
 def stretches_of(found: Survey, every: int = EVERY) -> tuple[Stretch, ...]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from triaxcal.dynamic.again import extended, task_again
 from triaxcal.dynamic.filterpass import run_pass
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.passdata import Task
 from triaxcal.dynamic.survey import Survey
-from triaxcal.dynamic.wander import wander_of
 from triaxcal.evidence.case import Case
-from triaxcal.evidence.heldout import HeldOut, extended, held_out_every
+from triaxcal.evidence.heldout import HeldOut, held_out_every
 from triaxcal.model.types import IntArray
 
 
@@ -66,9 +65,8 @@ def innovations_again(
     """
     result = case.result
     layout = layout or result.layout
-    wander = wander_of(layout, case.noise, result.survey.duration_s)
-    frame = replace(result.frame, layout=wander.layout)
-    task = Task(case.recording, found or result.survey, frame, case.noise, wander, cuts_s)
+    task = task_again(case.recording, result, layout, case.noise)
+    task = replace(task, survey=found or result.survey, cuts_s=cuts_s)
     if renewed is not None:
         task = replace(task, renewed=renewed)
     done = run_pass(task, extended(result, layout), first=False)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.limits import SD_DEMANDS, ImuLimits
+from triaxcal.dynamic.limits import SD_DEMANDS, ImuLimits, places_of
 from triaxcal.model.types import FloatArray
 
 
@@ -76,12 +76,10 @@ def goals_of(limits: ImuLimits, layout: Layout) -> tuple[Goal, ...]:
     """What [limits] demands of the constants of a layout; inf where it demands nothing."""
     found = []
     for kind in SD_DEMANDS:
-        if kind.block not in layout:
-            continue
-        demand, place = getattr(limits, kind.key), layout.place(kind.block)
-        units = [state.unit for state in layout.states]
-        mine = tuple(i for i in range(place.start, place.stop) if units[i] == kind.unit)
-        found.append(Goal(kind.words, kind.unit, math.inf if demand is None else demand, mine))
+        demand, places = getattr(limits, kind.key), tuple(places_of(kind, layout))
+        if places:
+            most = math.inf if demand is None else demand
+            found.append(Goal(kind.words, kind.unit, most, places))
     return tuple(found)
 
 

@@ -23,6 +23,7 @@ from triaxcal.readings.format import PIECE, Block, Source
 from triaxcal.rig.bus.frames import ERR_FLAG, concatenate
 from triaxcal.rig.check.census import Census
 from triaxcal.rig.description.recorded import ACCELERATIONS, RATES, Recorded, unit_of
+from triaxcal.rig.description.resolve import AXES, GYROS
 from triaxcal.rig.description.rigfile import read_description
 from triaxcal.rig.logs.linelog import frames_of_log
 from triaxcal.rig.logs.logfile import Left
@@ -38,8 +39,6 @@ from triaxcal.rig.samples.samples import (
 )
 from triaxcal.rig.samples.undetected import undetected
 
-_AXES = ("x", "y", "z")
-GYROS = ("gyro_x", "gyro_y", "gyro_z")
 _TEMPERATURE, _TIME, SAMPLE_TIME, _CODE = "temperature", "time", "sample_time", "_code"
 _NAMED = {"m/s^2", "g", "mg", "deg/s", "rad/s", "deg/h"}
 """Units that unit.toml names."""
@@ -75,7 +74,7 @@ class RiggedLog(Source):
     def __init__(self, path: Path, name: str) -> None:
         self._path = path
         self._rig = rig = read_description(path.parent / name)
-        recorded: dict[str, Recorded] = dict(zip((*_AXES, *GYROS), rig.sampled, strict=False))
+        recorded: dict[str, Recorded] = dict(zip((*AXES, *GYROS), rig.sampled, strict=False))
         if rig.temperature is not None:
             recorded[_TEMPERATURE] = rig.temperature
         self._recorded = recorded
@@ -85,7 +84,7 @@ class RiggedLog(Source):
         self.clocks = {"sample": (0, "ns")}
         units = {key: unit_of(what.unit) for key, what in recorded.items()}
         self._factors: dict[str, float] = {}
-        for keys, table, unit in ((_AXES, ACCELERATIONS, "g"), (GYROS, RATES, "deg/s")):
+        for keys, table, unit in ((AXES, ACCELERATIONS, "g"), (GYROS, RATES, "deg/s")):
             factors = _to_one_unit([recorded[key] for key in keys if key in recorded], table)
             self._factors |= dict(zip(keys, factors, strict=False))
             if any(factor != 1.0 for factor in factors):
@@ -166,7 +165,7 @@ class RiggedLog(Source):
     def _columns(self, samples: Samples, temps: FloatArray) -> dict[str, Any]:
         """All columns of a batch of samples but their times by number."""
         found: dict[str, Any] = {_TIME: samples.t_ns}
-        sent = dict(zip(_AXES, samples.codes.T, strict=True)) | {_TEMPERATURE: temps}
+        sent = dict(zip(AXES, samples.codes.T, strict=True)) | {_TEMPERATURE: temps}
         sent |= dict(zip(GYROS, samples.gyros.T, strict=False))
         for key, what in self._recorded.items():
             values, factor = sent[key] * what.step + what.zero, self._factors.get(key, 1.0)
