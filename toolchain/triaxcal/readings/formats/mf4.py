@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from traceback import walk_tb
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from triaxcal.unit.recordingfile import FileLayout
 class _Mf4(Source):
     def __init__(self, path: Path, layout: FileLayout) -> None:  # noqa: ARG002
         self._path, self._file = path, _opened(path)
+        # An MDF is part of a cycle: without this its file would be left to the garbage collection.
+        finalize(self, self._file.close)
         groups = self._file.groups
         self._place = [(g, c) for g in range(len(groups)) for c in range(len(groups[g].channels))]
         titles = [_title(g, group) for g, group in enumerate(groups)]
