@@ -11,12 +11,12 @@ C^T (x'' + 2 u x x' + g) and turns at rate + C^T u against inertial space. Nothi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
-from dynamic_cases import recording_of
+from dynamic_cases import recording_of, sheet
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import ImuRecording, ImuSamples
 from triaxcal.simulation.imu_grades import GRADES, draw_truth
@@ -130,9 +130,8 @@ def record(truth: ImuTruth, hand: Hand, seed: int) -> ImuRecording:
 
 
 def stated(truth: ImuTruth) -> DataSheet:
-    """The white noise of the unit; `record` counts nothing."""
-    noise = truth.noise
-    return DataSheet(noise.gyro_arw_deg_per_sqrt_h, noise.accel_vrw_ug_per_sqrt_hz)
+    """The noise of the unit: white alone; `record` counts nothing."""
+    return replace(sheet(truth), accel_lsb=0.0, table_sd_arcsec=None)
 
 
 @cache
