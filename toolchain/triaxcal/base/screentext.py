@@ -41,6 +41,11 @@ def _broken(head: str, width: int) -> list[str]:
     return textwrap.wrap(head, max(width, longest, 1)) or [""]
 
 
+def counted(number: int, thing: str) -> str:
+    """As "1 rest", "2 rests"."""
+    return f"{number} {thing}{'s' * (number != 1)}"
+
+
 def wrapped(text: str, width: int) -> str:
     """`text` with each line of prose that is longer than `width` broken between words.
 

@@ -1,12 +1,12 @@
 """Bias instability from the recording, where [noise] does not state it.
 
-Poses of some seconds do not show it by themselves: a mean over 3 s scatters by white noise several
+A pose of some seconds alone does not show it: a mean over 3 s scatters by white noise several
 times as much. All of them together do. The likelihood of a recording's innovations (`tape`)
 says how much biases wander within it. With what is known of a sensor beforehand it gives a
 distribution of B, for each triad, and the root of the expected B^2 is used: the variance that the
 filter adds is then the expected one. Where the recording speaks against such a sensor, and for one
-without any flicker, at odds of `AGAINST`, there is none. Where it cannot tell, B is that of a usual
-sensor.
+without any flicker, at odds of `AGAINST`, there is none. Where it does not decide, B is that
+of a usual sensor.
 
 Beforehand ln B is normal with the standard deviation 1. In its middle white noise and flicker have
 equal Allan deviations at `USUAL_S`,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from triaxcal.base.screentext import counted
 from triaxcal.dynamic.series import Series
 from triaxcal.model.types import FloatArray
 
@@ -62,7 +63,7 @@ class Part:
         return round(math.log(self.series.step_s), 1), "rate" not in self.places
 
 
-def holes_told(part: Part) -> list[str]:
+def hole_words(part: Part) -> list[str]:
     """What was filled, and what was not."""
     series, words = part.series, []
     if series.lost:
@@ -70,16 +71,15 @@ def holes_told(part: Part) -> list[str]:
         unsure = f", the angle over the worst to {math.degrees(sd):.2g} deg"
         unsure *= "rate" in part.places
         words.append(
-            f"{series.lost} sample{'s' * (series.lost != 1)} of the {part.words} lost in "
-            f"{series.places} place{'s' * (series.places != 1)}, at most "
+            f"{counted(series.lost, 'sample')} of the {part.words} lost in "
+            f"{counted(series.places, 'place')}, at most "
             f"{1e3 * series.longest_s:.3g} ms: interpolated{unsure}"
         )
     if series.gaps:
         at_s, longest_s = max(series.gaps, key=lambda gap: gap[1])
-        count = len(series.gaps)
         words.append(
-            f"{count} gap{'s' * (count != 1)} in the {part.words}, the longest {longest_s:.3g} s "
-            f"at {at_s:.6g} s: nothing is taken from one side to the other"
+            f"{counted(len(series.gaps), 'gap')} in the {part.words}, the longest "
+            f"{longest_s:.3g} s at {at_s:.6g} s: nothing is taken from one side to the other"
         )
     return words
 
@@ -91,8 +91,3 @@ def between(time_s: FloatArray, values: FloatArray, wanted_s: FloatArray) -> Flo
     if len(there) == 0:
         return np.full(len(wanted_s), np.nan)
     return np.interp(wanted_s, time_s[there], values[there])
-
-
-def rows_told(count: int) -> str:
-    """As "1 row", "3 rows"."""
-    return f"{count} row{'s' * (count != 1)}"

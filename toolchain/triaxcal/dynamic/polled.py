@@ -55,7 +55,7 @@ def at_least_seen(recording: ImuRecording, noise: DataSheet) -> DataSheet:
     return noise
 
 
-def told(name: str, density: float) -> str:
+def density_words(name: str, density: float) -> str:
     """For the report."""
     value = (
         f"{math.degrees(density) * 60:.3g} deg/sqrt(h)"

@@ -76,16 +76,16 @@ def offsets_of(table: ReadTable, quantities: tuple[Quantity, ...]) -> dict[str, 
     return found
 
 
-def offsets_told(offsets: Mapping[str, FloatArray], quantities: tuple[Quantity, ...]) -> list[str]:
+def offset_words(offsets: Mapping[str, FloatArray], quantities: tuple[Quantity, ...]) -> list[str]:
     """What was taken off, for the report."""
-    told = []
+    words = []
     for quantity in (q for q in quantities if q.name in offsets):
         counts = abs(float(offsets[quantity.name][0] / quantity.convert(np.ones((1, 3)))[0, 0]))
-        told.append(
+        words.append(
             f"{quantity.key}: counts without sign, {counts:.0f} is taken off as the middle of the "
             "range"
         )
-    return told
+    return words
 
 
 def quantities_of(values: Values, found: DynamicTable) -> tuple[Quantity, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.parts import Log
-from triaxcal.dynamic.quantities import FORCES, offsets_of, offsets_told
+from triaxcal.dynamic.quantities import FORCES, offset_words, offsets_of
 from triaxcal.dynamic.recording import INCREMENT, ImuRecording, ImuSamples
 from triaxcal.dynamic.repair import UNEVEN, repaired
 from triaxcal.model.types import FloatArray
@@ -49,7 +49,7 @@ def read_recording(unit: DynamicDescription) -> ImuRecording:
             raise RefusedError(table.source, "holds fewer than three samples")
     offsets = {k: v for table, own in tables for k, v in offsets_of(table, own).items()}
     findings = [word for table, _ in tables for word in table.findings]
-    findings += offsets_told(offsets, unit.quantities)
+    findings += offset_words(offsets, unit.quantities)
     _refuse_time_unit(unit, tables[0][0])
     about = ImuRecording(
         name=str(path),

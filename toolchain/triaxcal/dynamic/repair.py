@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.parts import NAMES, Log, Part, between, holes_told, rows_told
-from triaxcal.dynamic.polled import told, white_density
+from triaxcal.base.screentext import counted
+from triaxcal.dynamic.parts import NAMES, Log, Part, between, hole_words
+from triaxcal.dynamic.polled import density_words, white_density
 from triaxcal.dynamic.recording import ImuSamples
 from triaxcal.dynamic.series import at_times, held_series, series_of
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
@@ -84,9 +85,9 @@ def repaired(logs: Sequence[Log]) -> Repaired:
         if part.held or part.series.step_s > SLOWER * step_s:
             own = {n: white_density(part.series, p) for n, p in part.places.items()}
             seen |= own
-            findings += [f"{NAMES[n]}: {told(n, density)}" for n, density in own.items()]
+            findings += [f"{NAMES[n]}: {density_words(n, density)}" for n, density in own.items()]
         values, variance = part.series.values, part.series.variance
-        findings += holes_told(part)
+        findings += hole_words(part)
         if part is not base:
             values, variance, there = at_times(part.series, time_s)
             inside &= there
@@ -119,6 +120,10 @@ def repaired(logs: Sequence[Log]) -> Repaired:
     return Repaired(samples, 1 / step_s, min(force_hz, 1 / step_s), tuple(findings), seen)
 
 
+def _rows(count: int) -> str:
+    return counted(count, "row")
+
+
 def _groups(log: Log) -> list[tuple[str, ...]]:
     """Triads that have one clock, by the rows that have their readings."""
     names = [name for name in NAMES if name in log.columns]
@@ -142,12 +147,12 @@ def _parts(log: Log, names: tuple[str, ...]) -> tuple[list[Part], list[str]]:
     words = []
     if not whole.all() and len(names) == len(log.columns.keys() & NAMES.keys()):
         words.append(
-            f"{rows_told(int((~whole).sum()))} without all readings left out, the first is "
+            f"{_rows(int((~whole).sum()))} without all readings left out, the first is "
             f"{log.row_word} {int(log.rows[np.argmin(whole)])}"
         )
     if whole.sum() < _LEAST:
         raise RefusedError(
-            log.source, f"{rows_told(int(whole.sum()))} with readings of {' and '.join(names)}"
+            log.source, f"{_rows(int(whole.sum()))} with readings of {' and '.join(names)}"
         )
     rows = np.flatnonzero(whole)
     clock, stamps_s, values, more = _in_order(log, rows, values[rows])
@@ -197,7 +202,7 @@ def _unheld(
             known = ~np.logical_or.reduce([stuck(values[:, place]) for place in places.values()])
         if not known.all():
             words.append(
-                f"{rows_told(int((~known).sum()))} with the readings of the row before while the "
+                f"{_rows(int((~known).sum()))} with the readings of the row before while the "
                 "unit moves: taken as lost"
             )
         return [Part(places, series_of(clock, values, known, _turns(places)))]
@@ -245,8 +250,8 @@ def _refuse_increments(log: Log, parts: Sequence[Part]) -> None:
     if series.lost:
         raise RefusedError(
             log.source,
-            f"{rows_told(series.lost)} lost in {series.places} "
-            f"place{'s' * (series.places != 1)}, the first at {series.first_s:.6g} s",
+            f"{_rows(series.lost)} lost in {counted(series.places, 'place')}, the first at "
+            f"{series.first_s:.6g} s",
             expected="every increment, because the increments are summed",
             remedy="record again, or cut the recording there",
         )

@@ -31,7 +31,7 @@ SHAKEN = 6.0
 """Samples that scatter within a window by so many times the quietest seconds' are shaken."""
 SHAKEN_M_PER_S2 = 0.1
 QUIET_S = 1.0
-"""A stretch so long tells the bias from an even turn."""
+"""In a stretch so long an even turn differs from a bias."""
 QUIETEST = 0.1
 """Part of all seconds that is surely at rest, to know the noise by."""
 REST_MIN_S = 0.5

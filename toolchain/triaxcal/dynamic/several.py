@@ -19,7 +19,7 @@ from triaxcal.dynamic.recording import ImuRecording, ImuSamples
 BREAK_S = 3600.0
 """From the end of a recording to the start of the next: the filter counts time through all."""
 RATE_TOLERANCE = 0.01
-"""Of the sampling rate, between recordings: a gap is told from an interval by it."""
+"""Of the sampling rate, between recordings: by it a gap is longer than an interval."""
 
 
 @dataclass(frozen=True)

@@ -247,14 +247,14 @@ def _sections(
         rate = windows.rate[rest.first : rest.end].mean(axis=0)
         numbers[number] = len(sections)
         sections.append(Section(begin, last, rest.start_s, rest.duration_s, rate, rest.force))
-    return sections, numbers, _told(lost_s)
+    return sections, numbers, _lost_words(lost_s)
 
 
-def _told(lost_s: list[tuple[float, float]]) -> list[str]:
+def _lost_words(lost_s: list[tuple[float, float]]) -> list[str]:
     """What is said of starts and lengths of what is before the first rest of a section."""
     if not lost_s:
         return []
     places = f" in {len(lost_s)} places" if len(lost_s) > 1 else ""
     total_s = sum(length for _, length in lost_s)
-    told = f"{total_s:.1f} s{places} are not used, the first at {lost_s[0][0]:.1f} s"
-    return [f"{told}: what is before the first rest, and between a gap and the next one"]
+    words = f"{total_s:.1f} s{places} are not used, the first at {lost_s[0][0]:.1f} s"
+    return [f"{words}: what is before the first rest, and between a gap and the next one"]

@@ -2,7 +2,7 @@
 
 A sensor at rest reads the specific force, +g along the axis that points up. Some logs hold gravity
 itself, with the other sign. Reversed forces turn in the unit exactly as the right ones do,
-f' = -w x f, so no turn tells them apart. A mirrored triad is another matter: one or two
+f' = -w x f, so that no turn shows the difference. A mirrored triad is another matter: one or two
 of its signs are turned, and its forces do not turn as the gyros say.
 """
 
@@ -43,12 +43,12 @@ def upright(
     force = first_rest(read_windows(recording)[0])
     if up is None:
         axis = int(np.argmax(np.abs(force)))
-        told = (
+        said = (
             f"{'xyz'[axis]} reads {force[axis]:+.4g} m/s^2 at the first rest and is taken to point "
             f"{'up' if force[axis] > 0 else 'down'}: forces of reversed sign would look the same, "
             "and up_at_start is not given"
         )
-        return unit, replace(recording, findings=(*recording.findings, told))
+        return unit, replace(recording, findings=(*recording.findings, said))
     axis, sign = "xyz".index(up[1]), 1.0 if up[0] == "+" else -1.0
     share = sign * float(force[axis]) / float(np.linalg.norm(force))
     if abs(share) < ALONG:
@@ -62,7 +62,7 @@ def upright(
         )
     if share > 0:
         return unit, recording
-    told = (
+    said = (
         f"forces reversed: {'xyz'[axis]} reads {force[axis]:+.4g} m/s^2 at the first rest and "
         f"up_at_start is {up}; all their signs are turned"
     )
@@ -70,7 +70,7 @@ def upright(
     return replace(unit, quantities=quantities), replace(
         recording,
         pieces=lambda: _reversed(recording),
-        findings=(*recording.findings, told),
+        findings=(*recording.findings, said),
     )
 
 

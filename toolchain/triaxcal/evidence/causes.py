@@ -2,7 +2,7 @@
 
 A trial repeats the failed tests as if its cause were there and allowed for. It explains the failure
 where every chi-square then keeps its limit. Of those that describe all of the recording the most
-likely is named; causes that leave much the same cannot be told apart. Those that leave a part out,
+likely is named; causes that leave much the same are named together. Those that leave a part out,
 or change the noise, have evidence of their own, and are named beside it.
 """
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.stats import chi2
 
+from triaxcal.base.screentext import counted
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.limits import ImuLimits
 from triaxcal.dynamic.missing import Effect
@@ -24,11 +25,6 @@ MOVES_SD = 1.96
 LESS_NOISE = 0.5
 """Mean square of the innovations: below it the stated noise is too large, and so is every standard
 deviation."""
-
-
-def counted(number: int, thing: str) -> str:
-    """As "1 rest", "2 rests"."""
-    return f"{number} {thing}{'s' * (number != 1)}"
 
 
 def largest(freedom: int) -> float:

@@ -54,7 +54,7 @@ class Jump:
         )
 
 
-REMEDY = "calibrate both parts each for itself"
+REMEDY = "calibrate each part alone"
 
 
 class Change:
@@ -63,7 +63,7 @@ class Change:
     name = "a change of the constants"
 
     def of(self, case: Case, _held: HeldOut | None, /) -> Suspect | None:
-        """New biases at the largest jump of the gyros at rest, or both parts by themselves."""
+        """New biases at the largest jump of the gyros at rest, or each part alone."""
         jump = largest_jump(case.result.survey, case.noise)
         if jump is None:
             return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from triaxcal.base.progress import Progress
+from triaxcal.base.screentext import counted
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.imumodel import IN_MODEL
@@ -16,7 +17,6 @@ from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.evidence.case import Case
 from triaxcal.evidence.causes import causes_of
 from triaxcal.evidence.chance import (
-    counted,
     earth,
     effects_off,
     held_out_checks,

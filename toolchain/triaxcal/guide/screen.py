@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 
+from triaxcal.base.screentext import counted
 from triaxcal.guide.goals import Standing
 from triaxcal.guide.guide import Guide
 from triaxcal.guide.turns import up_words
@@ -24,7 +25,7 @@ def bar(part: float) -> str:
 def screen_lines(guide: Guide, unit: str, seconds: float) -> list[str]:
     """Lines of at most `WIDTH` characters."""
     minutes, rest = divmod(int(seconds), 60)
-    head = f"{unit}   {minutes} min {rest:02d} s   {_count(guide.rests, 'rest')}"
+    head = f"{unit}   {minutes} min {rest:02d} s   {counted(guide.rests, 'rest')}"
     return [head[:WIDTH], "", *_order_lines(guide), "", *_goal_lines(guide)]
 
 
@@ -72,10 +73,6 @@ def _number(value: float) -> str:
         return "0"
     places = max(0, 2 - math.floor(math.log10(abs(value))))
     return f"{value:.{min(places, 6)}f}"
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'s' * (number != 1)}"
 
 
 def status_line(guide: Guide) -> str:

@@ -35,6 +35,11 @@ def step_of(stamps_s: FloatArray) -> float:
     return float(steps[near].mean()) if near.sum() > 0.9 * len(steps) else about
 
 
+def consecutive(rows: IntArray) -> list[IntArray]:
+    """Rising numbers of rows, cut where they do not follow each other."""
+    return np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []
+
+
 def numbered(stamps_s: FloatArray, step_s: float) -> IntArray:
     """Beats since the first row, shape (n,)."""
     steps = np.diff(stamps_s) / step_s
@@ -70,7 +75,7 @@ def _lost_after(stamps_s: FloatArray, step_s: float) -> FloatArray:
         limit[[k, count - 2 - k]] = max(0.5, _SURELY * 1.25 * sd / np.sqrt(k + 1))
     stays = np.flatnonzero(after - before > limit)
     steps = np.diff(stamps_s) / step_s - 1.0
-    for run in np.split(stays, np.flatnonzero(np.diff(stays) > 1) + 1) if len(stays) else ():
+    for run in consecutive(stays):
         beats = int(np.rint(after[run[-1]] - before[run[0]]))
         for _ in range(beats):
             # One after the other at the longest step that is left: several may be lost close by.

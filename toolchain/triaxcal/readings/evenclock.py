@@ -17,7 +17,7 @@ import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
-from triaxcal.readings.beats import CLEAN, PAUSE_S, REACH, SPAN, numbered
+from triaxcal.readings.beats import CLEAN, PAUSE_S, REACH, SPAN, consecutive, numbered
 
 EXACT = 1e-3
 """Of a step: stamps that are nearer to the even clock than this stay as they are."""
@@ -25,7 +25,7 @@ _ROUNDS = 5
 _BIN = 200
 _ORDER_MAX = 5
 _FASTEST = 0.9
-"""Quantile of the change of the readings, above which they tell when they were taken."""
+"""Quantile of the change of the readings, above which they show when they were taken."""
 _BETTER = 0.8
 """Of the squares that are missed: both times miss by noise where nothing moves."""
 _EXACT_S = 1e-9
@@ -43,7 +43,7 @@ _FEW = 6
 _ROUNDED = 0.75
 """Of a tick: what rounding and a slow curve leave."""
 _LAGS = (16, 64)
-"""Rows over which differences are taken, to tell what adds up."""
+"""Rows over which differences are taken, to see what adds up."""
 _STEADY = 2e-3
 """Of the jitter's variance: steps that add up to less over 500 rows are seen by the slow curve."""
 _LOOSE = 4.0
@@ -99,8 +99,8 @@ def even_clock(stamps_s: FloatArray, step_s: float) -> EvenClock:
 def taken_at_stamps(stamps_s: FloatArray, clock: EvenClock, values: FloatArray) -> bool:
     """Whether the readings (n, columns) say that the stamps are right and the samples uneven.
 
-    Each reading is foretold by the cubic through the four around it, once at the stamps and once at
-    even times. Where the readings change fastest, the wrong times miss by more.
+    Each reading is predicted by the cubic through the four around it, once at the stamps and once
+    at even times. Where the readings change fastest, the wrong times miss by more.
     """
     if not clock.smoothed:
         return False
@@ -194,8 +194,8 @@ def _restarts(stamps_s: FloatArray, number: IntArray, step_s: float) -> IntArray
     if len(rows) > _RESTARTS_MAX * len(late):
         return np.zeros(0, dtype=np.int64)  # it drifts all the time
     step = np.abs(np.diff(late, prepend=late[0]))
-    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []
-    return np.array([run[int(np.argmax(step[run]))] for run in runs], dtype=np.int64)
+    largest = [run[int(np.argmax(step[run]))] for run in consecutive(rows)]
+    return np.array(largest, dtype=np.int64)
 
 
 def _curve(beat: FloatArray, late: FloatArray) -> FloatArray:

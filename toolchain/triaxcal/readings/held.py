@@ -17,7 +17,7 @@ _NEAR = 4
 _COUNTS = 25.0
 """Over `2 _NEAR` rows a moving triad changes by so many of its smallest steps: three a row."""
 MOVING_MIN = 30
-"""Rows in motion that tell."""
+"""Rows in motion that are enough."""
 
 
 def changed(values: FloatArray) -> BoolArray:
@@ -47,7 +47,7 @@ def stuck(values: FloatArray) -> BoolArray:
 
 
 def held_share(values: FloatArray) -> float:
-    """Part of the rows in motion that repeat the row before; 0 where too few move to tell."""
+    """Part of the rows in motion that repeat the row before; 0 where too few move."""
     where = moving(values)
     if where.sum() < MOVING_MIN:
         return 0.0

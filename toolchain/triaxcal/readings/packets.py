@@ -10,6 +10,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.readings.beats import consecutive
 from triaxcal.readings.evenclock import EvenClock, smoothed
 
 CLOSE = 0.1
@@ -46,7 +47,7 @@ def packet_clock(stamps_s: FloatArray, same: BoolArray) -> EvenClock | None:
     lost = np.zeros(count, dtype=np.int64)
     before, after = middle[: -2 * _REACH - 1], middle[2 * _REACH + 1 :]
     stays = np.flatnonzero(after - before > limit)
-    for run in np.split(stays, np.flatnonzero(np.diff(stays) > 1) + 1) if len(stays) else ():
+    for run in consecutive(stays):
         packets = run + _REACH + 1
         jump = late[packets] - late[packets - 1]
         packet = int(packets[int(np.argmax(jump))])

@@ -1,6 +1,7 @@
 """Rows of a log by the beats of its clock: doubled rows left out, exchanged rows put in order.
 
-For samples that are even, as those of an IMU are. What `order.Order` would leave out is told apart:
+For samples that are even, as those of an IMU are. What `order.Order` would leave out is of three
+kinds:
 
 exchanged   the stamp falls into a hole of the rising ones: the row belongs there
 in its place the stamp is wrong, and the rows before and after leave a beat for it: the row stays,
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.screentext import counted
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 from triaxcal.readings.beats import step_of
 from triaxcal.readings.evenclock import EvenClock, even_clock
@@ -82,10 +84,9 @@ def sequence(stamps_s: FloatArray, same: BoolArray, numbers: FloatArray, place: 
 
     packets = packet_clock(stamps_s, same)
     if packets is not None:
-        told = (
-            f"{_rows(len(stamps_s))} with stamps of packets: the newest row of each has its stamp"
-        )
-        return Sequence(np.arange(len(stamps_s)), packets, (told,), 0)
+        words = f"{_rows(len(stamps_s))} with stamps of packets"
+        said = f"{words}: the newest row of each has its stamp"
+        return Sequence(np.arange(len(stamps_s)), packets, (said,), 0)
     doubled = same & (np.diff(stamps_s, prepend=np.nan) == 0.0)
     single = np.flatnonzero(~doubled)
     if doubled.any():
@@ -126,7 +127,7 @@ def sequence(stamps_s: FloatArray, same: BoolArray, numbers: FloatArray, place: 
 
 
 def _rows(count: int) -> str:
-    return f"{count} row{'s' * (count != 1)}"
+    return counted(count, "row")
 
 
 def _exchanged(stamps_s: FloatArray, rows: IntArray, odd: IntArray, step_s: float) -> IntArray:
