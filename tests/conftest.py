@@ -100,6 +100,7 @@ LONG = {
     "test_imu_delivery.py",
     "test_imu_delivery_thermal.py",
     "test_imu_production.py",
+    "test_imu_compiled_truth.py",
     "test_imu_over_temperature.py",
     "test_imu_series.py",
     "test_imu_verdict.py",

@@ -88,6 +88,12 @@ def test_functions_on_common_breaks_are_the_same_functions() -> None:
         (np.linspace(-40.0, 85.0, 100), [-27.5, -2.5, 20.0, 47.5, 72.5], 20.0),
         (np.repeat([40.0, 60.0], 5), [40.0, 60.0], 40.0),
         (np.full(9, 23.0), [23.0], 23.0),
+        # A ramp with a gap: five steps in all, rounded up on each side of it.
+        (
+            np.append(np.linspace(-41.0, 25.0, 60), np.linspace(45.0, 86.0, 40)),
+            [-32.75, -16.25, 0.25, 20.0, 55.25, 75.75],
+            20.0,
+        ),
     ],
 )
 def test_nodes_are_points_or_steps_of_a_ramp(

@@ -3,76 +3,30 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import triaxcal
-from dynamic_cases import UNIT_TOML, table_of, write_unit
+from compiled_judge import G, Ran, delivered, folder_of
 from thermal_cases import POINTS, at_point, ramp, true_at, truth_of
 from triaxcal.base.errors import RefusedError
-from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
-from triaxcal.delivery.imu import ImuDelivery, deliver_imu
+from triaxcal.delivery.imu import deliver_imu
 from triaxcal.dynamic.blocks.base import LOWER
-from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.unit import calibrate_unit
 from triaxcal.evidence.examine import examine
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
-from triaxcal.simulation.imu_truth import ImuTruth
 
-G = 9.80665
-DEVICE = """\
-[device]
-accel_bits = 21
-accel_full_scale_g = 10.48576
-gyro_bits = 20
-gyro_full_scale_deg_per_s = 500
-degc_per_code = 0.125
-range_degc = [-40, 85]
-"""
 BETWEEN = (-25.0, 5.0, 35.0, 70.0)
 """Temperatures at which nothing was recorded at rest."""
 
 
-def toml_of(files: list[str], device: str = DEVICE, more: str = "") -> str:
-    recordings = "".join(f'[[dynamic.recording]]\nfile = "{name}"\n' for name in files)
-    toml = UNIT_TOML.replace('recording = "recording.csv"\n', "").replace(
-        "[noise]", f'temp_column = "temp_degc"\n{recordings}[noise]'
-    )
-    return toml + device + more
-
-
-def folder_of(
-    base: Path, recordings: list[ImuRecording], device: str = DEVICE, more: str = ""
-) -> Path:
-    files = ["recording.csv", *(f"{k}.csv" for k in range(1, len(recordings)))]
-    unit = write_unit(base / "IMU", table_of(recordings[0]), toml_of(files, device, more))
-    for k, recording in enumerate(recordings[1:], start=1):
-        other = write_unit(base / f"other{k}", table_of(recording))
-        (other / "recording.csv").rename(unit / f"{k}.csv")
-    return unit
-
-
-@dataclass(frozen=True)
-class Ran:
-    truth: ImuTruth
-    unit: Path
-    made: ImuDelivery
-    generated: GeneratedImu
-
-
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
-    base = tmp_path_factory.mktemp("over")
     truth = truth_of(3)
-    unit = folder_of(base, [at_point(truth, t, 300 + k) for k, t in enumerate(POINTS)])
-    made = deliver_imu(unit)
-    assert made.c is not None
-    for name, content in made.c.build.files.items():
-        (base / name).write_bytes(content)
-    return Ran(truth, unit, made, GeneratedImu(start_generated_imu(base, base).load()))
+    points = [at_point(truth, t, 300 + k) for k, t in enumerate(POINTS)]
+    return delivered(tmp_path_factory.mktemp("over"), truth, points)
 
 
 def codes(ran: Ran, degc: float, force_g: np.ndarray, rate: np.ndarray) -> list[np.ndarray]:

@@ -36,10 +36,12 @@ def at_point(truth: ImuTruth, degc: float, seed: int) -> ImuRecording:
     return held(simulate_imu(truth, motion, RATE_HZ, seed))
 
 
+def points_of(truth: ImuTruth, seed: int) -> list[ImuRecording]:
+    return [at_point(truth, degc, 100 * seed + k) for k, degc in enumerate(POINTS)]
+
+
 def five_points(truth: ImuTruth, seed: int) -> ImuRecording:
-    return joined_recordings(
-        [at_point(truth, degc, 100 * seed + k) for k, degc in enumerate(POINTS)]
-    )
+    return joined_recordings(points_of(truth, seed))
 
 
 def ramp(
@@ -59,6 +61,22 @@ def three_ramps(truth: ImuTruth, seed: int) -> ImuRecording:
     """Up, down and up again, another axis each time."""
     ends = (-40.0, 85.0), (85.0, -40.0), (-40.0, 85.0)
     return joined_recordings([ramp(truth, k, e, 100 * seed + k) for k, e in enumerate(ends)])
+
+
+def ramps_of(truth: ImuTruth, seed: int) -> list[ImuRecording]:
+    """As `three_ramps`, a degree beyond both ends; nothing is recorded between 25 and 45 degC."""
+    spans = (-41.0, 25.0), (45.0, 86.0)
+    up = [(axis, span) for axis in (0, 2) for span in spans]
+    down = [(1, (high, low)) for low, high in reversed(spans)]
+    parts = up[:2] + down + up[2:]
+    return [
+        ramp(truth, axis, ends, 100 * seed + k, rounds=3) for k, (axis, ends) in enumerate(parts)
+    ]
+
+
+PROGRAMMES = {"points": points_of, "ramps": ramps_of}
+HELD_OUT = {"points": (-25.0, 5.0, 35.0, 70.0), "ramps": (30.0, 35.0, 40.0)}
+"""Temperatures of which no recording shows anything: the nearest is 5 to 17.5 degC away."""
 
 
 def solved(truth: ImuTruth, recording: ImuRecording, stated: ThermalChoice | None = None) -> Solved:

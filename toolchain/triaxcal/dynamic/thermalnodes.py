@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -17,7 +18,7 @@ from triaxcal.model.types import FloatArray, IntArray
 POINT_DEGC = 4.0
 """Temperatures that lie nearer together than this, without a gap, are one point."""
 STEPS = 5
-"""Of a ramp: what a cubic and a held-out step need."""
+"""Of all that ramps pass through: what a cubic and a held-out step need."""
 REST_S = 1.0
 """A section of its own may begin with a rest of this length."""
 
@@ -47,14 +48,14 @@ def nodes_of(recorded: Recorded, reference_degc: float) -> Nodes:
     """Nodes of the recorded temperatures; T0 is the one that is nearest to the reference."""
     degc = np.sort(recorded.degc)
     clusters = np.split(degc, np.flatnonzero(np.diff(degc) > GROUP_GAP_DEGC) + 1)
-    wide = sum(c[-1] - c[0] > POINT_DEGC for c in clusters)
+    moved = sum(float(c[-1] - c[0]) for c in clusters if c[-1] - c[0] > POINT_DEGC)
     found: list[float] = []
     for cluster in clusters:
         low, high = float(cluster[0]), float(cluster[-1])
         if high - low <= POINT_DEGC:
             found.append(float(cluster.mean()))
             continue
-        steps = STEPS if wide == 1 else max(2, STEPS // 2)
+        steps = max(2, math.ceil(STEPS * (high - low) / moved))
         width = (high - low) / steps
         middles = low + width * (np.arange(steps) + 0.5)
         if low <= reference_degc <= high:
