@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +13,10 @@ from dynamic_cases import UNIT_TOML, mems_short, table_of, write_unit
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.reading import read_recording
-from triaxcal.dynamic.recording import ImuRecording
+from triaxcal.dynamic.recording import ImuRecording, ImuSamples
 from triaxcal.dynamic.survey import survey
 from triaxcal.dynamic.unit import calibrate_described
-from triaxcal.dynamic.upright import upright
+from triaxcal.dynamic.upright import force_at_first_rest, upright
 from triaxcal.model.types import FloatArray
 
 G = 9.80665
@@ -203,3 +204,28 @@ def test_times_of_another_unit(tmp_path: Path) -> None:
     rows[:, 0] /= 1e6
     with pytest.raises(RefusedError, match=r"samples in 0\.187 s; expected rests and turns"):
         recorded(write_unit(tmp_path / "IMU-B", rows))
+
+
+def test_no_more_is_read_than_up_to_the_first_rest(tmp_path: Path) -> None:
+    """Pieces of half a second, of which a hand moves the first twelve; the rest is in two of them.
+
+    Pieces are taken one, then two, four and so on.
+    """
+    unit = read_dynamic(write_unit(tmp_path / "IMU-A", table()))
+    whole = read_recording(unit)
+    rate_hz, taken = round(whole.rate_hz), []
+    n = 100 * rate_hz
+    time_s = np.arange(1, n + 1) / rate_hz
+    force = np.tile([0.0, 9.8, 0.0], (n, 1))
+    moving = time_s < 6.2
+    force[moving, 0] = 5.0 * np.sin(20.0 * time_s[moving])
+    force[time_s > 7.5] = [0.0, 0.0, 9.8]
+    samples = ImuSamples(time_s, np.zeros((n, 3)), force)
+
+    def pieces() -> Iterator[ImuSamples]:
+        for k in range(0, n, rate_hz // 2):
+            taken.append(k)
+            yield samples[k : k + rate_hz // 2]
+
+    assert force_at_first_rest(replace(whole, pieces=pieces)) == pytest.approx([0.0, 9.8, 0.0])
+    assert len(taken) <= 32  # of 200: 16 s, twice what the rest needs

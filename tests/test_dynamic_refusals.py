@@ -202,14 +202,16 @@ def test_a_rest_in_a_moving_vehicle_is_refused(
         assert word in text, text
 
 
-def test_one_rest_that_is_not_gravity_alone_is_left_out_and_said() -> None:
+def test_one_rest_that_contradicts_the_others_is_left_out_and_reported() -> None:
     recording = _driven(0.3, slice(7, 8))
     found = survey(recording)
     static = static_poses(recording, found, stated(hand_short()[0]))
     assert static.left_out == (found.rests[7].start_s,)
     without = found.without(static.left_out)
     assert len(without.rests) == len(found.rests) - 1
-    assert any(f"{found.rests[7].start_s:.1f} s: not gravity alone" in f for f in without.findings)
+    assert any(
+        f"{found.rests[7].start_s:.1f} s: contradicts the others" in f for f in without.findings
+    )
     assert not without.use[found.rests[7].first : found.rests[7].end].any()
 
 

@@ -57,8 +57,8 @@ def test_without_a_thermometer_the_range_is_reported_as_not_shown(tmp_path: Path
     assert done.recorded_degc is None
     (finding,) = (f for f in done.findings if "temperature" in f)
     assert finding == (
-        "no temperature was recorded: that the constants hold over the -40 to 85 degC of [device] "
-        "is not shown"
+        "no temperature was recorded: it is not shown that the constants hold over the -40 to 85 "
+        "degC of [device]"
     )
 
 

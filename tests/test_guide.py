@@ -158,7 +158,7 @@ def test_who_turns_another_axis_is_guided_on() -> None:
 
     guide = guided(operator, wilful)
     assert guide.done is not None
-    assert any(note.startswith("that was another turn: now ") for note in guide.notes)
+    assert any(note.startswith("not the turn that was asked for: now ") for note in guide.notes)
     assert met(calibrate_dynamic(operator.recording(), NOISE))
 
 

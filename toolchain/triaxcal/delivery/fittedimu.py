@@ -122,8 +122,9 @@ def saved_for_c(done: DynamicUnit, device: Device, verdict: ImuVerdict) -> Saved
 
 
 def _unknown_temperature(done: DynamicUnit) -> tuple[str, ...]:
-    known = done.recorded_degc is not None
-    return () if known else ("not shown: no temperature was recorded, the constants are of one",)
+    if done.recorded_degc is not None:
+        return ()
+    return ("no temperature was recorded: it is not shown that the constants hold at others",)
 
 
 def _verdict_lines(verdict: ImuVerdict) -> list[str]:

@@ -1,4 +1,4 @@
-"""The verdict on an IMU: whether it may be delivered, and in which words it is said.
+"""The verdict on an IMU: whether it may be delivered, and its words.
 
 Terminal, page, calibration.json and the C header print what stands here. The results are those of a
 triad; what is held against which limit is in `triaxcal.evidence`.
@@ -92,8 +92,8 @@ def refusal_of(done: DynamicUnit, found: Evidence) -> RefusedError | None:
     """Why nothing may be delivered: what failed, and what would explain it; None where it may."""
     if not found.failed:
         return None
-    demands = [c for c in found.failed if c.name.startswith("[limits]")]
-    others = [c for c in found.failed if c not in demands]
+    demands = [c for c in found.failed if c.demanded]
+    others = [c for c in found.failed if not c.demanded]
     expected = []
     if others:
         expected.append("a recording that agrees with the constants found from it")

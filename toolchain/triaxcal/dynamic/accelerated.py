@@ -1,7 +1,8 @@
-"""Rests in a moving vehicle: what is said of them, and how much a force at rest may differ."""
+"""Rests in a moving vehicle: how much a force at rest may differ, and the refusals."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,12 +20,15 @@ SHAKEN_TIMES, SHAKEN_M_PER_S2 = 10.0, 0.1
 EXPECTED = "rests on something that does not move"
 
 
-def changing(recording: ImuRecording) -> float:
+def rest_tolerance(recording: ImuRecording) -> float:
     """By how much |a| of rests may differ from gravity, m/s^2: a hand, and a temperature."""
-    temps = [piece.temp_degc for piece in recording.pieces()]
-    ends = [e for t in temps if t is not None and len(t) for e in (t.min(), t.max())]
-    span_k = float(max(ends) - min(ends)) if ends else 0.0
-    return OUTLIER_M_PER_S2 + OUTLIER_M_PER_S2_PER_K * span_k
+    low, high = math.inf, -math.inf
+    for piece in recording.pieces():
+        if piece.temp_degc is None:
+            break
+        low = min(low, float(piece.temp_degc.min(initial=math.inf)))
+        high = max(high, float(piece.temp_degc.max(initial=-math.inf)))
+    return OUTLIER_M_PER_S2 + OUTLIER_M_PER_S2_PER_K * max(high - low, 0.0)
 
 
 def never_at_rest(name: str, rests: int, rms_m_per_s2: float) -> RefusedError:
@@ -32,7 +36,8 @@ def never_at_rest(name: str, rests: int, rms_m_per_s2: float) -> RefusedError:
     return RefusedError(
         name,
         f"the forces of {rests} rests differ from gravity by {rms_m_per_s2:.2g} m/s^2 rms, "
-        "whatever the biases and scale factors: the unit was accelerated",
+        "whatever the biases and scale factors: the unit was accelerated, or its accelerometers "
+        "are far from linear",
         expected=EXPECTED,
         remedy="record where nothing drives, swings or is leaned on",
     )

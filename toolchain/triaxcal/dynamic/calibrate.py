@@ -143,7 +143,7 @@ def calibrate_dynamic(
             covariance = done.root @ done.root.T
             shown = (done.p, sd, covariance, done.stage_p, start.heading_rad, found)
             used = noise, not_stated(stated, noise)
-            beside = compared(static, found, layout, (done.p, sd), recording.gravity_m_per_s2)
+            beside = compared(static, layout, done.p, sd)
             return DynamicResult(layout, *shown, *used, frame, tuple(passes), beside)
     raise NotSettledError(
         recording.name,

@@ -72,7 +72,7 @@ def _even(at_scale: BoolArray, close: BoolArray, below: BoolArray, section: IntA
 def cut_at_clips(
     windows: Windows, edges: list[tuple[int, int]]
 ) -> tuple[Windows, list[tuple[int, int]], tuple[str, ...]]:
-    """The same with a section more after each moment in which a gyro clips, and what is said of it.
+    """The same with a section more after each moment in which a gyro clips, and words for it.
 
     Edges are the numbers of the first and last sample of each section.
     """
@@ -91,6 +91,6 @@ def cut_at_clips(
         new.append((int(windows.first[inside[0]]), last))
     at = ", ".join(f"{windows.start_s[k]:.1f}" for k in starts[:5])
     more = f" and {len(starts) - 5} more" if len(starts) > 5 else ""
-    said = f"a gyro clips at {at}{more} s: a new alignment at the next rest"
+    said = f"a gyro clips at {at}{more} s: not used from there to the next rest"
     renumbered = np.unique(section, return_inverse=True)[1].astype(np.int64)
     return replace(windows, section=renumbered), new, (said,)

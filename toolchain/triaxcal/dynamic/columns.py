@@ -142,8 +142,8 @@ class DynamicTable(WrittenFile, _Recorded):
     blocks
         Extensions that are switched on.
     motion
-        How the unit is turned: by "hand" the accelerometers are believed at rest only, on a
-        "table" in all turns about an axis too.
+        How the unit is turned: by "hand" the accelerometers are used at rest only, on a "table"
+        in all turns about an axis too.
     """
 
     time_column: tuple[Column, ...] = setting(TIMES, (), words="none", example='"time_s"')

@@ -194,7 +194,7 @@ class _Pass:
         time_s = samples.time_s[lead : lead + blocks * self.frame.block + 1 : self.frame.block]
         about = About(C, self.p, self._earth())
         made = equations(Window(samples, lead, blocks, about, self.frame))
-        use = self.found.believed(time_s)
+        use = self.found.used_blocks(time_s)
         rows = whitened(made, use, self.frame, self.noise)
         freedom = 3 * (1 if made.y2 is None else 2) * use
         for more, where in self._table_rows(samples, lead, made, use):

@@ -1,10 +1,10 @@
 """Which effects that are switched off the recording shows.
 
-The sum of squared innovations is blunt: an effect far below the noise of one block, in step with
-the motion for an hour, hardly changes it. So every extension that the recording's columns allow is
-switched on for one more pass, about the finished result. If an effect is absent the estimates of
-its k states are noise, and p^T P^-1 p is chi-square with k degrees of freedom. Each is tested
-beside those that are shown, the strongest first, and with the others absent.
+The sum of squared innovations is a weak test: an effect far below the noise of one block, in step
+with the motion for an hour, hardly changes it. So every extension that the recording's columns
+allow is switched on for one more pass, about the finished result. If an effect is absent the
+estimates of its k states are noise, and p^T P^-1 p is chi-square with k degrees of freedom. Each is
+tested beside those that are shown, the strongest first, and with the others absent.
 """
 
 from __future__ import annotations

@@ -101,8 +101,8 @@ class DataSheet:
     ) -> float:
         """Variance of the mean of a block of samples, (m/s^2)^2, with the counting of `accel_lsb`.
 
-        Counts of instants are rounded each for itself; those of increments only shift what is
-        left of a count from one interval to the next, so that only the two ends are rounded.
+        Each instant is rounded alone. An increment leaves its rest of a count to the next one, so
+        that only the two ends are rounded.
         """
         if convention == INCREMENT:
             counting = 2 * (self.accel_lsb * 1e-3 / duration_s) ** 2 / 12

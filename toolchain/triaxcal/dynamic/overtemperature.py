@@ -165,7 +165,7 @@ def _findings(recorded: Recorded, moved: Recorded) -> tuple[str, ...]:
         return ()
     turned = f"the unit turned at {first:.1f} to {last:.1f} degC only"
     beyond = f"scale factors and misalignments at {low:.1f} to {high:.1f} degC"
-    return (f"{turned}: that {beyond} follow the same functions is not shown",)
+    return (f"{turned}: it is not shown that {beyond} follow the same functions",)
 
 
 def _information(

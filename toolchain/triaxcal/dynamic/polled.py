@@ -62,4 +62,4 @@ def density_words(name: str, density: float) -> str:
         if name == "rate"
         else f"{density / MICRO_G:.3g} micro-g/sqrt(Hz)"
     )
-    return f"white noise of {value} from sample to sample, which counts where [noise] has less"
+    return f"white noise of {value} from sample to sample, used where [noise] states less"

@@ -22,9 +22,9 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.accelerated import (
     OUTLIER_M_PER_S2,
-    changing,
     never_at_rest,
     refuse_shaken,
+    rest_tolerance,
 )
 from triaxcal.dynamic.blocks.base import ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX, LOWER
 from triaxcal.dynamic.layout import Layout
@@ -60,10 +60,6 @@ class StaticPoses:
         df0 and Gamma by rows of the lower triangle, SI; the covariance by the stated noise, or by
         the scatter of the rests where that is larger.
     names : tuple of str
-    residual : array, shape (n,)
-        |a| - g of each rest, m/s^2.
-    scatter : float
-        Root mean square of the residuals over their stated deviations.
     left_out : tuple of float
         Starts of the rests that contradict the others, s.
     """
@@ -71,8 +67,6 @@ class StaticPoses:
     p: FloatArray
     covariance: FloatArray
     names: tuple[str, ...]
-    residual: FloatArray
-    scatter: float
     left_out: tuple[float, ...]
 
     @property
@@ -94,13 +88,9 @@ class StaticComparison:
     ----------
     names : tuple of str
         Of the nine constants of the accelerometers.
-    static, static_sd, joint, joint_sd : arrays, shape (9,)
-        SI.
     normalised : array, shape (9,)
         Joint less static, over the larger deviation of the two: the rests are part of the joint
         solution, so that a sound recording stays below a normal number of unit deviation.
-    residual_m_per_s2 : float
-        Root mean square of |a| - g over the rests, by the joint constants.
     left_out : tuple of float
         Starts of the rests that contradict the others, s.
     determined : bool
@@ -109,12 +99,7 @@ class StaticComparison:
     """
 
     names: tuple[str, ...]
-    static: FloatArray
-    static_sd: FloatArray
-    joint: FloatArray
-    joint_sd: FloatArray
     normalised: FloatArray
-    residual_m_per_s2: float
     left_out: tuple[float, ...]
     determined: bool
 
@@ -140,34 +125,30 @@ def static_poses(recording: ImuRecording, found: Survey, noise: DataSheet) -> St
     window = _variance(noise, recording, WINDOW_S)
     sd = np.sqrt(variance)
     rests = _Forces.of(found, window / gravity)
-    keep = _refused_or_kept(recording, found, rests)
+    tolerance = rest_tolerance(recording)
+    keep = _refused_or_kept(recording, found, rests, tolerance)
     p, covariance = _solved(rests, keep / sd, gravity)
     residual = rests.sizes(p) - gravity
     freedom = max(1, int(keep.sum()) - len(p))
     scatter = float(np.sqrt(((residual / sd)[keep] ** 2).sum() / freedom))
     rms = float(np.sqrt((residual[keep] ** 2).sum() / freedom))
-    if keep.sum() >= RESTS_MIN and scatter > OUTLIER_SD and rms > changing(recording):
+    if keep.sum() >= RESTS_MIN and scatter > OUTLIER_SD and rms > tolerance:
         raise never_at_rest(recording.name, int(keep.sum()), rms)
     names = tuple(state.name for state in LAYOUT.states)
     left_out = tuple(found.rests[k].start_s for k in np.flatnonzero(~keep))
     covariance = covariance * max(1.0, scatter) ** 2
-    return StaticPoses(p, covariance, names, residual, scatter, left_out)
+    return StaticPoses(p, covariance, names, left_out)
 
 
 def compared(
-    static: StaticPoses, found: Survey, layout: Layout, at: tuple[FloatArray, FloatArray],
-    gravity: float,
-) -> StaticComparison:  # fmt: skip
+    static: StaticPoses, layout: Layout, p: FloatArray, sd: FloatArray
+) -> StaticComparison:
     """The joint solution, constants and deviations (n,) of `layout`, against the rests alone."""
-    p, sd = at
     plain = [block.name for block, _ in layout.columns("force")] == [b.name for b in LAYOUT.blocks]
-    joint, joint_sd = p[: len(static.p)], sd[: len(static.p)]
-    larger = np.maximum(static.sd, joint_sd)
-    residual = _Forces.of(found, 0.0).sizes(joint) - gravity
-    return StaticComparison(
-        static.names, static.p, static.sd, joint, joint_sd, (joint - static.p) / larger,
-        float(np.sqrt((residual**2).mean())), static.left_out, plain and static.determined,
-    )  # fmt: skip
+    n = len(static.p)
+    normalised = (p[:n] - static.p) / np.maximum(static.sd, sd[:n])
+    determined = plain and static.determined
+    return StaticComparison(static.names, normalised, static.left_out, determined)
 
 
 def _variance(noise: DataSheet, recording: ImuRecording, duration_s: float) -> float:
@@ -248,8 +229,10 @@ def _solved(rests: _Forces, weight: FloatArray, gravity: float) -> tuple[FloatAr
     return p, covariance
 
 
-def _refused_or_kept(recording: ImuRecording, found: Survey, rests: _Forces) -> BoolArray:
-    """Rests, shape (n,), that do not contradict the others.
+def _refused_or_kept(
+    recording: ImuRecording, found: Survey, rests: _Forces, tolerance: float
+) -> BoolArray:
+    """Rests, shape (n,), that do not contradict the others by more than `tolerance`, m/s^2.
 
     By the least sum of absolute residuals, in which every rest has one vote: a long one that is
     wrong would pull a sum of squares to itself.
@@ -265,7 +248,7 @@ def _refused_or_kept(recording: ImuRecording, found: Survey, rests: _Forces) -> 
         residual = rests.sizes(_solved(rests, weight, gravity)[0]) - gravity
     usual = 1.4826 * float(np.median(np.abs(residual)))
     size = np.abs(residual)
-    keep[:] = size < max(changing(recording), OUTLIER_SD * usual)
+    keep[:] = size < max(tolerance, OUTLIER_SD * usual)
     firsts = {section.start_s for section in found.sections}
     begins = np.array([rest.start_s in firsts for rest in found.rests])
     many = int((~keep).sum()) > MOST_LEFT_OUT * count

@@ -194,7 +194,7 @@ def _unheld(
     values: FloatArray,
     words: list[str],
 ) -> list[Part]:
-    """Series of the triads, without the rows that only repeat one; says so in `words`."""
+    """Series of the triads, without the rows that only repeat one; `words` is added to."""
     shares = {name: held_share(values[:, place]) for name, place in places.items()}
     if log.increments or not any(shares.values()):
         known = np.ones(len(values), dtype=bool)

@@ -212,7 +212,7 @@ def _neighbours(rates: FloatArray, agreed: BoolArray, limit: float) -> BoolArray
 
 
 def guard_of(windows: Windows, rests: list[Edges]) -> int:
-    """Windows at the edge of a rest that are not believed.
+    """Windows at the edge of a rest that are not used.
 
     The smallest number after which `SETTLED` windows in a row are as quiet as the middles, by the
     median over the edges that meet a motion.

@@ -26,6 +26,7 @@ from triaxcal.dynamic.thermalnodes import Nodes
 from triaxcal.dynamic.thermalparts import Information
 from triaxcal.dynamic.window import gamma_matrix, inverse_of_one_plus
 from triaxcal.model.types import FloatArray
+from triaxcal.unit.site import EARTH_RATE_DEG_PER_H
 
 MEAN_S = 5.0
 LEANS_RAD = np.radians(1.0)
@@ -34,7 +35,6 @@ DRIFTS_RAD_PER_S = np.radians(5.0)
 """A gyro's bias changes by less over any temperature."""
 FORCE_SD = 0.05
 """Of d, m/s^2: 5 mrad, what the constants leave of f_0."""
-EARTH_DEG_PER_H = 15.04
 
 
 @dataclass(frozen=True)
@@ -112,10 +112,8 @@ def soak_blocks(soaks: tuple[Soak, ...]) -> tuple[StateBlock, ...]:
     made = []
     for number in range(1, len(soaks) + 1):
         lean = [State(f"lean{number}_{i}", "m/s^2", 1.0, FORCE_SD, f"lean {i}") for i in (1, 2)]
-        earth = [
-            State(f"earth{number}_{i}", "deg/h", DEG_PER_H, EARTH_DEG_PER_H, f"Earth, {AXIS[i]}")
-            for i in (1, 2, 3)
-        ]
+        rate = "deg/h", DEG_PER_H, EARTH_RATE_DEG_PER_H
+        earth = [State(f"earth{number}_{i}", *rate, f"Earth, {AXIS[i]}") for i in (1, 2, 3)]
         made.append(StateBlock(f"soak-{number}", "rest", (*lean, *earth), shown=False))
     return tuple(made)
 

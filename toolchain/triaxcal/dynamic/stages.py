@@ -82,7 +82,7 @@ def find_stages(
     runs = _runs(windows, quiet)
     candidates = [r for r in runs if r.kind >= 0 and r.turned_rad >= STAGE_TURN_RAD]
     if recording.motion != TABLE:
-        candidates = _believed(windows, quiet, candidates, recording.gravity_m_per_s2)
+        candidates = _on_table(windows, quiet, candidates, recording.gravity_m_per_s2)
     stages: list[Stage] = []
     for run in candidates:
         turning[run.windows[0] : run.windows[-1] + 1] = True
@@ -116,8 +116,8 @@ def _runs(windows: Windows, quiet: Quiet) -> list[_Run]:
     return runs
 
 
-def _believed(windows: Windows, quiet: Quiet, candidates: list[_Run], gravity: float) -> list[_Run]:
-    """Candidates that nothing contradicts, all runs of an axis in a row judged together."""
+def _on_table(windows: Windows, quiet: Quiet, candidates: list[_Run], gravity: float) -> list[_Run]:
+    """Candidates that can be turns on a table; all runs of an axis in a row are judged together."""
     groups: list[list[_Run]] = []
     for run in candidates:
         if groups and groups[-1][-1].kind == run.kind:
@@ -152,7 +152,7 @@ def _rigid(windows: Windows, quiet: Quiet, group: list[_Run], gravity: float) ->
 
     |f| - g is, to first order in small errors, u . (b + S f) + sum of u_i (K r_i)_i with u = f/|f|,
     K = [w'] + [w]^2, and r_i the place of accelerometer i: 18 unknowns that the run itself finds,
-    within what a coarse unit may have. Runs too short to overdetermine them are not believed.
+    within what a coarse unit may have. Runs too short to overdetermine them do not count.
     """
     rows, values = [], []
     for run in group:

@@ -77,7 +77,7 @@ class Survey:
     stages : tuple of Stage
     rests : tuple of Rest
     use : array, shape (w,), bool
-        Windows in which the accelerometers are believed: rests, and turns on the table.
+        Windows in which the accelerometers are used: rests, and turns on the table.
     still : array, shape (w,), bool
     rate_max : float
         Largest mean rate in a window, rad/s.
@@ -105,7 +105,7 @@ class Survey:
         out = [rest for rest in self.rests if rest.start_s in starts_s]
         for rest in out:
             use[rest.first : rest.end] = False
-        said = [f"rest at {rest.start_s:.1f} s: not gravity alone, not used" for rest in out]
+        said = [f"rest at {rest.start_s:.1f} s: contradicts the others, not used" for rest in out]
         kept = tuple(rest for rest in self.rests if rest.start_s not in starts_s)
         return replace(self, rests=kept, use=use, findings=(*self.findings, *said))
 
@@ -114,8 +114,8 @@ class Survey:
         """Number of windows before each that are not used."""
         return np.concatenate([[0], np.cumsum(~self.use)]).astype(np.int64)
 
-    def believed(self, ends_s: FloatArray) -> IntArray:
-        """1 for each block in all of whose windows the accelerometers are believed, else 0.
+    def used_blocks(self, ends_s: FloatArray) -> IntArray:
+        """1 for each block in all of whose windows the accelerometers are used, else 0.
 
         `ends_s` (blocks + 1,) are the ends of blocks that follow each other.
         """
@@ -177,7 +177,7 @@ def survey(recording: ImuRecording) -> Survey:
 
 
 def _used(windows: Windows, quiet: Quiet, turning: BoolArray) -> tuple[BoolArray, int]:
-    """Windows in which the accelerometers are believed, and the guard in windows.
+    """Windows in which the accelerometers are used, and the guard in windows.
 
     A rest beside a turn on the table is whole; where it meets anything else it is cut.
     """
@@ -251,7 +251,7 @@ def _sections(
 
 
 def _lost_words(lost_s: list[tuple[float, float]]) -> list[str]:
-    """What is said of starts and lengths of what is before the first rest of a section."""
+    """Words for what is before the first rest of a section, by its starts and lengths."""
     if not lost_s:
         return []
     places = f" in {len(lost_s)} places" if len(lost_s) > 1 else ""

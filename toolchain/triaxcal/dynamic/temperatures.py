@@ -125,8 +125,8 @@ def refuse_beyond(unit: DynamicDescription, recorded: Recorded | None) -> tuple[
         return ()
     low, high = unit.device.range_degc
     if recorded is None:
-        text = f"that the constants hold over the {low:g} to {high:g} degC of [device] is not shown"
-        return (f"no temperature was recorded: {text}",)
+        text = f"that the constants hold over the {low:g} to {high:g} degC of [device]"
+        return (f"no temperature was recorded: it is not shown {text}",)
     first, last = recorded.ends_degc
     if first - EDGE_DEGC <= low and high <= last + EDGE_DEGC:
         return ()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def upright(
         Where another axis points up or down at the first rest.
     """
     up = unit.up_at_start
-    force = first_rest(read_windows(recording)[0])
+    force = force_at_first_rest(recording)
     if up is None:
         axis = int(np.argmax(np.abs(force)))
         said = (
@@ -74,15 +75,36 @@ def upright(
     )
 
 
-def first_rest(windows: Windows) -> FloatArray:
-    """Mean force (3,), m/s^2, over the first stretch of `REST_S` that is quiet; else the first."""
+def force_at_first_rest(recording: ImuRecording) -> FloatArray:
+    """Mean force (3,), m/s^2, over the first quiet stretch of `REST_S`; of the start without one.
+
+    The recording is read up to that stretch only.
+    """
+    head: list[ImuSamples] = []
+    begun = replace(recording, pieces=lambda: head)
+    pieces = iter(recording.pieces())
+    while True:
+        more = list(islice(pieces, max(1, len(head))))
+        head.extend(more)
+        windows = read_windows(begun)[0]
+        # Where more follows, the last window may lack samples.
+        whole = windows.part(windows.first < windows.first[-1]) if more else windows
+        found = _quiet_force(whole)
+        if found is not None:
+            return found
+        if not more:
+            return np.asarray(windows.force[: round(REST_S / WINDOW_S)].mean(axis=0))
+
+
+def _quiet_force(windows: Windows) -> FloatArray | None:
+    """Mean force (3,), m/s^2, over the first stretch of `REST_S` that is quiet."""
     length = round(REST_S / WINDOW_S)
     jump = np.abs(np.diff(windows.force, axis=0)).max(axis=1) > QUIET_M_PER_S2
     jump |= np.abs(np.diff(windows.rate, axis=0)).max(axis=1) > QUIET_RAD_PER_S
     for start in range(len(windows.first) - length + 1):
         if not jump[start : start + length - 1].any():
             return np.asarray(windows.force[start : start + length].mean(axis=0))
-    return np.asarray(windows.force[:length].mean(axis=0))
+    return None
 
 
 def _turned(quantity: Quantity) -> Quantity:

@@ -1,9 +1,10 @@
 """Which cause would explain what failed: each is tried, none is guessed.
 
 A trial repeats the failed tests as if its cause were there and allowed for. It explains the failure
-where every chi-square then keeps its limit. Of those that describe all of the recording the most
-likely is named; causes that leave much the same are named together. Those that leave a part out,
-or change the noise, have evidence of their own, and are named beside it.
+where every chi-square then keeps its limit. Of the causes that describe the whole recording the
+most likely one is named, and with it all that are nearly as likely. A trial that leaves a part of
+the recording out, or changes the noise, has another chi-square, which cannot be compared: such a
+cause needs a sign of its own in the recording, and is then named as well.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.missing import Effect, without_others
 from triaxcal.evidence.case import Case
-from triaxcal.evidence.chance import chi_square, largest, lengths, stacked
+from triaxcal.evidence.chance import EXPLAINED, chi_square, largest, lengths, stacked
 from triaxcal.evidence.check import Cause, Evidence
 from triaxcal.evidence.heldout import HeldOut, held_out_every
 from triaxcal.evidence.suspect import Suspect, innovations_again
@@ -27,7 +28,8 @@ from triaxcal.model.types import FloatArray
 
 EQUAL = 13.8
 """Chi-squares that differ by less than this are within a factor of 1000 in likelihood."""
-EXPLAINED = 1.0
+MOST_LEFT = 1.0
+"""Of the limits of the chi-squares, where a cause explains the failure."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,7 @@ def causes_of(
     found: Evidence, case: Case, off: Sequence[Effect], held: HeldOut | None, report: Progress
 ) -> Evidence:
     """The same evidence with the causes that explain its failed tests."""
-    chance = {c.name for c in found.failed} & {*_CHI_SQUARES, "effects that are off"}
-    if not chance:
+    if not any(c.name in EXPLAINED for c in found.failed):
         return found
     tried = list(_effects(case, off, held, report))
     names = [f'block "{e.name}"' for e in off]
@@ -52,11 +53,11 @@ def causes_of(
         if suspect is not None:
             names.append(trial.name)
             tried.append(_of_suspect(suspect))
-    explains = [t for t in tried if t.cause.left <= EXPLAINED]
+    explains = [t for t in tried if t.cause.left <= MOST_LEFT]
     together = [e for e in off if e.shown]
     if not explains and len(together) > 1:
         names.append(" with ".join(f'"{e.name}"' for e in together))
-        explains = [t for t in [_together(case, together, held)] if t.cause.left <= EXPLAINED]
+        explains = [t for t in [_together(case, together, held)] if t.cause.left <= MOST_LEFT]
     direct = [t for t in explains if t.direct]
     likely = sorted((t for t in explains if not t.direct), key=lambda t: t.total)
     likely = [t for t in likely if t.total - likely[0].total < EQUAL]
@@ -74,9 +75,6 @@ def _together(case: Case, shown: Sequence[Effect], held: HeldOut | None) -> _Tri
     words = f"{titles} together, which are switched off"
     remedy = f"switch on {names} in [dynamic] blocks"
     return _of_suspect(Suspect(words, remedy, innovations_again(case, layout=layout), out))
-
-
-_CHI_SQUARES = ("innovations", "held-out rests", "held-out turns")
 
 
 def _of_suspect(suspect: Suspect) -> _Tried:

@@ -17,14 +17,19 @@ from triaxcal.evidence.check import MODEL_TOLERANCE, SHARE, Check
 from triaxcal.evidence.heldout import HeldOut
 from triaxcal.evidence.prediction import LENGTH, ROWS
 from triaxcal.model.types import BoolArray, FloatArray
-from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
+from triaxcal.unit.site import EARTH_RATE_DEG_PER_H, STANDARD_GRAVITY_M_PER_S2
 
-EARTH_DEG_PER_H = 15.04
 MOVES_SD = 1.96
 """An effect that is off matters where it moves a constant out of its own 95 % interval."""
 LESS_NOISE = 0.5
 """Mean square of the innovations: below it the stated noise is too large, and so is every standard
 deviation."""
+
+
+INNOVATIONS, HELD_OUT_RESTS, HELD_OUT_TURNS = "innovations", "held-out rests", "held-out turns"
+EFFECTS_OFF = "effects that are off"
+EXPLAINED = frozenset({INNOVATIONS, HELD_OUT_RESTS, HELD_OUT_TURNS, EFFECTS_OFF})
+"""Tests for whose failure a cause is looked for."""
 
 
 def largest(freedom: int) -> float:
@@ -39,7 +44,7 @@ def innovations(result: DynamicResult) -> Check:
     times = math.sqrt(last.chi_square / last.freedom)
     most = math.sqrt(limit / last.freedom)
     return Check(
-        "innovations", last.chi_square <= limit,
+        INNOVATIONS, last.chi_square <= limit,
         f"{times:.2f} times the stated noise (limit {most:.2f})",
         last.chi_square, limit, "", last.freedom,
     )  # fmt: skip
@@ -58,7 +63,7 @@ def less_noise(result: DynamicResult) -> tuple[str, ...]:
     if ratio >= LESS_NOISE:
         return ()
     times = f"{math.sqrt(ratio):.2g} times the stated noise"
-    return (f"the innovations are {times}: [noise] states too much, and the tests are as blunt",)
+    return (f"the innovations are {times}: [noise] states too much, and the tests show too little",)
 
 
 def stacked(held: HeldOut) -> tuple[FloatArray, FloatArray]:
@@ -103,7 +108,7 @@ def _rests(error: FloatArray, sd: FloatArray, value: float) -> Check:
         sd[worst] / STANDARD_GRAVITY_M_PER_S2 * 1e6,
     )
     return Check(
-        "held-out rests", value <= limit,
+        HELD_OUT_RESTS, value <= limit,
         f"|a| - g of {counted(len(error), 'rest')}: {size:.3g} micro-g at the worst, where "
         f"{its:.3g} is the predicted standard deviation (chi-square {value:.3g}, limit "
         f"{limit:.3g})",
@@ -114,7 +119,7 @@ def _rests(error: FloatArray, sd: FloatArray, value: float) -> Check:
 def _turns(angle_deg: FloatArray, sd_deg: FloatArray, value: float) -> Check:
     limit, worst = largest(2 * len(angle_deg)), int(np.argmax(angle_deg / sd_deg))
     return Check(
-        "held-out turns", value <= limit,
+        HELD_OUT_TURNS, value <= limit,
         f"closure of {counted(len(angle_deg), 'turn')}: {angle_deg[worst]:.3g} deg at the worst, "
         f"where {sd_deg[worst]:.3g} is the predicted standard deviation of a component (chi-square "
         f"{value:.3g}, limit {limit:.3g})",
@@ -131,7 +136,10 @@ def _demanded(error_g: FloatArray, angle_deg: FloatArray, limits: ImuLimits) -> 
         if limit is not None:
             most = float(found.max())
             words = f"up to {most:.3g} {unit} (limit {limit:g})"
-            yield Check(f"[limits] {key}", most <= limit, words, most, limit, unit, len(found))
+            held = most <= limit
+            yield Check(
+                f"[limits] {key}", held, words, most, limit, unit, len(found), demanded=True
+            )
 
 
 def earth(result: DynamicResult) -> Iterator[Check]:
@@ -146,11 +154,11 @@ def earth(result: DynamicResult) -> Iterator[Check]:
     # The length of two components, each with its error: chi-square of 2 at the worst.
     times = math.sqrt(chi2.isf(SHARE / len(size), 2))
     worst = int(np.argmax(size - times * own))
-    limit = EARTH_DEG_PER_H + times * float(own[worst])
+    limit = EARTH_RATE_DEG_PER_H + times * float(own[worst])
     yield Check(
         "horizontal rate of the Earth", bool(size[worst] <= limit),
         f"{size[worst]:.3g} deg/h, standard deviation {own[worst]:.2g} (the Earth turns at "
-        f"{EARTH_DEG_PER_H} deg/h; limit {limit:.3g})",
+        f"{EARTH_RATE_DEG_PER_H} deg/h; limit {limit:.3g})",
         float(size[worst]), limit, "deg/h", len(size),
     )  # fmt: skip
 
@@ -184,10 +192,10 @@ def effects_off(off: Sequence[Effect]) -> Iterator[Check]:
         return
     if worst is None:
         words = f"none of {len(off)} would move a constant"
-        yield Check("effects that are off", True, words, 0.0, MOVES_SD, "sd", len(off))
+        yield Check(EFFECTS_OFF, True, words, 0.0, MOVES_SD, "sd", len(off))
         return
     yield Check(
-        "effects that are off", worst.moves_sd <= MOVES_SD,
+        EFFECTS_OFF, worst.moves_sd <= MOVES_SD,
         f"{worst.name} shows, and would move {worst.moved} by {worst.moves_sd:.3g} of its standard "
         f"deviations (limit {MOVES_SD})",
         worst.moves_sd, MOVES_SD, "sd", len(off),

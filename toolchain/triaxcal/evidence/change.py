@@ -46,7 +46,7 @@ class Jump:
 
     @property
     def words(self) -> str:
-        """What is said of it."""
+        """As the end of "constants ..."."""
         size = float(np.degrees(np.abs(self.rate).max()))
         return (
             f"that change at {self.at_s:.1f} s, where the gyros at rest jump by {size:.3g} deg/s: "

@@ -32,6 +32,8 @@ class Check:
         "" for a ratio or a chi-square.
     count : int
         Degrees of freedom, or how many were tested.
+    demanded : bool
+        Whether the limit is one of [limits] in unit.toml.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Check:
     limit: float
     unit: str
     count: int
+    demanded: bool = False
 
     def __str__(self) -> str:
         return f"{self.name}: {self.words}"

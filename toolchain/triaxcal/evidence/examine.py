@@ -93,12 +93,12 @@ def sd_checks(limits: ImuLimits, case: Case) -> Iterator[Check]:
             f"[limits] {demand.key}", sd[worst] <= limit,
             f"{states[worst].name} has {sd[worst]:.3g} {demand.unit}{where} (limit {limit:g}), "
             f"{100 * parts[source]:.0f} % of its variance from {source}",
-            sd[worst], limit, demand.unit, len(index),
+            sd[worst], limit, demand.unit, len(index), demanded=True,
         )  # fmt: skip
 
 
 def _unseen(result: DynamicResult, seen: Observability) -> list[tuple[tuple[str, ...], bool]]:
-    """Directions that the motion did not show, with a state of the C; whether one is basic."""
+    """Directions that the motion leaves open, with a state of the C; whether one is basic."""
     layout = result.layout
     of = {state.name: block for block in layout.blocks for state in block.states}
     found = []
@@ -111,7 +111,7 @@ def _unseen(result: DynamicResult, seen: Observability) -> list[tuple[tuple[str,
 
 def _unseen_of_the_base(result: DynamicResult, seen: Observability) -> Iterator[Check]:
     basic = [" with ".join(names) for names, is_basic in _unseen(result, seen) if is_basic]
-    words = f"the motion did not show {', '.join(basic)}" if basic else "every basic constant"
+    words = f"the motion does not determine {', '.join(basic)}" if basic else "every basic constant"
     count = sum(len(block.states) for block in BASE)
     yield Check("observability", not basic, words, float(len(basic)), 0.0, "", count)
 
@@ -134,7 +134,7 @@ def _notes(held: HeldOut | None) -> tuple[str, ...]:
     rests = len(held.stretches)
     words = (
         f"held out: one rest in {held.every} and the turns before and after it, "
-        f"{counted(rests, 'rest')} and {2 * rests} turns, predicted by the rest of the recording; "
+        f"{counted(rests, 'rest')} and {2 * rests} turns, predicted by the remaining recording; "
         "the delivered constants are those of the whole recording"
     )
     return (words,)

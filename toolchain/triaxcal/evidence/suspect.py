@@ -43,7 +43,7 @@ class Trial(Protocol):
     name: str
 
     def of(self, case: Case, held: HeldOut | None, /) -> Suspect | None:
-        """The cause allowed for; None where nothing of the recording speaks for it."""
+        """The cause allowed for; None where the recording shows no sign of it."""
 
 
 def again(words: str, remedy: str, case: Case, held: HeldOut | None) -> Suspect:

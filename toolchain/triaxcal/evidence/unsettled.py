@@ -12,9 +12,9 @@ from triaxcal.evidence.change import REMEDY, halves, largest_jump
 
 
 def explained(unit: DynamicDescription, refusal: NotSettledError) -> RefusedError:
-    """The refusal; where both parts beside the largest jump at rest settle, with that.
+    """The refusal, with the largest jump at rest as its cause if both parts settle alone.
 
-    Where one part is refused for itself, its own refusal says more.
+    If a part is refused as well, the refusal stays as it is.
     """
     recording = read_recordings(unit)
     found = survey(recording)

@@ -2,8 +2,8 @@
 
 After each rest the step model (`stepmodel`) says what the constants are known to, and what each
 turn that can be asked for would make of it. The demand that is farthest from being met is served
-first, by the turn that lowers it most for its time. That the demands are met is said by a
-calibration of the recording alone: the same that `triaxcal dynamic` makes.
+first, by the turn that lowers it most for its time. Only a calibration of the recording, the same
+that `triaxcal dynamic` makes, decides that the demands are met.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ EVERY = 8
 AGAIN = 2
 """Rests after a calibration until the next."""
 OTHER_RAD = math.radians(25.0)
-"""Up after a turn is farther from what was asked for: it was another turn."""
+"""Up after a turn is farther from where it was asked for: the operator made another turn."""
 
 Submit = Callable[[Callable[[], DynamicResult]], "Future[DynamicResult]"]
 """Runs a calibration, here or in a thread."""
@@ -196,7 +196,7 @@ class Guide:
         if asked.turn is not None and asked.up is not None and asked.turn.angle_deg:
             wanted = asked.turn.end(asked.up)
             if float(wanted @ motion.after) < math.cos(OTHER_RAD):
-                self.notes.append(f"that was another turn: now {up_words(motion.after)}")
+                self.notes.append(f"not the turn that was asked for: now {up_words(motion.after)}")
                 self.advice = Advice(Turn(0, 0), HOLD_S, motion.after, asked.target)
 
     def _rested(self) -> None:

@@ -46,7 +46,7 @@ def _order_lines(guide: Guide) -> list[str]:
         else:
             lines.append(f"  {up_words(up)}, still  {bar(part)}  {guide.resting_s:.0f} s")
     else:
-        lines.append("  it moves")
+        lines.append("  moving")
     if guide.refusal:
         lines.append("  the recording so far cannot be calibrated:")
         lines += [f"    {line[: WIDTH - 4]}" for line in textwrap.wrap(guide.refusal, WIDTH - 4)]

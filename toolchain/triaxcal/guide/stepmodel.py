@@ -7,9 +7,9 @@ and forces at rest are off by
     r = F p + g psi x u + noise                 F: rows of force of the blocks of states
     psi' = R psi + sum_k R_k W_k p dt + noise   R_k: from the axes of moment k to those of the end
 
-with W the blocks' rows of rate. Nothing is believed while the unit turns, and nothing is known of
-lever arms and of the north: the filter of `dynamic` knows more, and what it says is taken over
-(`covariance`).
+with W the blocks' rows of rate. Forces are not used while the unit turns; lever arms and the north
+are left out. The filter of `dynamic` has all of that, and its covariance is taken over once there
+is one.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from triaxcal.guide.turns import Turn
 from triaxcal.model.types import FloatArray
 
 PART_S, PARTS_MAX = 0.7, 12
-"""The gyros of a MEMS unit are believed for about a second against its accelerometers at rest."""
+"""For about a second the gyros of a MEMS unit know a tilt better than its accelerometers do."""
 _TILT_SD_RAD = 0.1
 """Before the first rest."""
 _AZIMUTH_SD_RAD = 1e-4

@@ -1,4 +1,4 @@
-"""Turns that an operator can be asked for, and how they are said.
+"""Turns that an operator can be asked for, and the words for them.
 
 A turn is about an axis of the instrument, right-handed. Up in instrument axes is then
 

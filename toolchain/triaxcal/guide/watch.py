@@ -1,8 +1,8 @@
 """Rests and motions in samples as they come.
 
 Means over a tenth of a second are still where the gyros read their bias and the force is that of
-the rest so far. The bias is what the gyros read at the last rest. It decides what is said on the
-screen; what a recording is worth is decided by `dynamic`, which looks at all of it.
+the rest so far. The bias is what the gyros read at the last rest. This is for the screen alone; a
+calibration finds the rests anew, from the whole recording.
 """
 
 from __future__ import annotations

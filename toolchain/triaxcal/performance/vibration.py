@@ -140,9 +140,9 @@ def vibration_chapter(
     if lacking:
         notes.append(f"not in the prediction, because not measured: {', '.join(lacking)}")
     for name, vibration in stated.items():
-        found, told = _one(done, terms, name, vibration, shake)
+        found, words = _one(done, terms, name, vibration, shake)
         figures += found
-        notes += told
+        notes += words
     return Chapter("vibration", title, DEFINITION, tuple(figures), tuple(notes))
 
 

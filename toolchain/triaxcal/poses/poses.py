@@ -167,8 +167,8 @@ def _with_steps(found: PoseSet, steps: Steps, layout: RecordingLayout) -> PoseSe
         for p, sd in zip(found.poses, left, strict=True)
         if p.covariance is not None and p.sd_mean is not None
     )
-    told = steps.finding(left, np.array([p.sd_mean for p in poses]), layout, found.reading_of_1_g)
-    return replace(found, poses=poses, findings=(*found.findings, *told))
+    words = steps.finding(left, np.array([p.sd_mean for p in poses]), layout, found.reading_of_1_g)
+    return replace(found, poses=poses, findings=(*found.findings, *words))
 
 
 def _scatter(pose: Pose) -> FloatArray:

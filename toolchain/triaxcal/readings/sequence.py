@@ -84,9 +84,8 @@ def sequence(stamps_s: FloatArray, same: BoolArray, numbers: FloatArray, place: 
 
     packets = packet_clock(stamps_s, same)
     if packets is not None:
-        words = f"{_rows(len(stamps_s))} with stamps of packets"
-        said = f"{words}: the newest row of each has its stamp"
-        return Sequence(np.arange(len(stamps_s)), packets, (said,), 0)
+        words = f"{_rows(len(stamps_s))} with stamps of packets: a stamp is that of the newest row"
+        return Sequence(np.arange(len(stamps_s)), packets, (words,), 0)
     doubled = same & (np.diff(stamps_s, prepend=np.nan) == 0.0)
     single = np.flatnonzero(~doubled)
     if doubled.any():

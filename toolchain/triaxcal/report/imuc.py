@@ -1,4 +1,4 @@
-"""What is said of the C of an IMU: verification.json and the lines of the summary."""
+"""The C of an IMU in verification.json and the lines of the summary."""
 
 from __future__ import annotations
 

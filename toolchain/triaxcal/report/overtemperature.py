@@ -1,4 +1,4 @@
-"""What is said of an IMU over temperature: calibration.json, the screen, the page."""
+"""An IMU over temperature in calibration.json, on the screen and on the page."""
 
 from __future__ import annotations
 

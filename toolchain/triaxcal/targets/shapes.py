@@ -190,8 +190,8 @@ def made_case(folder: Path, name: str, note: str, change: Change, terms: Terms) 
         imu = ImuCompensation(compensation, compensation, EXAMPLE_SENSITIVITY)
         plan = make_gyro_plan(imu, replace(unit, output_q=18), unit.output_q)
     files = render_routine(plan)
-    told = f"shape {name}: {note}" if note else f"shape {name}"
-    provenance = Provenance(unit.serial, inputs_sha256(folder), (told,))
+    words = f"shape {name}: {note}" if note else f"shape {name}"
+    provenance = Provenance(unit.serial, inputs_sha256(folder), (words,))
     files |= render_constants(plan, unit.temperature_sensor, provenance)
     files |= render_selftest(plan, provenance)
     angles = None

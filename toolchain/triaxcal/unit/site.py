@@ -8,6 +8,7 @@ from triaxcal.base.keys import TableKeys, setting
 from triaxcal.base.kinds import number
 
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
+EARTH_RATE_DEG_PER_H = 15.04
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""Asymmetry of the accelerometers' scale factors: df_i = e_i |f_i|."""
+"""Asymmetry of the accelerometers' scale factors: df_i = e_i |f_i|.
+
+e_i is half of the difference of the scale factors for both signs of the force.
+"""
 
 from __future__ import annotations
 

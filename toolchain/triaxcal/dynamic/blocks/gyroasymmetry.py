@@ -1,6 +1,6 @@
 """Asymmetry of the gyros' scale factors: another one for each sense of rotation.
 
-nu_i = e_i |w_i|. IEEE Std 528 calls half of the difference of both scale factors so.
+nu_i = e_i |w_i|: e_i is half of the difference of the scale factors for both senses.
 """
 
 from __future__ import annotations

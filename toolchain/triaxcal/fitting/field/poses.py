@@ -226,6 +226,6 @@ def inside_range(found: FieldPoses, range_degc: tuple[float, float]) -> FieldPos
             remedy="record within the range, or calibrate over a wider one",
         )
     left = int((~inside).sum())
-    told = f"{left} of {len(found)} poses are outside of {low:g} to {high:g} degC and not used"
+    words = f"{left} of {len(found)} poses are outside of {low:g} to {high:g} degC and not used"
     kept = found.select(np.flatnonzero(inside).tolist())
-    return replace(kept, findings=(*kept.findings, told))
+    return replace(kept, findings=(*kept.findings, words))
