@@ -78,6 +78,41 @@ def jitter_and_lost(rows: Rows) -> Rows:
     return some_lost(jitter(rows))
 
 
+def jitter_of_3_ms_and_lost(rows: Rows) -> Rows:
+    """Stamps alone leave it open behind which of a few rows one is lost."""
+    return some_lost(jitter_of_3_ms(rows))
+
+
+def zeros(rows: Rows) -> Rows:
+    """A driver that had no sample: zeros now and then."""
+    spoiled = rows.copy()
+    spoiled[RNG(13).random(len(rows)) < 0.004, 1:] = 0.0
+    return spoiled
+
+
+def one_far_off(rows: Rows) -> Rows:
+    """An error of transmission in the fastest turn: 2000 deg/s in one sample."""
+    spoiled = rows.copy()
+    spoiled[fastest(rows), 1] = np.radians(2000.0)
+    return spoiled
+
+
+def increments_among_instants(rows: Rows) -> Rows:
+    """Each tenth row has the angle since the row before in place of the rate."""
+    spoiled = rows.copy()
+    spoiled[::10, 1:4] /= RATE_HZ
+    return spoiled
+
+
+def knocked(rows: Rows) -> Rows:
+    """Put down hard twenty times: one sample of 30 m/s^2, and the gyros ring."""
+    spoiled = rows.copy()
+    for k in range(100, len(rows) - 10, len(rows) // 20):
+        spoiled[k, 4:] += 30.0
+        spoiled[k : k + 4, 1:4] += 0.1 * np.array([[1.0], [-0.7], [0.4], [-0.2]])
+    return spoiled
+
+
 def early_stamps(rows: Rows) -> Rows:
     """Rows in order, each fiftieth stamp a row and a half early."""
     early = np.zeros(len(rows))

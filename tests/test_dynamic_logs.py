@@ -13,7 +13,17 @@ from scipy.stats import chi2
 from dynamic_cases import held, short_motion
 from dynamic_judge import data_sheet, true_constants
 from recordings import FOLDER
-from spoiled_logs import LOST, NOTHING_LOST, RATE_HZ, SLOW_FORCES, Spoil, mended, stuck
+from spoiled_logs import (
+    LOST,
+    NOTHING_LOST,
+    RATE_HZ,
+    SLOW_FORCES,
+    Spoil,
+    jitter_of_3_ms_and_lost,
+    mended,
+    one_far_off,
+    stuck,
+)
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.reading import read_recording
@@ -57,7 +67,10 @@ def nees(result: DynamicResult, true: dict[str, float]) -> float:
     return float(error @ np.linalg.solve(result.covariance[np.ix_(known, known)], error))
 
 
-@pytest.mark.parametrize("spoil", [*NOTHING_LOST, *LOST, *SLOW_FORCES, stuck])
+OTHERS = (stuck, one_far_off, jitter_of_3_ms_and_lost)
+
+
+@pytest.mark.parametrize("spoil", [*NOTHING_LOST, *LOST, *SLOW_FORCES, *OTHERS])
 def test_errors_are_covered(spoil: Spoil) -> None:
     truth, _, plain = whole()
     result = spoiled(spoil)

@@ -73,6 +73,13 @@ def _clipped(limit_deg_per_s: float) -> ImuRecording:
     return changed(recording, rate=held_back)
 
 
+def _changed_half_way(spoil: Callable[[ImuSamples], np.ndarray]) -> ImuRecording:
+    """Other rates from half of the time on."""
+    recording, samples = hand_short()[1], hand_short()[1].all()
+    later = samples.time_s > samples.time_s[-1] / 2
+    return changed(recording, rate=np.where(later[:, None], spoil(samples), samples.rate))
+
+
 def _few_rests() -> ImuRecording:
     recording = hand_short()[1]
     fourth = survey(recording).rests[4]
@@ -136,6 +143,14 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
     "exchanged axes": (
         lambda: _with(rate=_samples().rate[:, [1, 2, 0]]),
         ("exchanged axes", "z, x, y", "rate_columns"),
+    ),
+    "exchanged from half-way on": (
+        lambda: _changed_half_way(lambda s: s.rate[:, [1, 0, 2]]),
+        ("up to here", "gyros' x, y, z, and from here on as the gyros' y, x, z", "cut"),
+    ),
+    "increments from half-way on": (
+        lambda: _changed_half_way(lambda s: s.rate / hand_short()[1].rate_hz),
+        ("from here on as about 100 times the gyros' x, y, z", "kind of samples"),
     ),
     "left-handed": (
         lambda: _with(force=_samples().force * [1.0, 1.0, -1.0]),

@@ -23,6 +23,7 @@ from dynamic_cases import (
     table_of,
     write_unit,
 )
+from hand_cases import hand_short, stated
 from triaxcal.cli.main import main
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.limits import ImuLimits
@@ -156,6 +157,13 @@ def _nonlinear() -> tuple[ImuRecording, DataSheet]:
     return changed(recording, rate=bent), noise
 
 
+def _bent_forces() -> tuple[ImuRecording, DataSheet]:
+    """By hand: at each rest the gyros read another part of the Earth's rate, which is no jump."""
+    truth, recording = hand_short()
+    force = recording.all().force
+    return changed(recording, force=force * (1 + 2e-3 * force / 9.81)), stated(truth)
+
+
 def _clipped() -> tuple[ImuRecording, DataSheet]:
     recording, noise = _fast()
     rate = recording.all().rate
@@ -200,6 +208,11 @@ CONTRADICTIONS: dict[
         _nonlinear,
         {"innovations", "held-out turns"},
         ("nonlinearity of the gyros, which is switched off",),
+    ),
+    "nonlinear accelerometers by hand": (
+        _bent_forces,
+        {"effects that are off"},
+        ("nonlinearity of the accelerometers, which is switched off",),
     ),
     "noise stated too small": (
         _noisier,

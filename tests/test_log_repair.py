@@ -11,14 +11,20 @@ from spoiled_logs import (
     RATE_HZ,
     SLOW_FORCES,
     Spoil,
+    fastest,
     forces_empty,
     holes_of_50_ms,
+    increments_among_instants,
     jitter,
+    jitter_of_3_ms_and_lost,
+    knocked,
     log_of,
     mended,
+    one_far_off,
     packets_of_ten,
     restarted,
     stamps_of_seconds,
+    zeros,
 )
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.repair import repaired
@@ -107,6 +113,53 @@ def test_a_pause_is_a_gap_and_no_turn_is_made_up() -> None:
     found = mended(np.delete(whole, slice(1000, 1100), 0))
     assert len(found.samples) == len(whole) - 100
     assert "1 gap in the gyros and accelerometers, the longest 1 s at 10 s" in found.findings[-1]
+
+
+def test_rows_lost_among_jittered_ones_are_lost_where_they_were() -> None:
+    """The angles over 4 s are off by what holes of known place are, and not by a row's change."""
+    whole = rows(240.0)
+    samples = mended(jitter_of_3_ms_and_lost(whole)).samples
+    assert samples.turn_variance is not None
+    place = np.rint((samples.time_s - whole[0, 0]) * RATE_HZ).astype(int)
+    place = place.clip(0, len(whole) - 1)
+    off = np.cumsum(samples.rate - whole[place, 1:4], axis=0) / RATE_HZ
+    known = np.cumsum(samples.turn_variance)
+    span = slice(4 * 100, None, 4 * 100)
+    error, variance = np.diff(off[span], axis=0), np.diff(known[span])
+    # The variance is that of the worst axis; a row that is displaced in a turn adds some hundred
+    # times as much.
+    assert np.mean(error**2) < np.mean(variance) * (1 + 4 * np.sqrt(2 / error.size))
+
+
+def test_one_stray_row_is_a_lost_sample() -> None:
+    whole = rows()
+    found = mended(one_far_off(whole))
+    assert "1 row whose rates do not fit between those before and after" in found.findings[0]
+    off = np.abs(found.samples.rate - whole[:, 1:4])
+    assert off[fastest(whole)].max() < 10 * SD_RATE
+    assert np.delete(off, fastest(whole), 0).max() == 0.0
+
+
+def test_zeros_of_a_driver_are_lost_samples() -> None:
+    whole = rows()
+    off = np.abs(mended(zeros(whole)).samples.rate - whole[:, 1:4])
+    # What is left is below a twentieth of the fastest readings.
+    assert off.max() < 0.05 * np.abs(whole[:, 1:4]).max()
+
+
+def test_knocks_are_left_as_they_are() -> None:
+    whole = knocked(rows())
+    assert np.array_equal(mended(whole).samples.rate, whole[:, 1:4])
+    assert np.array_equal(mended(whole).samples.force, whole[:, 4:])
+
+
+def test_increments_among_instants_are_refused() -> None:
+    with pytest.raises(RefusedError) as refusal:
+        mended(increments_among_instants(rows()))
+    said = str(refusal.value)
+    assert "of 4000 rows of the gyros do not fit between the rows before and after" in said
+    assert "they read 0.01 of it: increments among instants?" in said
+    assert "rate_samples in [dynamic] holds for every row" in said
 
 
 def test_samples_that_are_uneven_in_truth_keep_their_stamps() -> None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.blocks.attitude import skew
+from triaxcal.dynamic.halfway import refuse_change
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import WINDOW_S, Windows
 from triaxcal.model.types import FloatArray
@@ -40,7 +41,9 @@ def refuse_wrong_units(recording: ImuRecording, windows: Windows) -> None:
     """
     start = _quietest(windows)
     _refuse_force(recording, np.median(windows.force[start], axis=0))
-    _refuse_rate(recording, windows, np.median(windows.rate[start], axis=0))
+    bias = np.median(windows.rate[start], axis=0)
+    refuse_change(recording, windows, bias)
+    _refuse_rate(recording, windows, bias)
 
 
 def _quietest(windows: Windows) -> slice:

@@ -19,6 +19,7 @@ from triaxcal.readings.beats import step_of
 from triaxcal.readings.format import PIECE
 from triaxcal.readings.held import stuck
 from triaxcal.readings.opened import RecordingFile
+from triaxcal.readings.strays import strays
 from triaxcal.readings.table import TIME, Quantity, ReadTable, read_table
 from triaxcal.unit.recordingfile import ClockLayout, FileLayout
 
@@ -148,7 +149,7 @@ def even_step(table: ReadTable) -> float | None:
         last_s = float(piece[-1, 0])
         if np.abs(step - step_s).max() > UNEVEN * step_s or not np.isfinite(piece).all():
             return None
-        if any(stuck(piece[:, part]).any() for part in triads):
+        if any((stuck(piece[:, k]) | strays(piece[:, k])).any() for k in triads):
             return None
     return step_s
 

@@ -14,10 +14,12 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.screentext import counted
+from triaxcal.dynamic.misplaced import settled
 from triaxcal.dynamic.parts import NAMES, Log, Part, between, hole_words
 from triaxcal.dynamic.polled import density_words, white_density
 from triaxcal.dynamic.recording import ImuSamples
 from triaxcal.dynamic.series import at_times, held_series, series_of
+from triaxcal.dynamic.strayrows import stray_rows
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 from triaxcal.readings.evenclock import EvenClock, taken_at_stamps
 from triaxcal.readings.held import changed, held_share, stuck
@@ -164,6 +166,7 @@ def _parts(log: Log, names: tuple[str, ...]) -> tuple[list[Part], list[str]]:
             words.append(f"samples are uneven by {rms}, and are taken at their stamps")
         else:
             words.append(f"stamps scatter by {rms} about an even clock of {hz}: its times are used")
+            clock = settled(clock, stamps_s, values)
     else:
         uneven = np.std(np.diff(stamps_s) / np.diff(clock.number) - clock.step_s)
         if uneven > UNEVEN * clock.step_s:
@@ -204,6 +207,13 @@ def _unheld(
             words.append(
                 f"{_rows(int((~known).sum()))} with the readings of the row before while the "
                 "unit moves: taken as lost"
+            )
+        stray = stray_rows(log, places, values, clock) & known
+        if stray.any():
+            known &= ~stray
+            words.append(
+                f"{_rows(int(stray.sum()))} whose rates do not fit between those before and after: "
+                "taken as lost"
             )
         return [Part(places, series_of(clock, values, known, _turns(places)))]
     whole = {name: place for name, place in places.items() if shares[name]}

@@ -37,6 +37,8 @@ class _Tried:
     cause: Cause
     total: float
     direct: bool = False
+    innovations: float = 0.0
+    rival: bool = False
 
 
 def causes_of(
@@ -58,7 +60,12 @@ def causes_of(
     if not explains and len(together) > 1:
         names.append(" with ".join(f'"{e.name}"' for e in together))
         explains = [t for t in [_together(case, together, held)] if t.cause.left <= MOST_LEFT]
-    direct = [t for t in explains if t.direct]
+    effects = [t.innovations for t in explains if not t.direct]
+    direct = [
+        t
+        for t in explains
+        if t.direct and not (t.rival and t.innovations + EQUAL > min(effects, default=np.inf))
+    ]
     likely = sorted((t for t in explains if not t.direct), key=lambda t: t.total)
     likely = [t for t in likely if t.total - likely[0].total < EQUAL]
     named = tuple(t.cause for t in (*direct, *likely))
@@ -86,7 +93,7 @@ def _of_suspect(suspect: Suspect) -> _Tried:
         left += shares
         total += more
     cause = Cause(suspect.words, suspect.remedy, max(left))
-    return _Tried(cause, total, suspect.direct)
+    return _Tried(cause, total, suspect.direct, last[0], suspect.rival)
 
 
 def _held_shares(y: FloatArray, covariance: FloatArray) -> tuple[list[float], float]:
@@ -129,4 +136,4 @@ def _effects(
         remedy = f'switch on "{effect.name}" in [dynamic] blocks'
         if effect.hint:
             remedy += f", unless: {effect.hint}"
-        yield _Tried(Cause(words, remedy, max(left)), total)
+        yield _Tried(Cause(words, remedy, max(left)), total, innovations=value)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.stats import chi2
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.blocks import north
@@ -24,6 +25,9 @@ from triaxcal.model.types import FloatArray
 
 JUMP_SD = 6.0
 """Of the noise of means at rest: a smaller jump is not tried."""
+CHANCE, BIASES = 1e-6, 6
+"""The gyros' readings at rest change with the Earth's rate too: new biases have to lower the
+chi-square by more than chance does."""
 FEWEST = 10
 """Windows on each side of a jump."""
 
@@ -68,9 +72,10 @@ class Change:
         if jump is None:
             return None
         biases = _new_biases(case, jump)
-        only_biases = Suspect(f"biases {jump.words}", REMEDY, biases, None, direct=True)
+        only_biases = Suspect(f"biases {jump.words}", REMEDY, biases, None, True, rival=True)
         if biases[0] <= largest(biases[1]):
-            return only_biases
+            gain = case.result.passes[-1].chi_square - biases[0]
+            return only_biases if gain > chi2.isf(CHANCE, BIASES) else None
         result = case.result
         blocks = tuple(b for b in result.layout.blocks if b not in (*BASE, north.BLOCK))
         degc = result.frame.reference_degc
@@ -80,7 +85,7 @@ class Change:
             return only_biases
         chi = sum(part.passes[-1].chi_square for part in parts)
         freedom = sum(part.passes[-1].freedom for part in parts)
-        return Suspect(f"constants {jump.words}", REMEDY, (chi, freedom), None, direct=True)
+        return Suspect(f"constants {jump.words}", REMEDY, (chi, freedom), None, True)
 
 
 def _new_biases(case: Case, jump: Jump) -> tuple[float, int]:

@@ -28,6 +28,9 @@ class Suspect:
     direct : bool
         Whether the recording shows the cause itself, and the trial leaves a part of it out or
         changes its noise: its chi-square is none of the same data.
+    rival : bool
+        Of a direct cause whose chi-square is of the same data all the same: an effect that is as
+        likely, or more, is named in its place.
     """
 
     words: str
@@ -35,6 +38,7 @@ class Suspect:
     innovations: tuple[float, int]
     held: HeldOut | None
     direct: bool = False
+    rival: bool = False
 
 
 class Trial(Protocol):

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from triaxcal.model.types import FloatArray, IntArray
+from triaxcal.readings.phase import beats_by_phase
 
 PAUSE_S = 0.25
 """After a longer pause a clock need not go on with the same beats."""
@@ -50,7 +51,12 @@ def numbered(stamps_s: FloatArray, step_s: float) -> IntArray:
     beats = np.where(pause, whole, 1.0)
     edges = [0, *(np.flatnonzero(pause) + 1).tolist(), len(stamps_s)]
     for first, last in pairwise(edges):
-        beats[first : last - 1] += _lost_after(stamps_s[first:last], step_s)
+        part = stamps_s[first:last]
+        by_phase = beats_by_phase(part, step_s)
+        if by_phase is None:
+            beats[first : last - 1] += _lost_after(part, step_s)
+        else:
+            beats[first : last - 1] = np.diff(by_phase)
     return np.concatenate([[0], np.cumsum(beats)]).astype(np.int64)
 
 
