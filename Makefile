@@ -20,7 +20,7 @@ NAMED = case "$$UNIT" in \
     */*) echo "make: UNIT=$$UNIT is a path; say UNIT=<name>, one of:" $$(ls units) >&2; exit 1;; esac
 
 .DEFAULT_GOAL := help
-.PHONY: help series test-versions test-long test-verify rig-demo test-can calib-header verify certify fuzz mutation simulate test check lint types nightly bench golden docs clean test-targets bench-target
+.PHONY: help series test-versions test-long test-verify rig-demo test-can calib-header verify certify fuzz mutation mutation-by-proof simulate test check lint types nightly bench golden docs clean test-targets bench-target
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-28s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -47,6 +47,9 @@ fuzz: $(DEVELOPER)  ## Images against the loaders, text against the parsers, for
 
 mutation: $(DEVELOPER)  ## EVERY=<n>: does the vector set find each n-th mutant of the generated C?
 	@$(BIN)/python fuzz/mutation.py --every "$${EVERY:-1}"
+
+mutation-by-proof: $(DEVELOPER)  ## EVERY=<n>: does WP refuse each n-th mutant, as the vectors do? (an hour for all)
+	@$(BIN)/python fuzz/mutation.py --proof --every "$${EVERY:-10}"
 
 simulate: $(INSTALLED)  ## UNIT=<name>: write the measurements of a simulated unit again
 	@$(NAMED)

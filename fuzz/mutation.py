@@ -1,9 +1,13 @@
 """Mutation testing of the generated C, the constants and the image, on a few shapes.
 
-python fuzz/mutation.py [--every 1] [--shape NAME] [--units units] [--selftest]
+python fuzz/mutation.py [--every 1] [--shape NAME] [--units units] [--selftest | --proof]
 
 With --selftest: how many mutants of triax_comp.c the self-test of the unit finds alone, and which
 it does not. No survivor is a failure then.
+
+With --proof: mutants of triax_comp.c by the vectors and by Frama-C WP, for shapes with contracts.
+Exit code 1 when a mutant is proven that the vectors kill, or one survives both without a reason on
+file.
 
 Exit code 1 when a mutant survives that is not on file as equivalent, or when an entry of that file
 covers none (told only when every mutant of every shape was made).
@@ -18,7 +22,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from triaxcal.codegen.annotations import not_covered
 from triaxcal.codegen.names import Names
+from triaxcal.verify.mutants_by_proof import PROOFS, both_campaigns
 from triaxcal.verify.mutation import (
     CAMPAIGNS,
     EQUIVALENT,
@@ -46,7 +52,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--shape", choices=list(ALL_SHAPES), action="append")
     parser.add_argument("--units", type=Path, default=HERE.parent / "units")
     parser.add_argument("--selftest", action="store_true", help="by the self-test alone")
+    parser.add_argument("--proof", action="store_true", help="by the vectors and by proof")
     given = parser.parse_args(arguments)
+    if given.proof:
+        agree = [_proof(s, given.units, given.every) for s in given.shape or ALL_SHAPES]
+        return int(not all(agree))
     if given.selftest:
         for shape in given.shape or ALL_SHAPES:
             _selftest(shape, given.units, given.every)
@@ -76,6 +86,26 @@ def _shape(shape: str, units: Path, every: int) -> list[Verdict]:
                     print(f"  survived: {verdict.mutant}", flush=True)
             verdicts += found
     return verdicts
+
+
+def _proof(shape: str, units: Path, every: int) -> bool:
+    """Whether the vectors and WP agree, and nothing survives both without a reason on file."""
+    made = subject(shape, units)
+    if reason := not_covered(made.plan.shape):
+        print(f"{shape}: no contracts for {reason}", flush=True)
+        return True
+    with tempfile.TemporaryDirectory(prefix="triaxcal-mutants-") as folder:
+        work = Workspace.create(Path(folder), made.files, made.plan, made.bound)
+        found = both_campaigns(Bench(work, shape), every)
+    counts = Counter((v.by_vectors, v.by_proof) for v in found)
+    for fate in FATES:
+        told = ", ".join(f"{counts[fate, p]} {p}" for p in PROOFS if counts[fate, p])
+        if told:
+            print(f"{shape}, {fate}: {told}", flush=True)
+    for verdict in found:
+        if verdict.contradicts or verdict.open:
+            print(f"  {verdict}", flush=True)
+    return not any(v.contradicts or (v.open and v.by_vectors != EQUIVALENT) for v in found)
 
 
 def _selftest(shape: str, units: Path, every: int) -> None:

@@ -11,8 +11,9 @@ from triaxcal.base.tools import MissingToolError
 from triaxcal.codegen.annotations import not_covered, with_contracts, without_annotations
 from triaxcal.codegen.render import annotated_routine, render_routine, specification
 from triaxcal.verify import wp
-from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED
+from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 from triaxcal.verify.shapes import ALL_SHAPES, Subject
+from triaxcal.verify.workspace import Workspace
 from verify.conftest import Planter, needs
 
 COVERED = "direct-two-segments"
@@ -84,6 +85,7 @@ def test_every_goal_is_proven_and_known_the_next_time(
     outcome = wp.check(work)
     assert outcome.result == PASSED, outcome
     goals = outcome.figures["goals"]
+    assert outcome.figures["smoke_tests"] > len(goals)
     assert {"set_temperature", "apply", "lemmas", "evaluate_rows"} <= set(goals)
     monkeypatch.setattr(wp, "_prove", lambda *_: pytest.fail("the same texts are proven again"))
     assert wp.check(work) == outcome
@@ -112,21 +114,41 @@ FAULTS = {
 """Function whose goals fail, and the mistake."""
 
 
+def judged(
+    work: Workspace, monkeypatch: pytest.MonkeyPatch, function: str, old: str, new: str
+) -> Outcome:
+    """The outcome of one function alone, with a text of the annotated C replaced."""
+    text = annotated_routine(work.plan)
+    assert text.count(old) == 1, old
+    name = re.search(rf"{function}\w*", text)
+    assert name is not None
+    monkeypatch.setattr(wp, "annotated_routine", lambda _: text.replace(old, new))
+    monkeypatch.setattr(wp, "functions_of", lambda *_: [name[0]])
+    monkeypatch.setattr(wp, "GOAL_S", 5)
+    monkeypatch.setattr(wp, "_LEMMAS", ())
+    return wp.check(work)
+
+
 @PROVERS
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(FAULTS))
 def test_a_planted_mistake_is_not_proven(
     plant: Planter, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    function, old, new = FAULTS[name]
-    work = plant(COVERED)
-    text = annotated_routine(work.plan)
-    assert text.count(old) == 1, old
-    monkeypatch.setattr(wp, "annotated_routine", lambda _: text.replace(old, new))
-    monkeypatch.setattr(wp, "GOAL_S", 5)
-    for group in ("OF_VALUES", "OF_MEMORY", "WRAPPING"):
-        monkeypatch.setattr(wp, group, tuple(n for n in getattr(wp, group) if n == function))
-    monkeypatch.setattr(wp, "_LEMMAS", ())
-    outcome = wp.check(work)
+    outcome = judged(plant(COVERED), monkeypatch, *FAULTS[name])
     assert outcome.result == FAILED
     assert "not proven: " in outcome.finding
+
+
+@PROVERS
+@pytest.mark.slow
+def test_what_is_proven_from_a_contradiction_fails(
+    plant: Planter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = "requires step_bound(c, mag(p)) <= INT32_MAX;"
+    new = "requires step_bound(c, mag(p)) < 0; ensures 1 == 2;"
+    outcome = judged(plant(COVERED), monkeypatch, "horner_step", old, new)
+    goals, proven = outcome.figures["goals"]["horner_step"], outcome.finding.split(" ")[0]
+    assert int(proven) == goals > 3
+    assert outcome.result == FAILED
+    assert "not proven: horner_step_wp_smoke_default_requires" in outcome.finding

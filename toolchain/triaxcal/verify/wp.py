@@ -13,7 +13,7 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from triaxcal.codegen.annotations import not_covered
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.render import annotated_routine, specification
 from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
-from triaxcal.verify.tools import BrokenToolError, run
+from triaxcal.verify.tools import BrokenToolError, run, run_until
 from triaxcal.verify.workspace import Workspace
 
 KEY, TITLE = "wp", "WP: C = specification"
@@ -42,7 +42,10 @@ OF_MEMORY = (
 )  # fmt: skip
 WRAPPING = ("apply",)
 """Its test of the raw range subtracts modulo 2^32, as C defines."""
+SMOKE = "_wp_smoke_"
+"""Name of a goal that asks whether anything follows from nothing: WP must not prove it."""
 _LINE = re.compile(r"^\[wp\] \[(.+?)\] Goal (\w+)( : Valid.*)?", re.MULTILINE)
+_SMOKE = re.compile(r"^\[wp\] \[(\w+)\] Smoke-test typed_(\w+)", re.MULTILINE)
 _COUNT = re.compile(r"Proved goals: +(\d+) / (\d+)")
 _TIME = re.compile(r"\(([\d.]+m?s)\)")
 
@@ -54,6 +57,16 @@ class Part:
     functions: tuple[str, ...]
     specification: str
     options: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Place:
+    """Folder and C file that WP reads, what its link names begin with, and the provers' setting."""
+
+    folder: Path
+    file: str
+    linked: str
+    config: Mapping[str, str]
 
 
 _LEMMAS = (
@@ -71,13 +84,10 @@ def check(work: Workspace) -> Outcome:
     """
     if reason := not_covered(work.plan.shape):
         return Outcome(KEY, TITLE, NOT_DONE, f"not done for {reason}")
-    versions = _versions()
+    found = versions()
     folder = work.folder / "wp"
-    folder.mkdir(exist_ok=True)
-    texts = _texts(work)
-    for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    known = _known(texts, versions)
+    texts = write_texts(work, folder)
+    known = _known(texts, found)
     before = known.is_file()
     goals = json.loads(known.read_text(encoding="utf-8")) if before else _prove(work, folder)
     unproven = [name for name, goal in goals.items() if not goal["prover"]]
@@ -86,15 +96,24 @@ def check(work: Workspace) -> Outcome:
         partial = known.with_suffix(f".{os.getpid()}")
         partial.write_text(json.dumps(goals, indent=1, sort_keys=True), encoding="utf-8")
         partial.replace(known)
-    counts = Counter(goal["function"] for goal in goals.values())
-    finding = f"{len(goals) - len(unproven)} of {len(goals)} goals, every input; not the loader"
+    smoke = {name for name in goals if SMOKE in name}
+    counts = Counter(goal["function"] for name, goal in goals.items() if name not in smoke)
+    proven, passed = (set(names) - set(unproven) for names in (goals.keys() - smoke, smoke))
+    finding = (
+        f"{len(proven)} of {counts.total()} goals, every input; "
+        f"{len(passed)} of {len(smoke)} smoke tests; not the loader"
+    )
     if unproven:
         finding += f"; not proven: {unproven[0]}"
-    figures: dict[str, Any] = {"versions": versions, "goals": dict(sorted(counts.items()))}
+    figures: dict[str, Any] = {
+        "versions": found,
+        "goals": dict(sorted(counts.items())),
+        "smoke_tests": len(smoke),
+    }
     return judged(KEY, TITLE, good=not unproven, finding=finding, figures=figures, details=unproven)
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
     """First line of what each program says about its version.
 
     Raises
@@ -111,16 +130,27 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _texts(work: Workspace) -> dict[str, str]:
-    """Header and annotated C, and the specification with definitions and without."""
+def write_texts(work: Workspace, folder: Path) -> dict[str, str]:
+    """Write header, annotated C and both forms of the specification; return them by name."""
     plan = work.plan
     header = work.named("triax_comp.h")
-    return {
+    texts = {
         header: (work.folder / header).read_text(encoding="utf-8"),
         work.named("triax_comp.c"): annotated_routine(plan),
         "specification.h": specification(plan, opaque=False),
         "opaque.h": specification(plan, opaque=True),
     }
+    folder.mkdir(exist_ok=True)
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return texts
+
+
+def prepared(work: Workspace, folder: Path) -> Place:
+    """The folder with what Why3 needs to find the provers."""
+    config = {"WHY3CONFIG": str(folder / "why3.conf")}
+    run(["why3", "config", "detect"], folder, config)
+    return Place(folder, work.named("triax_comp.c"), names_of(work.plan).linked, config)
 
 
 def _known(texts: dict[str, str], versions: dict[str, str]) -> Path:
@@ -133,67 +163,118 @@ def _known(texts: dict[str, str], versions: dict[str, str]) -> Path:
 
 def _prove(work: Workspace, folder: Path) -> dict[str, dict[str, str]]:
     """Every goal, with its function, its prover (none where unproven) and the time it took."""
-    config = {"WHY3CONFIG": str(folder / "why3.conf")}
-    run(["why3", "config", "detect"], folder, config)
-    linked = names_of(work.plan).linked
-    file = work.named("triax_comp.c")
-    text = (folder / file).read_text(encoding="utf-8")
-    present = [name.removeprefix(f"{linked}_") for name in _functions(text, linked)]
+    place = prepared(work, folder)
+    present = functions_of((folder / place.file).read_text(encoding="utf-8"), place.linked)
     goals: dict[str, dict[str, str]] = {}
-    for part in _parts(present):
-        goals |= _run(folder, file, part, linked, config)
+    for part in (*_LEMMAS, *parts_of(present)):
+        goals |= goals_of(place, part)
     return goals
 
 
-def _functions(text: str, linked: str) -> list[str]:
-    """Functions of the C that have a contract, by their link names."""
-    heads = re.findall(r"\*/\n(?:static )?u?int\d+_t (\w+)\(|\*/\nstatic void (\w+)\(", text)
+def functions_of(text: str, linked: str) -> list[str]:
+    """Functions of the C that have a contract; exported ones without the triad's name."""
+    contract = r"^/\*@(?:[^*]|\*(?!/))*\*/\n(?:static )?(?:void|u?int\d+_t) (\w+)\("
     triad = linked.rpartition("_")[0]
-    return [
-        name.replace(f"{triad}_", f"{linked}_", 1) if name.startswith(f"{triad}_") else name
-        for name in (a or b for a, b in heads)
-    ]
+    return [name.removeprefix(f"{triad}_") for name in re.findall(contract, text, re.MULTILINE)]
 
 
-def _parts(present: Sequence[str]) -> list[Part]:
+def parts_of(present: Sequence[str]) -> list[Part]:
+    """Runs that prove functions of the C.
+
+    Raises
+    ------
+    ValueError
+        Where one of them is in no group.
+    """
+
     def of(names: Sequence[str]) -> tuple[str, ...]:
         return tuple(p for p in present if re.sub(r"_\d+$", "", p) in names)
 
     no_wrap = ("-warn-unsigned-overflow",)
     functions = ("-wp-prop=-@lemma",)
     parts = [
-        *_LEMMAS,
         Part(of(OF_VALUES), "specification.h", no_wrap + functions),
         Part(of(OF_MEMORY), "opaque.h", no_wrap + functions),
         Part(of(WRAPPING), "opaque.h", functions),
     ]
-    return [part for part in parts if part.functions or part in _LEMMAS]
+    grouped = [name for part in parts for name in part.functions]
+    if sorted(grouped) != sorted(present):
+        raise ValueError(f"contracts of {present}, groups for {grouped}")
+    return [part for part in parts if part.functions]
 
 
-def _run(
-    folder: Path, file: str, part: Part, linked: str, config: dict[str, str]
-) -> dict[str, dict[str, str]]:
+def _command(place: Place, part: Part, limit_s: int) -> tuple[list[str], list[str]]:
+    """What runs a part, and the link names of its functions."""
+    linked = place.linked
     exported = ("set_temperature", "apply")
     names = [f"{linked}_{name}" if name in exported else name for name in part.functions]
     chosen = ("-wp-fct", ",".join(names)) if names else ()
     command = [
-        TOOLS["frama-c"].find(), *OPTIONS, "-wp-timeout", str(GOAL_S), *part.options, *chosen,
-        f"-cpp-extra-args=-include {part.specification}", file,
+        TOOLS["frama-c"].find(), *OPTIONS, "-wp-timeout", str(limit_s), *part.options, *chosen,
+        f"-cpp-extra-args=-include {part.specification}", place.file,
     ]  # fmt: skip
-    answer = run(command, folder, config)
+    return command, names
+
+
+def goals_of(place: Place, part: Part) -> dict[str, dict[str, str]]:
+    """Every goal of a part, with function, prover (none where unproven) and time.
+
+    Raises
+    ------
+    BrokenToolError
+    """
+    command, names = _command(place, part, GOAL_S)
+    if names:
+        command.insert(-1, "-wp-smoke-tests")
+    answer = run(command, place.folder, place.config)
     counted = _COUNT.search(answer.text)
     if answer.code or counted is None:
         raise BrokenToolError(f"frama-c: {' '.join(answer.text.split())[-300:]}")
     goals = {}
     for prover, goal, valid in _LINE.findall(answer.text):
-        function = max((n for n in names if f"_{n}_" in f"{goal}_"), key=len, default="lemmas")
         time = _TIME.findall(valid)
         goals[goal.removeprefix("typed_")] = {
-            "function": function.removeprefix(f"{linked}_"),
+            "function": _function(goal, place.linked, names),
             "prover": prover if valid else "",
             "time": time[-1] if time else "",
         }
+    for result, test in _SMOKE.findall(answer.text):
+        passed = "no contradiction" if result == "Passed" else ""
+        function = _function(test, place.linked, names)
+        goals[test] = {"function": function, "prover": passed, "time": ""}
     proven = sum(bool(goal["prover"]) for goal in goals.values())
     if (proven, len(goals)) != tuple(map(int, counted.groups())):
         raise BrokenToolError(f"frama-c: {counted[0]}, but {proven} of {len(goals)} reported")
     return goals
+
+
+def _function(goal: str, linked: str, names: Sequence[str]) -> str:
+    function = max((n for n in names if f"_{n}_" in f"_{goal}_"), key=len, default="lemmas")
+    return function.removeprefix(f"{linked}_")
+
+
+def is_proven(place: Place, part: Part, limit_s: int) -> bool | None:
+    """Whether every goal of a part is proven; the first that is not ends the run.
+
+    None where Frama-C does not accept the C.
+
+    Raises
+    ------
+    BrokenToolError
+    """
+    command, _ = _command(place, part, limit_s)
+    answer = run_until(_is_open_goal, command, place.folder, place.config)
+    if answer is None:
+        return False
+    counted = _COUNT.search(answer.text)
+    if counted is None:
+        return None
+    proven, goals = map(int, counted.groups())
+    if answer.code or not goals or proven != goals:
+        raise BrokenToolError(f"frama-c: {' '.join(answer.text.split())[-300:]}")
+    return True
+
+
+def _is_open_goal(line: str) -> bool:
+    found = _LINE.match(line)
+    return found is not None and not found[3]
