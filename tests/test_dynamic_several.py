@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynamic_cases import SHORT_MOVES, UNIT_TOML, held, sheet, table_of, write_unit
+from dynamic_cases import SHORT_MOVES, UNIT_TOML, changed, held, sheet, table_of, write_unit
 from dynamic_judge import true_constants
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.blocks.base import BASE
@@ -17,6 +17,7 @@ from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.several import BREAK_S, joined_recordings, read_recordings
+from triaxcal.dynamic.temperatures import recorded_temperatures
 from triaxcal.dynamic.unit import calibrate_unit
 from triaxcal.simulation.imu import simulate_imu
 from triaxcal.simulation.imu_grades import MEMS, draw_truth
@@ -91,6 +92,19 @@ def test_a_recording_that_is_missing_is_named(tmp_path: Path) -> None:
     unit = folder_of_two(tmp_path)
     (unit / "b.csv").unlink()
     assert refusal(unit).startswith("IMU/b.csv: no such file; ")
+
+
+def test_a_thermometer_without_the_noise_that_it_has_elsewhere_is_stuck() -> None:
+    one, two = both()[1]
+    noise = 0.02 * np.random.default_rng(3).standard_normal(len(one.all()))
+    reads = (
+        changed(one, temp_degc=40.0 + noise),
+        changed(two, temp_degc=np.full(len(two.all()), 20.0)),
+    )
+    with pytest.raises(RefusedError, match=r"reads the same for .* is stuck"):
+        recorded_temperatures(joined_recordings(list(reads)))
+    coarse = changed(one, temp_degc=40.0 + 0.5 * (noise > 0.05)), reads[1]
+    assert recorded_temperatures(joined_recordings(list(coarse))) is not None
 
 
 def test_recordings_of_two_rates_are_refused(tmp_path: Path) -> None:

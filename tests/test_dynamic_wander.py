@@ -53,6 +53,17 @@ def test_states_move_as_gauss_markov_and_random_walk() -> None:
     np.testing.assert_allclose(hour, np.repeat([2.0 * DEG_PER_H, 30.0 * MICRO_G], 3), rtol=1e-12)
 
 
+def test_a_night_between_two_recordings_forgets_and_divides_by_no_zero() -> None:
+    """The filter divides by the factor: at exp(-745) it would be zero."""
+    wander = wander_of(Layout(BASE), SHEET, DURATION_S)
+    factor, sd = wander.over(12 * 3600.0)
+    assert 12 * 3600.0 / wander.memory_s.min() > 745
+    assert factor.min() > 0
+    shortest = wander.memory_s < 3600.0
+    assert factor[shortest].max() < 1e-5
+    np.testing.assert_allclose(sd[shortest], wander.sd[shortest], rtol=1e-4)
+
+
 def test_white_noise_alone_moves_nothing() -> None:
     wander = wander_of(Layout(BASE), DataSheet(0.12, 50.0), DURATION_S)
     assert len(wander.columns) == 0

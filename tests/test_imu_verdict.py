@@ -150,6 +150,13 @@ def _two_effects() -> tuple[ImuRecording, DataSheet]:
     return _sound(accel_delay_ms=5.0, gyro_g_deg_per_h_per_g=drift)
 
 
+def _beside_the_axis() -> tuple[ImuRecording, DataSheet]:
+    """20 cm from the table's axis, at 60 deg/s: 0.2 m/s^2."""
+    motion = three_axes(2.0, still_s=20.0)
+    away = tuple(replace(m, centre_mm=(150.0, 100.0, -120.0)) for m in motion.mountings)
+    return _sound(replace(motion, mountings=away))
+
+
 def _nonlinear() -> tuple[ImuRecording, DataSheet]:
     recording, noise = _fast()
     rate = recording.all().rate
@@ -203,6 +210,11 @@ CONTRADICTIONS: dict[
         _two_effects,
         {"innovations", "effects that are off"},
         ("delay of the accelerometers behind the gyros and g-dependent gyro drift together",),
+    ),
+    "a unit far beside the table's axis": (
+        _beside_the_axis,
+        {"innovations"},
+        ("lever arm of the table's centre",),
     ),
     "scale nonlinearity of 1e-3": (
         _nonlinear,

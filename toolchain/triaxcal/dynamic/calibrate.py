@@ -150,7 +150,7 @@ def calibrate_dynamic(
         f"after {allowed} passes the constants still move by {moved:.1f} standard deviations",
         expected="a recording that the model describes",
         remedy="check "
-        + "that all recordings are of one unit, " * bool(recording.starts_s)
+        + "that all recordings are of one unit, their temperatures, " * bool(recording.starts_s)
         + "units, axes, conventions and the noise that unit.toml states",
     )
 

@@ -54,17 +54,22 @@ def recorded_temperatures(recording: ImuRecording) -> Recorded | None:
     length = max(1, round(PIECE_S * recording.rate_hz))
     start, degc = [], []
     steps, ahead = _Steps(), list(recording.starts_s)
+    known: list[_Steps] = []
     for piece in recording.pieces():
         if piece.temp_degc is None:
             return None
         if ahead and piece.time_s[0] >= ahead[0]:
-            steps.refuse_stuck(recording.name)
+            known.append(steps)
             steps, ahead = _Steps(), ahead[1:]
         for k in range(0, len(piece), length):
             start.append(float(piece.time_s[k]))
             degc.append(float(np.median(piece.temp_degc[k : k + length])))
         steps.add(piece.time_s, piece.temp_degc)
-    steps.refuse_stuck(recording.name)
+    known.append(steps)
+    usual_degc = max(each.usual_degc for each in known)
+    names = recording.names or (recording.name,) * len(known)
+    for name, each in zip(names, known, strict=True):
+        each.refuse_stuck(name, usual_degc)
     found = Recorded(np.array(start), np.array(degc))
     low, high = found.ends_degc
     if not (PLAUSIBLE_DEGC[0] <= low and high <= PLAUSIBLE_DEGC[1]):
@@ -99,16 +104,26 @@ class _Steps:
         self.since_s, self.value = float(begins[-1]), float(degc[-1])
         self.sizes.append(np.abs(step[changed]))
 
-    def refuse_stuck(self, name: str) -> None:
-        """Refuse a run of equal readings that the thermometer's own noise makes impossible."""
+    @property
+    def usual_degc(self) -> float:
+        """Usual step from reading to reading; 0 where it is one of few sizes, by rounding alone."""
         sizes = np.concatenate(self.sizes)
-        if len(sizes) == 0 or self.longest_s < STUCK_S:
-            return
-        if float(np.median(sizes)) >= RESOLVED * float(sizes.min()):
+        if len(sizes) == 0 or np.median(sizes) < RESOLVED * sizes.min():
+            return 0.0
+        return float(np.median(sizes))
+
+    def refuse_stuck(self, name: str, usual_degc: float) -> None:
+        """Refuse a run of equal readings that the thermometer's own noise makes impossible.
+
+        The noise is seen elsewhere in this recording; or in others, if it has none at all.
+        """
+        own = np.concatenate(self.sizes)
+        usual_degc = self.usual_degc if len(own) else usual_degc
+        if usual_degc and self.longest_s >= STUCK_S:
             raise RefusedError(
                 f"{name}, {self.longest_start_s:.1f} s",
                 f"the temperature reads the same for {self.longest_s:.0f} s, and elsewhere changes "
-                f"by {np.median(sizes):.2g} degC from reading to reading: the thermometer is stuck",
+                f"by {usual_degc:.2g} degC from reading to reading: the thermometer is stuck",
                 expected="a thermometer that follows the unit",
                 remedy="record again, or cut the recording there",
             )

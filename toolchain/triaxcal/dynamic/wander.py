@@ -43,6 +43,9 @@ STEPS = 2.0
 STEPS_MIN = 100
 """Of a random walk in a recording."""
 
+FORGOTTEN = 30.0
+"""Time constants after which nothing of a value is left, 1e-13; the filter divides by what is."""
+
 
 @dataclass(frozen=True)
 class Wander:
@@ -72,7 +75,7 @@ class Wander:
 
     def over(self, seconds: float) -> tuple[FloatArray, FloatArray]:
         """Factor of the old values, and deviation of what is added, in a time; shapes (m,)."""
-        factor = np.exp(-seconds / self.memory_s)
+        factor = np.exp(-np.minimum(seconds / self.memory_s, FORGOTTEN))
         walks = np.isinf(self.memory_s)
         growth = np.where(walks, seconds, -np.expm1(-2 * seconds / self.memory_s))
         return factor, self.sd * np.sqrt(growth)

@@ -18,6 +18,7 @@ from triaxcal.base.progress import Progress
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.layout import Layout
 from triaxcal.dynamic.missing import Effect, without_others
+from triaxcal.evidence.afresh import solved_beside_the_axis
 from triaxcal.evidence.case import Case
 from triaxcal.evidence.chance import EXPLAINED, chi_square, largest, lengths, stacked
 from triaxcal.evidence.check import Cause, Evidence
@@ -60,6 +61,10 @@ def causes_of(
     if not explains and len(together) > 1:
         names.append(" with ".join(f'"{e.name}"' for e in together))
         explains = [t for t in [_together(case, together, held)] if t.cause.left <= MOST_LEFT]
+    if not explains:
+        report("trying a unit beside the table's axis", 0.0)
+        suspect = solved_beside_the_axis(case)
+        explains = [] if suspect is None else [_of_suspect(suspect)]
     effects = [t.innovations for t in explains if not t.direct]
     direct = [
         t

@@ -1,4 +1,4 @@
-"""Why no constants describe a recording: whether two parts of it each have some."""
+"""Why no constants describe a recording: a unit beside the axis, or constants that change."""
 
 from __future__ import annotations
 
@@ -8,17 +8,24 @@ from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.restnoise import with_rests
 from triaxcal.dynamic.several import read_recordings
 from triaxcal.dynamic.survey import survey
+from triaxcal.evidence.afresh import beside_the_axis
 from triaxcal.evidence.change import REMEDY, halves, largest_jump
 
 
 def explained(unit: DynamicDescription, refusal: NotSettledError) -> RefusedError:
-    """The refusal, with the largest jump at rest as its cause if both parts settle alone.
+    """The refusal with its cause: a place beside the table's axis, or the largest jump at rest.
 
-    If a part is refused as well, the refusal stays as it is.
+    A jump is one if both parts settle alone; otherwise the refusal stays as it is.
     """
     recording = read_recordings(unit)
     found = survey(recording)
     noise = with_rests(recording.name, found, unit.noise)
+    beside = beside_the_axis(recording, unit.noise, unit.state_blocks(), unit.reference_degc)
+    if beside is not None:
+        return RefusedError(
+            refusal.place, refusal.found, expected=refusal.expected,
+            remedy=f"explained by: {beside.words}; {beside.remedy}",
+        )  # fmt: skip
     jump = largest_jump(found, noise)
     if jump is None:
         return refusal
