@@ -12,6 +12,7 @@ from thermal_cases import POINTS, at_point, solved, truth_of
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.agreement import Difference, recordings_differ, refuse_others
 from triaxcal.dynamic.calibrate import calibrate_dynamic
+from triaxcal.dynamic.otherunits import refuse_other_angles
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.several import joined_recordings
 from triaxcal.dynamic.temperatures import recorded_temperatures
@@ -86,12 +87,29 @@ def test_a_point_of_another_unit_is_refused_over_temperature() -> None:
         refuse_others(found)
 
 
-def test_a_thermometer_that_stays_at_another_temperature_is_refused() -> None:
+@pytest.mark.parametrize("number", [6, 7])
+def test_two_units_at_two_temperatures_are_refused_by_their_angles(number: int) -> None:
+    """Any two units lie on a straight line over temperature; one unit keeps its angles."""
+    truth, second = truth_of(6), truth_of(number)
+    points = [at_point(truth, POINTS[0], 60), at_point(second, POINTS[-1], 61)]
+    whole = joined_recordings([replace(r, name=f"{k}.csv") for k, r in enumerate(points)])
+    degc = recorded_temperatures(whole)
+    assert degc is not None
+    known = solved(truth, whole).over.known
+    if number == 6:
+        refuse_other_angles(whole, degc, known)
+        return
+    with pytest.raises(RefusedError, match=r"1.csv: the gyros' misalignments differ by 0.\d+ deg"):
+        refuse_other_angles(whole, degc, known)
+
+
+def test_a_thermometer_that_reads_another_temperature_is_refused() -> None:
     """The chamber was at 50 degC, and the thermometer reads the 20 degC of the point before."""
     truth = truth_of(6)
     points = [at_point(truth, t, 60 + k) for k, t in enumerate(POINTS)]
-    stuck = np.full(len(points[3].all()), 20.0)
-    points[3] = changed(points[3], temp_degc=stuck)
+    read = points[3].all().temp_degc
+    assert read is not None
+    points[3] = changed(points[3], temp_degc=read - np.median(read) + 20.0)
     found = over_temperature(points)
     assert {d.name for d in found} & {"2.csv", "3.csv"}
     with pytest.raises(RefusedError, match="and their temperatures"):
