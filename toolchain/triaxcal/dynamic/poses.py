@@ -41,7 +41,8 @@ DETERMINED = 0.01
 STEPS = 20
 HALVINGS = 10
 OUTLIER_SD = 6.0
-"""Of the scatter of the others: never in a thousand sound recordings."""
+"""Of the stated noise of a rest, and of the scatter of the others: by noise alone a residual was at
+most 5.4 of its deviations in 1700 simulated recordings of 18 to 45 rests."""
 RESTS_MIN = 2 * len(LAYOUT)
 """With fewer, one that is wrong bends the constants instead of standing out."""
 SMALL_M_PER_S2 = 1e-3
@@ -125,7 +126,9 @@ def static_poses(recording: ImuRecording, found: Survey, noise: DataSheet) -> St
     window = _variance(noise, recording, WINDOW_S)
     sd = np.sqrt(variance)
     rests = _Forces.of(found, window / gravity)
-    tolerance = rest_tolerance(recording)
+    # The least sum of absolute residuals goes through nine rests: of few rests the median residual
+    # is far below the noise.
+    tolerance = max(rest_tolerance(recording), OUTLIER_SD * float(np.median(sd)))
     keep = _refused_or_kept(recording, found, rests, tolerance)
     p, covariance = _solved(rests, keep / sd, gravity)
     residual = rests.sizes(p) - gravity
@@ -246,8 +249,8 @@ def _refused_or_kept(
     for _ in range(STEPS):
         weight = 1 / np.sqrt(np.maximum(np.abs(residual), SMALL_M_PER_S2) * SMALL_M_PER_S2)
         residual = rests.sizes(_solved(rests, weight, gravity)[0]) - gravity
-    usual = 1.4826 * float(np.median(np.abs(residual)))
     size = np.abs(residual)
+    usual = 1.4826 * float(np.median(size))
     keep[:] = size < max(tolerance, OUTLIER_SD * usual)
     firsts = {section.start_s for section in found.sections}
     begins = np.array([rest.start_s in firsts for rest in found.rests])
