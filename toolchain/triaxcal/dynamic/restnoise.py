@@ -23,7 +23,7 @@ PAIRS_MIN = 9
 EDGE = 3
 """Windows at each end of a rest that do not count."""
 NOISIER = 3.0
-"""Of the median: a rest of 9 differences in three axes is beyond it once in 10^5."""
+"""Of the median: a rest of 9 differences in three axes is beyond it once in 20 000, simulated."""
 
 
 def with_rests(name: str, found: Survey, stated: DataSheet) -> DataSheet:
