@@ -11,7 +11,8 @@ import numpy as np
 import triaxcal
 from dynamic_cases import COLUMNS, UNIT_TOML, write_unit
 from hand_motion import shaped_flicker
-from triaxcal.dynamic.noise import DEG_PER_H, MICRO_G
+from triaxcal.dynamic.blocks.base import DEG_PER_H
+from triaxcal.dynamic.noise import MICRO_G
 from triaxcal.dynamic.wander import FLOOR
 
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from triaxcal.api.study import Study
 from triaxcal.base.errors import RefusedError
+from triaxcal.dynamic.blocks.base import DEG_PER_H
 from triaxcal.dynamic.columns import RecordedFile
 from triaxcal.dynamic.description import read_dynamic
-from triaxcal.dynamic.noise import DEG_PER_H, MICRO_G, DataSheet, noise_section
+from triaxcal.dynamic.noise import MICRO_G, DataSheet, noise_section
 from triaxcal.dynamic.recording import INCREMENT, ImuSamples
 from triaxcal.dynamic.several import read_recordings
 from triaxcal.noise.allan import FLICKER

@@ -24,9 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.dynamic.blocks.attitude import rotation_of
+from triaxcal.dynamic.blocks.base import ARCSEC
 from triaxcal.dynamic.blocks.block import Signals
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.noise import ARCSEC, DataSheet
+from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import Turntable
 from triaxcal.model.types import BoolArray, FloatArray
 

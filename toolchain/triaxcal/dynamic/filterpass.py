@@ -17,11 +17,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from triaxcal.dynamic.blocks.attitude import level, rotation_of
+from triaxcal.dynamic.blocks.base import ARCSEC
 from triaxcal.dynamic.channels import Moments, extra_rows, steady
-from triaxcal.dynamic.noise import ARCSEC
 from triaxcal.dynamic.passdata import History, PassResult, Reference, Task
 from triaxcal.dynamic.preintegrate import BlockEquations, equations
-from triaxcal.dynamic.recording import ImuRecording, ImuSamples, joined
+from triaxcal.dynamic.recording import ImuSamples, joined
 from triaxcal.dynamic.rootfilter import RootFilter
 from triaxcal.dynamic.steps import Steps
 from triaxcal.dynamic.survey import Section
@@ -149,7 +149,7 @@ class _Pass:
         self._done = 0
         pool: ImuSamples | None = None
         lead = 0
-        pieces = section_samples(self.recording, section)
+        pieces = self.recording.between(section.first, section.last, CHUNK)
         ended = False
         while True:
             wanted = lead + 1 + self.blocks * size + MARGIN
@@ -288,15 +288,3 @@ class _Pass:
         history.sd.append(np.sqrt((root**2).sum(axis=1)))
         history.chi_square.append(self.filter.chi_square)
         history.freedom.append(self.filter.freedom)
-
-
-def section_samples(recording: ImuRecording, section: Section) -> Iterator[ImuSamples]:
-    """Samples of one section, in chunks."""
-    count = 0
-    for chunk in recording.chunks(CHUNK):
-        low, high = max(section.first - count, 0), min(section.last + 1 - count, len(chunk))
-        if low < high:
-            yield chunk[low:high]
-        count += len(chunk)
-        if count > section.last:
-            return

@@ -10,8 +10,6 @@ from triaxcal.base.keys import setting
 from triaxcal.base.kinds import number
 from triaxcal.dynamic.recording import INCREMENT
 
-ARCSEC = math.pi / 180 / 3600
-DEG_PER_H = math.pi / 180 / 3600
 MICRO_G = 9.80665e-6
 """Of standard gravity, as data sheets mean it; m/s^2."""
 

@@ -199,6 +199,17 @@ class ImuRecording:
         if count:
             yield joined(waiting)
 
+    def between(self, first: int, last: int, length: int) -> Iterator[ImuSamples]:
+        """Samples of the numbers `first` to `last`, in chunks of at most `length`."""
+        count = 0
+        for chunk in self.chunks(length):
+            low, high = max(first - count, 0), min(last + 1 - count, len(chunk))
+            if low < high:
+                yield chunk[low:high]
+            count += len(chunk)
+            if count > last:
+                return
+
     def all(self) -> ImuSamples:
         """Everything in one piece, for short recordings."""
         return joined(self.pieces())

@@ -24,9 +24,10 @@ from typing import Any
 
 import numpy as np
 
+from triaxcal.dynamic.blocks.base import DEG_PER_H
 from triaxcal.dynamic.blocks.block import AXIS, State, StateBlock, bias_rows
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.noise import DEG_PER_H, MICRO_G, DataSheet
+from triaxcal.dynamic.noise import MICRO_G, DataSheet
 from triaxcal.model.types import FloatArray, IntArray
 
 FLOOR = math.sqrt(2 * math.log(2) / math.pi)

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from triaxcal.base.screentext import counted
+from triaxcal.dynamic.blocks.base import DEG_PER_H
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.limits import ImuLimits
 from triaxcal.dynamic.missing import Effect
-from triaxcal.dynamic.noise import DEG_PER_H
 from triaxcal.evidence.check import MODEL_TOLERANCE, SHARE, Check
 from triaxcal.evidence.heldout import HeldOut
 from triaxcal.evidence.prediction import LENGTH, ROWS
