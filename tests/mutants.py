@@ -81,7 +81,7 @@ MUTANTS: dict[str, list[Mutant]] = {
     "inverse-saturating": [
         Mutant(
             "shift truncated",
-            "asr64_29(int64_t value)\n{\n    return (value < 0) ? (~(~value >> 29))",
+            "asr64_29(int64_t value)\n{\n    return (value < 0) ? (-1 - ((-1 - value) >> 29))",
             "asr64_29(int64_t value)\n{\n    return (value < 0) ? (-(-value >> 29))",
         ),
         Mutant("saturation upwards dropped", "result = (int64_t)INT32_MAX;", ";"),

@@ -116,6 +116,17 @@ def test_every_check_passes_over_temperature(build: ImuBuild, tmp_path: Path) ->
 CHECK = {key: check for key, _, check in imu.CHECKS}
 
 
+@needs("frama-c")
+def test_contracts_in_the_delivered_files_do_not_stop_eva(tmp_path: Path) -> None:
+    """Their words are defined in a file that Eva does not read."""
+    accel, gyro = triads()
+    full = replace(accel.adc, bits=32, code_min=-(2**31), code_max=2**31 - 1)
+    made = build_imu(imu_of(), (replace(accel, adc=full), gyro), (PROVENANCE, PROVENANCE), 100)
+    assert b"/*@ requires" in made.files["triax_comp.c"]
+    outcome = CHECK["eva_image"](imu.Both.create(tmp_path, made))
+    assert outcome.result == PASSED, outcome
+
+
 def broken(build: ImuBuild, folder: Path, old: str, new: str) -> imu.Both:
     """Files of an IMU with a text of triax_imu.c replaced."""
     text = build.files["triax_imu.c"].decode()

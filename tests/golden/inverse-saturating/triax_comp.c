@@ -27,25 +27,25 @@ static int32_t high_word(int64_t value)
 /* floor(value / 2^2) */
 static int64_t asr64_2(int64_t value)
 {
-    return (value < 0) ? (~(~value >> 2)) : (value >> 2);
+    return (value < 0) ? (-1 - ((-1 - value) >> 2)) : (value >> 2);
 }
 
 /* floor(value / 2^29) */
 static int64_t asr64_29(int64_t value)
 {
-    return (value < 0) ? (~(~value >> 29)) : (value >> 29);
+    return (value < 0) ? (-1 - ((-1 - value) >> 29)) : (value >> 29);
 }
 
 /* floor(value / 2^30) */
 static int64_t asr64_30(int64_t value)
 {
-    return (value < 0) ? (~(~value >> 30)) : (value >> 30);
+    return (value < 0) ? (-1 - ((-1 - value) >> 30)) : (value >> 30);
 }
 
 /* floor(value / 2^31) */
 static int64_t asr64_31(int64_t value)
 {
-    return (value < 0) ? (~(~value >> 31)) : (value >> 31);
+    return (value < 0) ? (-1 - ((-1 - value) >> 31)) : (value >> 31);
 }
 
 static int32_t saturate32(int64_t value)

@@ -34,7 +34,6 @@ def not_covered(shape: Shape) -> str:
     """Which part of a shape has no complete contracts; "" where all have them."""
     parts = {
         "the inverse form": shape.inverse is not None,
-        "saturating results": shape.saturates,
         "terms added to the sums": shape.adds_to_sums,
         "a term in dT/dt": shape.rate,
         "functions that do not depend on temperature": not shape.order,

@@ -73,14 +73,14 @@ def specification(plan: Plan, *, opaque: bool) -> str:
         Without the definitions of products, floors and polynomials; the lemmas about them stay.
     """
     spare = plan.shape.output_shift - 32
-    floors = {32, plan.shape.output_shift, *([spare] if spare > 0 else [])}
+    floors = {32, plan.shape.output_shift, *([spare] if spare > 0 else []), *shifts_64(plan.shape)}
     context = {
         **names_of(plan).context,
         **_portable_context(plan),
         "file": routine_file(plan, PORTABLE),
         "opaque": opaque,
         "floors": sorted(floors),
-        "last_shift": 32,
+        "last_shift": max(floors),
     }
     return environment().get_template("verify/specification.h.j2").render(context)
 

@@ -78,13 +78,21 @@ def _check(work: Workspace, key: str, title: str, entry: str, form: str) -> Outc
     driver = work.render(
         f"{key}_{DRIVER}", "verify/eva.c.j2", {"ranges": range_literals(work.plan)}
     )
-    # Eva has no specification to read the contracts by; its lines are those of the delivered file.
-    routine = work.folder / key / work.forms[form]
-    routine.parent.mkdir(exist_ok=True)
-    delivered = (work.folder / work.forms[form]).read_text(encoding="utf-8")
-    routine.write_text(blanked_contracts(delivered), encoding="utf-8")
-    sources = (f"{key}/{routine.name}", work.named(CONSTANTS), driver.name)
+    routines = without_contracts(work.folder, key, [work.forms[form]])
+    sources = (*routines, work.named(CONSTANTS), driver.name)
     return analyse(work.folder, Analysis(key, title, entry, ENTRIES[entry], sources))
+
+
+def without_contracts(folder: Path, key: str, names: Sequence[str]) -> list[str]:
+    """Write C files again into the folder `key` for Eva, and return their paths in `folder`.
+
+    Eva has no specification to read the contracts by; its lines are those of the delivered files.
+    """
+    (folder / key).mkdir(exist_ok=True)
+    for name in names:
+        text = (folder / name).read_text(encoding="utf-8")
+        (folder / key / name).write_text(blanked_contracts(text), encoding="utf-8")
+    return [f"{key}/{name}" for name in names]
 
 
 @dataclass(frozen=True)

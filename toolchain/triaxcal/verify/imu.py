@@ -127,7 +127,8 @@ def _verify_both(folder: Path, build: ImuBuild) -> tuple[Outcome, ...]:
 def _eva(work: Both, key: str, title: str, entry: str, form: str) -> Outcome:
     driver = work.render(f"{key}_{_DRIVER}", "verify/eva_imu.c.j2", _ranges(work.build))
     ends = {entry, "sample" if entry == "verify_imu_codes" else "accepted"}
-    asked = eva.Analysis(key, title, entry, ends, (*work.sources_in(form), driver.name))
+    sources = eva.without_contracts(work.folder, key, work.sources_in(form))
+    asked = eva.Analysis(key, title, entry, ends, (*sources, driver.name))
     return eva.analyse(work.folder, asked)
 
 

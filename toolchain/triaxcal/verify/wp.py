@@ -34,11 +34,15 @@ OPTIONS = (
     "-machdep", "x86_32", "-warn-right-shift-negative", "-warn-signed-downcast", "-wp", "-wp-rte",
     "-wp-model", "Typed", "-wp-prover", "cvc4,z3", "-wp-par", "1",
 )  # fmt: skip
-OF_VALUES = ("s32", "high_word", "asr32", "magnitude", "times", "evaluate", "x_q31_of")
+OF_VALUES = (
+    "s32", "high_word", "asr32", "asr64", "saturate32", "magnitude", "times", "evaluate",
+    "x_q31_of", "reciprocal",
+)  # fmt: skip
 """Functions proven with every definition."""
 OF_MEMORY = (
     "horner_step", "evaluate_column", "evaluate_rows", "rounded", "clamp_raw", "apply_row",
-    "apply_rows", "set_temperature",
+    "apply_rows", "set_temperature", "sensitivity_sum", "copy_terms",
+    "minor_of", "invert", "clear_rows",
 )  # fmt: skip
 WRAPPING = ("apply",)
 """Its test of the raw range subtracts modulo 2^32, as C defines."""
@@ -71,7 +75,7 @@ class Place:
 
 _LEMMAS = (
     Part((), "specification.h", ("-wp-prop=@lemma",)),
-    Part((), "opaque.h", ("-wp-prop=row_bounded_of",)),
+    Part((), "opaque.h", ("-wp-prop=row_bounded_of,words_fit_of",)),
 )
 
 
