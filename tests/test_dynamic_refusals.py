@@ -82,6 +82,32 @@ def _changed_half_way(spoil: Callable[[ImuSamples], np.ndarray]) -> ImuRecording
     return changed(recording, rate=np.where(later[:, None], spoil(samples), samples.rate))
 
 
+def _never_turned() -> ImuRecording:
+    """Eleven seconds at rest; coarse rates, whose changes of sign are no turns."""
+    still = part(mems_short()[1], _samples().time_s < 11.0)
+    noise = np.radians(0.3) * np.random.default_rng(3).standard_normal((len(still.all()), 3))
+    return changed(still, rate=still.all().rate + noise)
+
+
+def _until(rests: int) -> np.ndarray:
+    """Samples of a hand up to the end of so many rests."""
+    recording = hand_short()[1]
+    last = survey(recording).rests[rests - 1]
+    return np.asarray(recording.all().time_s < last.start_s + last.duration_s)
+
+
+def _parts() -> ImuRecording:
+    """The rests of a hand alone, without the turns between them, as if nothing were left out."""
+    recording, samples = hand_short()[1], hand_short()[1].all()
+    inside = np.zeros(len(samples), dtype=bool)
+    for rest in survey(recording).rests:
+        inside |= (samples.time_s >= rest.start_s) & (
+            samples.time_s < rest.start_s + rest.duration_s
+        )
+    kept = part(recording, inside)
+    return changed(kept, time_s=samples.time_s[: inside.sum()])
+
+
 def _few_rests() -> ImuRecording:
     recording = hand_short()[1]
     fourth = survey(recording).rests[4]
@@ -141,6 +167,18 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
     "g for m/s^2": (
         lambda: _with(force=_samples().force / 9.80665),
         ("the force at rest is 0.99", "g taken for m/s^2?", "force_unit"),
+    ),
+    "never turned": (
+        _never_turned,
+        ("the unit rests 1 time only",),
+    ),
+    "one turn of a hand": (
+        lambda: part(hand_short()[1], _until(2)),
+        ("the unit rests 2 times only",),
+    ),
+    "parts of a recording, one after the other": (
+        _parts,
+        ("gravity turns in the unit by", "of how it turns", "use the whole recording"),
     ),
     "exchanged axes": (
         lambda: _with(rate=_samples().rate[:, [1, 2, 0]]),

@@ -115,7 +115,7 @@ def test_the_wrong_kind_of_unit_is_told_in_one_line() -> None:
         ("poses", "IMU-SIM", "a whole IMU, [dynamic]; expected the unit of one accelerometer"),
         ("drift", "IMU-SIM", "`triaxcal dynamic "),
         ("poses", "AT-SIM", "no table [recording]"),
-        ("dynamic", "AT-SIM", "no table [dynamic]; expected a whole IMU on a turntable; `triaxcal"),
+        ("dynamic", "AT-SIM", "no table [dynamic]; expected a whole IMU; `triaxcal"),
     ):
         result = CliRunner().invoke(main, [command, str(UNITS / unit)])
         assert isinstance(result.exception, RefusedError)

@@ -77,7 +77,7 @@ def guided(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Operator, Gu
     # What is demanded is written before the recording proper.
     with (folder / "unit.toml").open("a", encoding="utf-8") as file:
         file.write(LIMITS)
-    (folder / "frames.log").unlink()
+    assert not (folder / "frames.log").exists()
     taken = GuidedRecording(folder, None, "can0", at_once)
     give(operator.hold(12.0))
     for _ in range(40):
@@ -170,6 +170,8 @@ def test_an_existing_log_becomes_a_unit(tmp_path: Path) -> None:
          "../../tilter.dbc does not lie beside it"),
         (["--bus", "replay:x", "--rig", "automotive-imu", "--latitude", "50", "--gravity", "9.81"],
          "no gyros; expected gyro_x, gyro_y and gyro_z"),
+        (["--bus", "replay:x", "--rig", "can-imu", "--latitude", "50", "--gravity", "9.81"],
+         "x: cannot be read: no such file"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_recorded_is_refused(
@@ -178,7 +180,15 @@ def test_what_cannot_be_recorded_is_refused(
     code, said = run(tmp_path / "U", *arguments)
     assert code == 1
     assert text in said
-    assert not (tmp_path / "U" / "frames.log").exists()
+    assert not (tmp_path / "U").exists()  # the next try finds nothing in its way
+
+
+def test_a_name_that_is_no_serial_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    options = ["--bus", "replay:x", "--rig", "can-imu", "--latitude", 50, "--gravity", G]
+    code, said = run(tmp_path / "my unit", *options)
+    assert code == 1
+    assert "unit name: found 'my unit'" in said
+    assert not (tmp_path / "my unit").exists()
 
 
 def test_options_of_a_first_unit_and_a_unit_that_is_there(tmp_path: Path) -> None:
@@ -203,6 +213,7 @@ def test_a_log_of_another_rig_is_refused_and_one_without_a_rest_is_kept(tmp_path
     code, said = run(tmp_path / "A", "--bus", f"replay:{log}", *options)
     assert code == 1
     assert "frames.log: no sample of" in said
+    assert not (tmp_path / "A" / "frames.log").exists()
     log.write_text("\n".join(imu_cases.lines(joined(operator.pieces))) + "\n")
     code, said = run(tmp_path / "B", "--bus", f"replay:{log}", *options)
     assert code == 0

@@ -17,6 +17,7 @@ from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.noise import MICRO_G, DataSheet, noise_section
 from triaxcal.dynamic.recording import INCREMENT, ImuSamples
 from triaxcal.dynamic.several import read_recordings
+from triaxcal.model.types import FloatArray
 from triaxcal.noise.allan import FLICKER
 from triaxcal.noise.stretch import SAMPLES_MIN
 from triaxcal.noise.study import NoiseStudy, study_noise
@@ -29,6 +30,9 @@ from triaxcal.report.testreport.text import figure_lines
 GAP = 1.5
 """Of an interval: a step as long as that has lost a sample."""
 RATE_UNIT = "deg/h"
+MEAN_S = 1.0
+LEAN_DEG, TURN = 2.0, 1.0
+"""Means of a second at rest stay within them: 35 mg and 1 deg/s are beyond what a bias wanders."""
 
 
 def study_imu_noise(
@@ -46,6 +50,7 @@ def study_imu_noise(
     step_s = 1 / recording.rate_hz
     rate = samples.rate / (step_s if recording.rate_convention == INCREMENT else 1.0)
     force = samples.force / (step_s if recording.force_convention == INCREMENT else 1.0)
+    _refuse_motion(recorded.name, rate, force, samples.time_s - samples.time_s[0])
     gyro = study_noise(recorded.name, rate / DEG_PER_H, step_s, longest_tau_s)
     accel = study_noise(recorded.name, force / MICRO_G, step_s, longest_tau_s)
     head = f"{recorded.name}: {len(samples)} samples, one every {step_s:.6g} s; 95 % intervals"
@@ -55,10 +60,9 @@ def study_imu_noise(
         *figure_lines("gyros at rest", tuple(_of_gyros(gyro))),
         "",
         *figure_lines("accelerometers at rest", tuple(noise_figures(accel, "", MICRO_G_WORD, 1.0))),
-        *gyro.findings,
-        *(finding for finding in accel.findings if finding not in gyro.findings),
+        *(f"gyros: {finding}" for finding in gyro.findings),
+        *(f"accelerometers: {f}" for f in accel.findings if f not in gyro.findings),
         "",
-        "for unit.toml, the root mean squares of the axes:",
         *_section(unit.noise, gyro, accel),
     ]
 
@@ -94,8 +98,33 @@ def _longest(name: str, samples: ImuSamples, step_s: float) -> ImuSamples:
     return found
 
 
+def _refuse_motion(name: str, rate: FloatArray, force: FloatArray, time_s: FloatArray) -> None:
+    """Refuse a recording in which the unit turns: its coefficients would be those of the motion."""
+    starts = np.flatnonzero(np.diff(np.floor(time_s / MEAN_S), prepend=-1.0))
+    count = np.diff([*starts, len(time_s)])[:, None]
+    rates = np.add.reduceat(rate, starts) / count
+    forces = np.add.reduceat(force, starts) / count
+    up = forces / np.linalg.norm(forces, axis=1)[:, None]
+    lean = np.linalg.norm(up - up[0], axis=1)
+    turn = np.abs(rates - np.median(rates, axis=0)).max(axis=1)
+    for what, size, limit in (("gravity moves in the unit by", lean, LEAN_DEG), ("", turn, TURN)):
+        moved = np.degrees(size) > limit
+        if moved.any():
+            worst = float(np.degrees(size).max())
+            found = f"{what} {worst:.3g} deg" if what else f"the unit turns at {worst:.3g} deg/s"
+            raise RefusedError(
+                name,
+                f"{found}, first at {time_s[starts[np.argmax(moved)]]:.0f} s",
+                expected="a recording at rest",
+                remedy="cut out the part at rest; `triaxcal dynamic` takes the noise of a "
+                "recording with turns from its rests",
+            )
+
+
 def _section(stated: DataSheet, gyro: NoiseStudy, accel: NoiseStudy) -> list[str]:
     """[noise] with what the recording determines; counts are in its white noise."""
+    if not (gyro.trusted and accel.trusted):
+        return ["no [noise] for unit.toml: outputs jump; cut those parts out"]
     hour = 60.0  # root seconds of a root hour
     found: dict[str, float] = {
         "gyro_arw_deg_per_sqrt_h": _mean(gyro, "N") / hour,
@@ -106,7 +135,10 @@ def _section(stated: DataSheet, gyro: NoiseStudy, accel: NoiseStudy) -> list[str
         "accel_random_walk_ug_per_sqrt_h": _mean(accel, "K") * hour,
     }
     shown = {name: float(f"{value:.3g}") for name, value in found.items() if value}
-    return noise_section(replace(stated, **shown), shown)
+    if not shown:
+        return ["no figure for [noise] of unit.toml: the recording determines none"]
+    head = "for unit.toml, the root mean squares of the axes:"
+    return [head, *noise_section(replace(stated, **shown), shown)]
 
 
 def _mean(study: NoiseStudy, symbol: str) -> float:

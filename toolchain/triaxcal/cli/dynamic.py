@@ -1,4 +1,4 @@
-"""`triaxcal dynamic`: a whole IMU from a recording on a turntable."""
+"""`triaxcal dynamic`: a whole IMU from a recording by hand or on a table."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from triaxcal.cli.progress import bar, calibrate
     "recording.",
 )
 def dynamic(unit: Path, build: Path, plan: bool) -> None:
-    """Calibrate a whole IMU from a recording on a turntable.
+    """Calibrate a whole IMU that is turned by hand or on a table.
 
     The folder UNIT has the recording, and a unit.toml with the table [dynamic].
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,11 +15,13 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.extras import quoted
 from triaxcal.cli.options import UnitFolder, example
 from triaxcal.cli.rig_options import PLAIN, BusOption, refuse_missing_bench
-from triaxcal.unit.folder import UNIT_FILE
+from triaxcal.unit.folder import UNIT_FILE, check_unit_name
 
 if TYPE_CHECKING:
     from triaxcal.guide.firstunit import Place
     from triaxcal.guide.session import GuidedRecording
+    from triaxcal.rig.bus.frames import Frames
+    from triaxcal.rig.description.description import RigDescription
     from triaxcal.rig.simulated.simulator import SimulatedRig
     from triaxcal.rig.sources.source import Source
 
@@ -35,8 +38,16 @@ _REFRESH_S = 0.25
 @click.argument("unit", type=UnitFolder())
 @click.option("--bus", required=True, cls=BusOption)
 @click.option("--rig", "rig_file", help="Rig description with gyros, for a unit without unit.toml.")
-@click.option("--latitude", type=float, help="Of the place, deg, for a unit without unit.toml.")
-@click.option("--gravity", type=float, help="At the place, m/s^2, for a unit without unit.toml.")
+@click.option(
+    "--latitude",
+    type=click.FloatRange(-90.0, 90.0),
+    help="Of the place, deg, for a unit without unit.toml.",
+)
+@click.option(
+    "--gravity",
+    type=click.FloatRange(9.7, 9.9),
+    help="At the place, m/s^2, for a unit without unit.toml.",
+)
 @click.option("--seconds", type=float, help="Stop after this time; by default at Ctrl-C.")
 @PLAIN
 def imu(  # noqa: PLR0917
@@ -55,22 +66,28 @@ def imu(  # noqa: PLR0917
     the folder UNIT. Where that has no unit.toml, one is written.
     """
     refuse_missing_bench()
-    place = _place(unit, rig_file, latitude, gravity)
-    from triaxcal.guide.session import GuidedRecording, at_once  # noqa: PLC0415
+    from triaxcal.guide.firstunit import copy_description  # noqa: PLC0415
+    from triaxcal.guide.session import GuidedRecording, at_once, recorded_rig  # noqa: PLC0415
     from triaxcal.rig.sources.source import Wanted, kind_of  # noqa: PLC0415
 
+    first = _first(unit, rig_file, latitude, gravity)
     kind = kind_of(bus)
     if kind.simulated:
         raise RefusedError("--bus virtual", "simulates no IMU", expected="a bus, or replay:LOG")
     from_log = kind.name == "replay"
+    rig = recorded_rig(unit) if first is None else first.rig
     with contextlib.ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(1))
+        wanted = Wanted(bus, rig.fd, _no_rig, rig.lines)
+        source = stack.enter_context(contextlib.closing(kind.open(wanted)))
+        begun = _read(source)
+        if first is not None:  # What can be refused has been: nothing is left half-written.
+            copy_description(first.rig_file, unit)
+        place = None if first is None else first.place
         taken = GuidedRecording(unit, place, bus, at_once if from_log else pool.submit)
         stack.enter_context(contextlib.closing(taken))
-        wanted = Wanted(bus, taken.rig.fd, _no_rig, taken.rig.lines)
-        source = stack.enter_context(contextlib.closing(kind.open(wanted)))
         show = _Plain() if plain else stack.enter_context(_Screen())
-        _run(taken, source, seconds, from_log, show)
+        _run(taken, source, begun, seconds, from_log, show)
         taken.finish()
     _say_end(unit, taken)
 
@@ -80,11 +97,22 @@ def _no_rig() -> SimulatedRig:
     raise AssertionError
 
 
-def _place(
+@dataclass(frozen=True)
+class _First:
+    """A unit without unit.toml: its place, and its rig description where that lies now."""
+
+    place: Place
+    rig_file: Path
+    rig: RigDescription
+
+
+def _first(
     unit: Path, rig_file: str | None, latitude: float | None, gravity: float | None
-) -> Place | None:
-    """Place of a unit without unit.toml, with its rig description copied; None of another."""
-    from triaxcal.guide.firstunit import Place, copy_description  # noqa: PLC0415
+) -> _First | None:
+    """What a first unit.toml is written from; None of a unit that has one."""
+    from triaxcal.guide.firstunit import Place, refuse_files_elsewhere  # noqa: PLC0415
+    from triaxcal.guide.stream import ImuStream  # noqa: PLC0415
+    from triaxcal.rig.description.rigfile import read_description  # noqa: PLC0415
     from triaxcal.rig.description.shippedrigs import find_description  # noqa: PLC0415
 
     given = {"--rig": rig_file, "--latitude": latitude, "--gravity": gravity}
@@ -92,7 +120,10 @@ def _place(
         named = next((name for name, value in given.items() if value is not None), None)
         if named is not None:
             raise RefusedError(
-                named, f"given, and {unit / UNIT_FILE} is there", expected="what that file says"
+                named,
+                f"given, and {unit / UNIT_FILE} is there",
+                expected="what that file says",
+                remedy=f"omit {named}; or correct or remove the file",
             )
         return None
     missing = next((name for name, value in given.items() if value is None), None)
@@ -105,20 +136,37 @@ def _place(
     assert rig_file is not None
     assert latitude is not None
     assert gravity is not None
-    copy_description(find_description(rig_file), unit)
-    return Place(latitude, gravity)
+    check_unit_name(unit.absolute().name)
+    file = find_description(rig_file)
+    refuse_files_elsewhere(file, unit)
+    rig = read_description(file)
+    ImuStream(rig)
+    return _First(Place(latitude, gravity), file, rig)
 
 
-def _run(
-    taken: GuidedRecording, source: Source, seconds: float | None, from_log: bool, show: _Plain
-) -> None:
-    """Record until the demands are met, the time is over, the log has ended, or Ctrl-C."""
+def _read(source: Source) -> Frames | None:
+    """The next frames; None at the end of a log."""
     from triaxcal.rig.sources.source import LogEndedError  # noqa: PLC0415
 
+    try:
+        return source.read()
+    except LogEndedError:
+        return None
+
+
+def _run(  # noqa: PLR0917
+    taken: GuidedRecording,
+    source: Source,
+    frames: Frames | None,
+    seconds: float | None,
+    from_log: bool,
+    show: _Plain,
+) -> None:
+    """Record until the demands are met, the time is over, the log has ended, or Ctrl-C."""
     end = time.monotonic() + (seconds or float("inf"))
-    with contextlib.suppress(KeyboardInterrupt, LogEndedError):
-        while time.monotonic() < end:
-            for _ in taken.feed(source.read()):
+    with contextlib.suppress(KeyboardInterrupt):
+        while frames is not None and time.monotonic() < end:
+            for _ in taken.feed(frames):
                 show.show(taken)
             taken.log.flush()
             for note in source.notes():
@@ -126,6 +174,7 @@ def _run(
             done = taken.guide is not None and taken.guide.done is not None
             if done and not from_log:
                 return
+            frames = _read(source)
 
 
 class _Plain:

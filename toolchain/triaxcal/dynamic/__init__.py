@@ -1,1 +1,1 @@
-"""Whole-IMU calibration on a rough single-axis turntable: state blocks and a square-root filter."""
+"""Whole-IMU calibration, by hand or on a rough turntable: state blocks, square-root filter."""

@@ -1,4 +1,4 @@
-"""unit.toml of a unit on a turntable: [site], [dynamic], [noise], [table], [limits], [device]."""
+"""unit.toml of an IMU: [site], [dynamic], [noise], [table], [limits], [device]."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from triaxcal.unit.thermal import ThermalChoice, thermal_choice
 
 @dataclass(frozen=True)
 class DynamicDescription:
-    """A unit on a turntable.
+    """A whole IMU.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ def imu_file() -> FileKeys:
     """Keys of the unit.toml of an IMU."""
     return FileKeys(
         UNIT_FILE,
-        "A whole IMU on a turntable",
+        "A whole IMU",
         (
             TOP,
             TURNING_SITE,
@@ -204,7 +204,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         raise RefusedError(
             str(path),
             "no table [dynamic]",
-            expected="a whole IMU on a turntable",
+            expected="a whole IMU",
             remedy=f"`triaxcal calib {folder}` calibrates this unit; see docs/how-to/imu.md",
         )
     tables = imu_file().read(path)

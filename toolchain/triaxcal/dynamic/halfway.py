@@ -24,6 +24,8 @@ LEFT = 0.85
 """Of the squares that the best single M leaves."""
 PART = 0.1
 """Of all squares: on each side of the moment so much has to turn."""
+LEAST_RAD = 2.0
+"""Of gravity's way in the unit on each side: some axes fit a shorter one by chance."""
 
 
 def refuse_change(recording: ImuRecording, windows: Windows, bias: FloatArray) -> None:
@@ -50,7 +52,9 @@ def refuse_change(recording: ImuRecording, windows: Windows, bias: FloatArray) -
             for M, factor in entries
         ]
     )
+    way = np.cumsum(np.linalg.norm(change, axis=1))
     inside = (every > PART * every[-1]) & (every < (1 - PART) * every[-1])
+    inside &= (way > LEAST_RAD) & (way < way[-1] - LEAST_RAD)
     if not inside.any():
         return
     after = left[:, -1:] - left

@@ -3,7 +3,8 @@
 At rest on the Earth gravity turns in the instrument as f' = -w x f. Over the whole recording this
 gives, by least squares, the matrix M that best makes the turning of the forces out of the measured
 rates. For a good recording M is near the identity; a factor in it is a wrong unit, and a signed
-permutation is exchanged axes or a left-handed triad.
+permutation is exchanged axes or a left-handed triad. Neither is concluded from rates that hardly
+explain how the forces turn.
 """
 
 from __future__ import annotations
@@ -27,6 +28,10 @@ FACTOR_LIMITS = (0.6, 1.6)
 START_S = 2.0
 LEAST_TURN_RAD = 0.01
 """Below it M is noise."""
+EXPLAINED = 0.2
+"""Of the squared turns of the forces: a hand's accelerations leave the rates above a half."""
+CLEARLY = 0.05
+"""Exchanged axes explain more than those stated by more than this."""
 TURNED_COSINE = math.cos(math.radians(30.0))
 """Gravity that moved so far in the unit was turned by somebody."""
 
@@ -79,6 +84,18 @@ def rate_matrix(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatAr
 
     Columns of axes that hardly turned are those of the identity.
     """
+    rows, change, turned = _equations(windows, bias)
+    seen = turned > 0.05 * turned.max() if turned.max() > 0 else np.zeros(3, dtype=bool)
+    columns = np.tile(seen, 3)
+    matrix = np.eye(3)
+    if seen.any():
+        solved = np.linalg.lstsq(rows[:, columns], change, rcond=None)[0]
+        matrix[:, seen] = solved.reshape(3, -1)
+    return matrix, turned
+
+
+def _equations(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rows (n, 9) and right sides (n,) of the equations of M, row by row; turns of the gyros."""
     follows = (np.diff(windows.first) > 0) & (np.diff(windows.section) == 0)
     force = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
     step = np.diff(windows.start_s)[:, None]
@@ -88,28 +105,49 @@ def rate_matrix(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatAr
     turn = rate * step
     rows = np.einsum("nij,nk->nijk", skew(middle), turn).reshape(-1, 3, 9)[follows]
     change = (force[1:] - force[:-1])[follows]
-    turned = np.abs(turn[follows]).sum(axis=0)
-    seen = turned > 0.05 * turned.max() if turned.max() > 0 else np.zeros(3, dtype=bool)
-    columns = np.tile(seen, 3)
-    matrix = np.eye(3)
-    if seen.any():
-        solved = np.linalg.lstsq(rows.reshape(-1, 9)[:, columns], change.ravel(), rcond=None)[0]
-        matrix[:, seen] = solved.reshape(3, -1)
-    return matrix, turned
+    return rows.reshape(-1, 9), change.ravel(), np.abs(turn[follows]).sum(axis=0)
 
 
-def _refuse_gyros_that_miss_the_turn(name: str, windows: Windows, turned: FloatArray) -> None:
-    """Refuse forces that turn while the gyros stand: by far the wrong unit, or other columns."""
+def _shares(windows: Windows, bias: FloatArray, tried: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of the squared turns of the forces: what each M (m, 3, 3) explains, and with which factor.
+
+    The factor that explains most is not negative.
+    """
+    rows, change, _ = _equations(windows, bias)
+    M = tried.reshape(-1, 9)
+    along = np.maximum(M @ (rows.T @ change), 0.0)
+    size = np.maximum(np.einsum("mi,ij,mj->m", M, rows.T @ rows, M), 1e-300)
+    return along**2 / size / max(float(change @ change), 1e-300), along / size
+
+
+def _refuse_gyros_that_miss_the_turn(
+    name: str, windows: Windows, turned: FloatArray, share: float
+) -> None:
+    """Refuse forces that turn otherwise than the gyros: the wrong unit, other columns, lost rows.
+
+    Forces that keep their direction show nothing.
+    """
     direction = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
     least = float((direction @ direction[0]).min())
-    if least < TURNED_COSINE:
+    if least >= TURNED_COSINE:
+        return
+    gravity = math.degrees(math.acos(max(least, -1.0)))
+    if turned.max() < LEAST_TURN_RAD:
         raise RefusedError(
             name,
-            f"gravity turns in the unit by {math.degrees(math.acos(max(least, -1.0))):.0f} deg, "
+            f"gravity turns in the unit by {gravity:.0f} deg, "
             f"but the gyros turn by {math.degrees(turned.max()):.2g} deg in all",
             expected="gyros that turn as the unit does",
             remedy="check rate_columns and rate_unit in [dynamic]",
         )
+    raise RefusedError(
+        name,
+        f"gravity turns in the unit by {gravity:.0f} deg, and the gyros explain "
+        f"{100 * share:.0f} % of how it turns",
+        expected="gyros that turn as the unit does, and every row between the rests",
+        remedy="check rate_columns, rate_unit and force_columns; where rows were cut out, as of a "
+        "file of labelled parts, use the whole recording",
+    )
 
 
 def _other_samples(rate_hz: float) -> dict[float, str]:
@@ -123,17 +161,19 @@ def _other_samples(rate_hz: float) -> dict[float, str]:
 def _refuse_rate(recording: ImuRecording, windows: Windows, bias: FloatArray) -> None:
     name = recording.name
     matrix, turned = rate_matrix(windows, bias)
-    if turned.max() < LEAST_TURN_RAD:
-        _refuse_gyros_that_miss_the_turn(name, windows, turned)
+    axes = list(product(permutations(range(3)), product((1.0, -1.0), repeat=3)))
+    tried = np.array([np.diag(signs) @ np.eye(3)[list(order)] for order, signs in axes])
+    share, factor = _shares(windows, bias, np.concatenate([[matrix], tried]))
+    if turned.max() < LEAST_TURN_RAD or share[0] < EXPLAINED:
+        _refuse_gyros_that_miss_the_turn(name, windows, turned, float(share[0]))
         return
-    best = 0.0
-    order: tuple[int, ...] = (0, 1, 2)
-    signs: tuple[float, ...] = (1.0, 1.0, 1.0)
-    for tried, flips in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-        likeness = sum(flips[i] * matrix[i, tried[i]] for i in range(3))
-        if likeness > best + 1e-9:
-            best, order, signs = likeness, tried, flips
-    size = float(np.median([abs(matrix[i, order[i]]) for i in range(3)]))
+    best = int(np.argmax(share[1:]))
+    if share[1 + best] <= share[1] + CLEARLY:
+        best = 0
+    order, signs = axes[best]
+    # Axes that hardly turn spoil the first, a wrong bias the second; another unit is in both.
+    sizes = float(np.median([abs(matrix[i, order[i]]) for i in range(3)])), float(factor[1 + best])
+    size = min(sizes, key=lambda k: abs(math.log(max(k, 1e-300))))
     if order != (0, 1, 2) or min(signs) < 0:
         words = ", ".join(f"{'-' if signs[i] < 0 else ''}{'xyz'[order[i]]}" for i in range(3))
         handed = np.linalg.det(np.diag(signs)[:, list(order)])

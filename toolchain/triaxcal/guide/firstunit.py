@@ -27,6 +27,30 @@ class Place:
     gravity_m_per_s2: float
 
 
+def refuse_files_elsewhere(rig_file: Path, folder: Path) -> list[str]:
+    """Bus descriptions that a rig description names, which go into the folder of a unit with it.
+
+    Raises
+    ------
+    RefusedError
+        When one does not lie beside it.
+    """
+    if _is_there(rig_file, folder):
+        return []
+    keys = read_toml(rig_file).get("rig")
+    named = [keys.get("file"), *keys.get("more_files", [])] if isinstance(keys, dict) else []
+    names = [name for name in named if name is not None]
+    for name in names:
+        if not is_in_folder(name):
+            raise RefusedError(
+                f"{rig_file}, [rig]",
+                f"{name} does not lie beside it",
+                expected="bus descriptions that can be copied to the unit with it",
+                remedy="put a copy beside the rig description, and name that",
+            )
+    return names
+
+
 def copy_description(rig_file: Path, folder: Path) -> None:
     """Copy a rig description and the bus descriptions that it names into the folder of a unit.
 
@@ -35,28 +59,20 @@ def copy_description(rig_file: Path, folder: Path) -> None:
     RefusedError
         When one lies elsewhere, or the disk refuses.
     """
-    if rig_file.parent.absolute() == folder.absolute() and rig_file.name == RIG_FILE:
+    names = refuse_files_elsewhere(rig_file, folder)
+    if _is_there(rig_file, folder):
         return
-    keys = read_toml(rig_file).get("rig")
-    named = [keys.get("file"), *keys.get("more_files", [])] if isinstance(keys, dict) else []
-    for name in (n for n in named if n is not None):
-        if not is_in_folder(name):
-            raise RefusedError(
-                f"{rig_file}, [rig]",
-                f"{name} does not lie beside it",
-                expected="bus descriptions that can be copied to the unit with it",
-                remedy="put a copy beside the rig description, and name that",
-            )
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, source in (
-            (RIG_FILE, rig_file),
-            *((n, rig_file.parent / n) for n in named if n is not None),
-        ):
+        for name, source in ((RIG_FILE, rig_file), *((n, rig_file.parent / n) for n in names)):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, folder / name)
     except OSError as error:
         raise refused_by_system(error.filename or folder, "written", error) from error
+
+
+def _is_there(rig_file: Path, folder: Path) -> bool:
+    return rig_file.parent.absolute() == folder.absolute() and rig_file.name == RIG_FILE
 
 
 def write_first_unit(folder: Path, rig: RigDescription, place: Place) -> Path:

@@ -24,6 +24,7 @@ from triaxcal.guide.guide import FIRST_HOLD_S, Guide, Setting, Submit
 from triaxcal.guide.stream import ImuStream
 from triaxcal.guide.watch import Watch
 from triaxcal.rig.bus.frames import Frames
+from triaxcal.rig.description.description import RigDescription
 from triaxcal.rig.description.rigfile import read_description
 from triaxcal.rig.description.rigkeys import RIG_FILE
 from triaxcal.rig.records.rawlog import RawLog
@@ -40,6 +41,24 @@ def at_once(work: Callable[[], DynamicResult]) -> Future[DynamicResult]:
     except RefusedError as refusal:
         ended.set_exception(refusal)
     return ended
+
+
+def recorded_rig(folder: Path) -> RigDescription:
+    """Rig description that unit.toml of an IMU names.
+
+    Raises
+    ------
+    RefusedError
+        When a file cannot be read, or it names none.
+    """
+    unit = read_dynamic(folder)
+    if unit.file.rig is None:
+        raise RefusedError(
+            f"{unit.path}, [dynamic]",
+            "names no rig description",
+            expected=f'rig = "{RIG_FILE}" and recording = "{LOG_FILE}"',
+        )
+    return read_description(folder / unit.file.rig)
 
 
 class GuidedRecording:
@@ -75,13 +94,7 @@ class GuidedRecording:
         if place is not None:
             write_first_unit(folder, read_description(folder / RIG_FILE), place)
         self.unit = read_dynamic(folder)
-        if self.unit.file.rig is None:
-            raise RefusedError(
-                f"{self.unit.path}, [dynamic]",
-                "names no rig description",
-                expected=f'rig = "{RIG_FILE}" and recording = "{LOG_FILE}"',
-            )
-        self.rig = read_description(folder / self.unit.file.rig)
+        self.rig = recorded_rig(folder)
         self.stream = ImuStream(self.rig)
         self._path = self.unit.recording
         if self._path.exists():
@@ -118,8 +131,10 @@ class GuidedRecording:
                 yield
 
     def close(self) -> None:
-        """Close the log."""
+        """Close the log; one without a sample is removed, as it would be in the way of another."""
         self.log.close()
+        if not self.stream.count:
+            self._path.unlink(missing_ok=True)
 
     def finish(self) -> None:
         """The recording has ended: wait for a calibration that is under way.

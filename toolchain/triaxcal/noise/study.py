@@ -50,6 +50,8 @@ class NoiseStudy:
     step_s, duration_s : float
     findings : tuple of str
         What was left out, and why there is no Allan deviation.
+    trusted : bool
+        No output jumps as no noise does.
     """
 
     source: str
@@ -57,6 +59,7 @@ class NoiseStudy:
     step_s: float
     duration_s: float
     findings: tuple[str, ...] = ()
+    trusted: bool = True
 
     @property
     def longest_tau_s(self) -> float:
@@ -100,7 +103,8 @@ def study_noise(
         except RefusedError as missing:
             findings = [str(missing)]
         axes.append(AxisNoise(axis, found, curve))
-    return NoiseStudy(source, tuple(axes), step_s, duration, (*_jumps(signal), *findings))
+    jumps = _jumps(signal)
+    return NoiseStudy(source, tuple(axes), step_s, duration, (*jumps, *findings), not jumps)
 
 
 def _jumps(signal: FloatArray) -> list[str]:
