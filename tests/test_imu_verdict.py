@@ -198,6 +198,14 @@ def _step() -> tuple[ImuRecording, DataSheet]:
     return changed(recording, rate=rate, force=samples.force + later * 0.02), noise
 
 
+def _drift() -> tuple[ImuRecording, DataSheet]:
+    """The gyros' biases drift evenly by 0.04 deg/s and less: nothing happens at any moment."""
+    recording, noise = _sound()
+    rate = recording.all().rate
+    drift = np.linspace(0.0, np.radians(0.04), len(rate))[:, None] * np.array([1.0, -0.7, 0.8])
+    return changed(recording, rate=rate + drift), noise
+
+
 CONTRADICTIONS: dict[
     str, tuple[Callable[[], tuple[ImuRecording, DataSheet]], set[str], tuple[str, ...]]
 ] = {
@@ -235,6 +243,11 @@ CONTRADICTIONS: dict[
         _step,
         {"innovations", "held-out rests", "held-out turns"},
         ("biases that change at",),
+    ),
+    "biases that drift": (
+        _drift,
+        {"innovations", "held-out turns"},
+        ("biases that drift: the gyros at rest change slowly, by 0.02",),
     ),
 }
 

@@ -1,4 +1,4 @@
-"""Constants that change at one moment of a recording."""
+"""Constants that change within a recording, at one moment or slowly."""
 
 from __future__ import annotations
 
@@ -34,35 +34,50 @@ FEWEST = 10
 
 @dataclass(frozen=True)
 class Jump:
-    """A jump of the gyros' readings at rest.
+    """A change of the gyros' readings at rest.
 
     Attributes
     ----------
     from_s, at_s : float
         End of the last window at rest before it, start of the first after it.
     rate : array, shape (3,)
-        rad/s.
+        rad/s: mean after it less mean before it.
+    drifts : bool
+        Whether a straight line over the recording explains the readings better than a jump.
     """
 
     from_s: float
     at_s: float
     rate: FloatArray
+    drifts: bool = False
 
     @property
     def words(self) -> str:
         """As the end of "constants ..."."""
-        size = float(np.degrees(np.abs(self.rate).max()))
+        size = f"{float(np.degrees(np.abs(self.rate).max())):.3g} deg/s"
+        if self.drifts:
+            return (
+                f"that drift: the gyros at rest change slowly, by {size} between the means before "
+                f"and after {self.at_s:.1f} s"
+            )
         return (
-            f"that change at {self.at_s:.1f} s, where the gyros at rest jump by {size:.3g} deg/s: "
-            "two units, a restart, a shock or another temperature"
+            f"that change at {self.at_s:.1f} s, where the gyros at rest jump by {size}: two units, "
+            "a restart, a shock or another temperature"
         )
 
-
-REMEDY = "calibrate each part alone"
+    @property
+    def remedy(self) -> str:
+        """What to do about it."""
+        if self.drifts:
+            return (
+                "let the unit warm up before it is recorded, or record its temperature and switch "
+                'on "gyro-thermal" and "accelerometer-thermal"'
+            )
+        return "calibrate each part alone"
 
 
 class Change:
-    """Constants that change at one moment: two units, a restart, another mounting of a sensor."""
+    """Constants that change: two units, a restart, another mounting of a sensor, a slow drift."""
 
     name = "a change of the constants"
 
@@ -72,7 +87,8 @@ class Change:
         if jump is None:
             return None
         biases = _new_biases(case, jump)
-        only_biases = Suspect(f"biases {jump.words}", REMEDY, biases, None, True, rival=True)
+        words, remedy = jump.words, jump.remedy
+        only_biases = Suspect(f"biases {words}", remedy, biases, None, True, rival=True)
         if biases[0] <= largest(biases[1]):
             gain = case.result.passes[-1].chi_square - biases[0]
             return only_biases if gain > chi2.isf(CHANCE, BIASES) else None
@@ -85,7 +101,7 @@ class Change:
             return only_biases
         chi = sum(part.passes[-1].chi_square for part in parts)
         freedom = sum(part.passes[-1].freedom for part in parts)
-        return Suspect(f"constants {jump.words}", REMEDY, (chi, freedom), None, True)
+        return Suspect(f"constants {words}", remedy, (chi, freedom), None, True)
 
 
 def _new_biases(case: Case, jump: Jump) -> tuple[float, int]:
@@ -126,7 +142,8 @@ def _one(samples: ImuSamples) -> tuple[ImuSamples, ...]:
 def largest_jump(found: Survey, noise: DataSheet) -> Jump | None:
     """Where the gyros' means at rest change most, over the windows at rest; None for a small one.
 
-    The two means before and after each window differ by noise of N^2 (1/T1 + 1/T2) an axis.
+    The two means before and after each window differ by noise of N^2 (1/T1 + 1/T2) an axis. A slow
+    drift makes them differ as well. It is told from a jump by what both explain of the squares.
     """
     windows = found.windows
     still = np.flatnonzero(at_rest(found))
@@ -144,4 +161,12 @@ def largest_jump(found: Survey, noise: DataSheet) -> Jump | None:
         return None
     last, first = still[k[best] - 1], still[k[best]]
     from_s = float(windows.start_s[last] + windows.duration_s[last])
-    return Jump(from_s, float(windows.start_s[first]), jump[best])
+    drifts = _line(windows.start_s[still], windows.rate[still], length, noise) > float(size[best])
+    return Jump(from_s, float(windows.start_s[first]), jump[best], drifts)
+
+
+def _line(time_s: FloatArray, rate: FloatArray, length_s: FloatArray, noise: DataSheet) -> float:
+    """Chi-square that a straight line takes from rates (w, 3); a window's variance is N^2 / T."""
+    since = time_s - np.average(time_s, weights=length_s)
+    weight = (length_s * since)[:, None] / noise.rate_density**2
+    return float((((weight * rate).sum(axis=0)) ** 2).sum() / (weight[:, 0] @ since))

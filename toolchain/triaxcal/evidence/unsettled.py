@@ -9,7 +9,7 @@ from triaxcal.dynamic.restnoise import with_rests
 from triaxcal.dynamic.several import read_recordings
 from triaxcal.dynamic.survey import survey
 from triaxcal.evidence.afresh import beside_the_axis
-from triaxcal.evidence.change import REMEDY, halves, largest_jump
+from triaxcal.evidence.change import halves, largest_jump
 
 
 def explained(unit: DynamicDescription, refusal: NotSettledError) -> RefusedError:
@@ -35,5 +35,5 @@ def explained(unit: DynamicDescription, refusal: NotSettledError) -> RefusedErro
         return refusal
     return RefusedError(
         refusal.place, refusal.found, expected=refusal.expected,
-        remedy=f"explained by constants {jump.words}: {REMEDY}",
+        remedy=f"explained by constants {jump.words}: {jump.remedy}",
     )  # fmt: skip
