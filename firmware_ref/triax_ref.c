@@ -197,6 +197,17 @@ static void add_quadratic(const triax_ref_state_t *state, const triax_ref_t *ref
     }
 }
 
+/* Step A for sums of high words: a floor for each product, and one for the sum. */
+static int64_t sum_of_high_words(const triax_ref_state_t *state, const triax_ref_t *ref, int axis, const int64_t u[3])
+{
+    int64_t total = state->offset[axis];
+    int j;
+    for (j = 0; j < 3; j++) {
+        total += floor_div(state->gain[axis][j] * u[j], 32);
+    }
+    return floor_div(total, ref->output_shift - 32);
+}
+
 /*
  * Steps A, Q and G: the sum of three products, the terms, offset and rounding; then one floor.
  * force is looked at with a g-sensitivity only.
@@ -217,6 +228,12 @@ static uint32_t apply(const triax_ref_state_t *state, const triax_ref_t *ref, co
             status |= TRIAX_REF_RAW_RANGE;
         }
         u[i] = clamped * scale;
+    }
+    if (ref->terms & TRIAX_REF_HIGH_WORDS) {
+        for (i = 0; i < 3; i++) {
+            result32[i] = (int32_t)sum_of_high_words(state, ref, i, u);
+        }
+        return status;
     }
     for (i = 0; i < 3; i++) {
         sum[i] = state->gain[i][0] * u[0] + state->gain[i][1] * u[1] + state->gain[i][2] * u[2];

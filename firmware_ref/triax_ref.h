@@ -34,7 +34,8 @@ enum {
 enum {
     TRIAX_REF_QUADRATIC = 1,
     TRIAX_REF_RATE = 2,
-    TRIAX_REF_SENSITIVITY = 4 /* of a gyro, with the Q of the force it takes times 256 */
+    TRIAX_REF_SENSITIVITY = 4, /* of a gyro, with the Q of the force it takes times 256 */
+    TRIAX_REF_HIGH_WORDS = 8   /* no term: each product is floored before the sum */
 };
 
 typedef struct {

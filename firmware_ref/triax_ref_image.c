@@ -65,10 +65,21 @@ static int shape_is_legal(const triax_ref_t *ref)
             (within(ref->reciprocal_log2, 31, 62) && within(ref->gain_shift, 1, 62)));
 }
 
-/* "TRXC" is an accelerometer, with quadratic terms or dT/dt in version 2; "TRXG" is a gyro. */
-static int terms_are_legal(uint32_t magic, uint32_t version, int terms)
+/* Sums of high words: direct form, a spare bit, no terms but dT/dt. */
+static int high_words_are_legal(const triax_ref_t *ref)
 {
+    const int others = ref->terms & ~(TRIAX_REF_HIGH_WORDS | TRIAX_REF_RATE);
+    return !ref->inverse_form && ref->output_shift > 32 && others == 0;
+}
+
+/* "TRXC" is an accelerometer, with quadratic terms or dT/dt in version 2; "TRXG" is a gyro. */
+static int terms_are_legal(const triax_ref_t *ref, uint32_t magic, uint32_t version)
+{
+    const int terms = ref->terms;
     if (magic == 0x43585254u) {
+        if (terms & TRIAX_REF_HIGH_WORDS) {
+            return high_words_are_legal(ref);
+        }
         return version == 1u || within(terms, 1, TRIAX_REF_QUADRATIC | TRIAX_REF_RATE);
     }
     return magic == 0x47585254u && version == 2u && (terms % 256) == TRIAX_REF_SENSITIVITY &&
@@ -131,7 +142,7 @@ uint32_t triax_ref_open(triax_ref_t *ref, const uint8_t *file, size_t file_size)
     ref->reciprocal_log2 = next_small(&reader);
     ref->gain_shift = next_small(&reader);
     ref->terms = (version == 2u) ? next_small(&reader) : 0;
-    if (!shape_is_legal(ref) || !terms_are_legal(magic, version, ref->terms)) {
+    if (!shape_is_legal(ref) || !terms_are_legal(ref, magic, version)) {
         return TRIAX_REF_BAD_IMAGE;
     }
     words = (size_t)(TRIAX_REF_HEADER_WORDS + 3 + ref->segments * (3 + 12 * (ref->order + 1)));

@@ -124,12 +124,18 @@ def cofactor(k: Rows, i: int, j: int) -> int:
 def apply(
     plan: Plan, rows: Rows, raw: list[int], force: list[int] | None = None
 ) -> tuple[list[int], int]:
-    """Steps A, Q and G, with the one formula that the page gives for both ways."""
+    """Steps A, Q and G, with the one formula that the page gives for two of three ways."""
     shape = plan.shape
     u = [min(max(code, shape.raw_min), shape.raw_max) for code in raw]
     status = 0 if u == raw else RAW_RANGE
     u = [int32(code * 2**shape.raw_shift) for code in u]
     accel = []
+    if shape.high_words:
+        for *n, b in rows:
+            words = [int32(floor_of(int64(n[j] * u[j]), 32)) for j in range(3)]
+            total = int32(int32(int32(words[0] + words[1]) + words[2]) + b)
+            accel.append(floor_of(total, shape.output_shift - 32))
+        return accel, status
     sums = [int64(n0 * u[0] + n1 * u[1] + n2 * u[2]) for n0, n1, n2, _ in rows]
     if plan.quadratic is not None:
         x, y, z = (int32(floor_of(s, 32) + row[3]) for s, row in zip(sums, rows, strict=True))
@@ -252,8 +258,11 @@ def error_bound(plan: Plan, code: int) -> list[Fraction]:
     bounds = []
     for n, exact in zip(found, real_gain_and_offset(plan, code), strict=True):
         gain = sum(abs(n[j] - exact[j]) for j in range(3))
-        offset = abs(n[3] - preload - exact[3])
-        bounds.append((gain * u_max / 2**32 + offset) / Fraction(2) ** spare + Fraction(1, 2))
+        # Three floors instead of one: 3/2 is their mean, and the most that they differ from it.
+        floors = Fraction(3, 2) if plan.shape.high_words else Fraction(0)
+        offset = abs(n[3] - preload - floors - exact[3])
+        before = gain * u_max / 2**32 + offset + floors
+        bounds.append(before / Fraction(2) ** spare + Fraction(1, 2))
     return bounds
 
 

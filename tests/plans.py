@@ -55,6 +55,7 @@ def integer_shape(
     raw: tuple[int, int] = (-(2**23), 2**23 - 1),
     shifts: tuple[int, int, int, int] = (30, 29, 58, 30),
     quadratic: bool = False,
+    high_words: bool = False,
 ) -> Shape:
     """A shape; `shifts` are those of the inverse form, ignored by the direct one."""
     return Shape(
@@ -68,6 +69,7 @@ def integer_shape(
         raw_shift=raw_shift_of(raw),
         inverse=InverseShifts(*shifts) if form == INVERSE else None,
         quadratic=quadratic,
+        high_words=high_words,
     )
 
 
@@ -109,6 +111,7 @@ def real_of(shape: Shape, rows: Coefficients, rounded_by: float = 0.0) -> list[l
     result = []
     for f, row in enumerate(rows):
         preload = shape.rounding_in_offset if f % 4 == 3 and shape.inverse is None else 0
+        preload += 1.5 if f % 4 == 3 and shape.high_words else 0
         centred = [
             c - (0.5 if k < shape.order else 0) - (preload if k == 0 else 0)
             for k, c in enumerate(row)
@@ -281,6 +284,13 @@ COVERING: dict[str, Shape] = {
     "inverse-saturating-order-3": integer_shape(
         segments=2, order=3, output_shift=32, raw=(INT32_MIN, 2**30), **_SATURATING
     ),
+    "high-words-cubic-24-bit": integer_shape(order=3, high_words=True),
+    "high-words-order-0-32-bit": integer_shape(
+        order=0, output_shift=33, raw=_FULL32, high_words=True
+    ),
+    "high-words-two-segments": integer_shape(
+        segments=2, order=1, output_shift=48, raw=(-3_000_001, 5_123_456), high_words=True
+    ),
     "quadratic-cubic": integer_shape(order=3, quadratic=True),
     "quadratic-order-0-32-bit": integer_shape(
         order=0, output_shift=33, raw=_FULL32, quadratic=True
@@ -295,7 +305,7 @@ COVERING: dict[str, Shape] = {
 }
 """Every branch: both forms; saturating or not; one segment or more; order 0 and above; no range
 test, one test for three codes, three tests; with and without a left shift; ranges that end at
-INT32_MIN or INT32_MAX; quadratic terms in both forms, saturating or not."""
+INT32_MIN or INT32_MAX; sums of high words; quadratic terms in both forms, saturating or not."""
 
 
 # ---- plans from physical constants, through make_plan ----
@@ -455,6 +465,9 @@ GOLDEN: dict[str, Plan] = {
         firsts=(0, 2560),
         rounded_by=0.25,
     ),
+    "direct-high-words": integer_plan(
+        integer_shape(order=2, output_shift=35, high_words=True), _CHECKED, rounded_by=0.25
+    ),
     "inverse-saturating": integer_plan(
         integer_shape(
             form=INVERSE,
@@ -468,6 +481,6 @@ GOLDEN: dict[str, Plan] = {
         rounded_by=0.25,
     ),
 }
-"""Of the size of P1's tables: 24-bit codes with a range test, and the same with quadratic terms;
-codes that fill 32 bits, three segments; K inverted on the device, 24-bit codes of a narrower range,
-results that saturate."""
+"""Of the size of P1's tables: 24-bit codes with a range test, the same with quadratic terms, the
+same with sums of high words; codes that fill 32 bits, three segments; K inverted on the device,
+24-bit codes of a narrower range, results that saturate."""

@@ -134,7 +134,9 @@ def test_three_implementations_agree(
 ) -> None:
     b = built[name]
     check = cross_check(b.plan, sets[name], b.generated, reference.routine(b.image), b.image)
-    assert list(check.vectors) == NAMES
+    # With sums of high words one in eight samples is on a border: there is no set of them.
+    names = [n for n in NAMES if not (b.plan.shape.high_words and n == "borders of rounding")]
+    assert list(check.vectors) == names
     assert check.total == sum(len(v.temp) for v in sets[name])
     assert 0.4 < check.largest_error_lsb <= prove(b.plan).lsb
 

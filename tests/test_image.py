@@ -82,7 +82,8 @@ def test_image_is_the_page(built: dict[str, Built], reference: Reference, name: 
     assert crc32_by_the_bit(image[:-4]).to_bytes(4, "little") == image[-4:]
     words = words_of(image)
     shape = plan.shape
-    terms = [] if plan.quadratic is None else [1]
+    word = (plan.quadratic is not None) + 8 * shape.high_words
+    terms = [word] if word else []
     assert words[1:3] == [1 + len(terms), len(image)]
     i = shape.inverse
     assert words[3:15] == [

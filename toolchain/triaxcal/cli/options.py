@@ -115,7 +115,7 @@ PREFIX = click.option(
 
 ARITHMETIC = click.option(
     "--arithmetic",
-    help="Form of products: portable, limbs, thumb2 or thumb1; default: that of unit.toml.",
+    help="Form of products: portable, limbs, thumb2, thumb1, high-words; default: unit.toml's.",
 )
 
 

@@ -36,6 +36,7 @@ def not_covered(shape: Shape) -> str:
         "the inverse form": shape.inverse is not None,
         "terms added to the sums": shape.adds_to_sums,
         "a term in dT/dt": shape.rate,
+        "sums of high words": shape.high_words,
         "functions that do not depend on temperature": not shape.order,
         "the raw range by one test": shape.raw_max - shape.raw_min != 2**32 - 1,
     }

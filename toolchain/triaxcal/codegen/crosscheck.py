@@ -88,13 +88,14 @@ def vector_sets(plan: Plan, random_vectors: int = RANDOM_VECTORS) -> list[Vector
     rng = np.random.Generator(np.random.PCG64(SEED))
     each = rng.multinomial(random_vectors, np.full(len(codes), 1.0 / len(codes)))
     in_range = _random_raw(random_vectors, plan.shape.raw_min, plan.shape.raw_max)
-    return [
+    sets = [
         _lattice(plan),
         _boundary(plan),
         VectorSet("borders of rounding", *ties(plan)),
         VectorSet("random in range", np.repeat(codes, each), in_range),
         _anything(random_vectors),
     ]
+    return [vectors for vectors in sets if len(vectors.temp)]
 
 
 @lru_cache(maxsize=2)

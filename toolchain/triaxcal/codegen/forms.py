@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from triaxcal.fixedpoint.shape import Shape
-from triaxcal.unit.arithmetic import LIMBS, PORTABLE, THUMB1, THUMB2
+from triaxcal.unit.arithmetic import HIGH_WORDS, LIMBS, PORTABLE, THUMB1, THUMB2
 
 
 def limb_split(shape: Shape) -> int:
@@ -15,8 +15,8 @@ def limb_split(shape: Shape) -> int:
     a high gain and a low code below (2^16 + 3) * 2^k: with what is carried into them all are below
     2^31 for spare >= 2 and k <= 13.
     """
-    if shape.adds_to_sums:
-        return 0  # what is added needs the 64-bit sums
+    if shape.adds_to_sums or shape.high_words:
+        return 0  # what is added needs the 64-bit sums; high words have no other form
     spare = shape.output_shift - 32
     split = 16 + spare - shape.raw_shift
     return split if spare >= 2 and shape.raw_shift <= 16 and 1 <= split <= 13 else 0
@@ -31,7 +31,7 @@ def assembly(shape: Shape) -> dict[str, int]:
     shifts the raw codes by so many less; `completes`, whether C puts the offset for that in place,
     as it does where there is no `evaluate` and where dT/dt adds to the offset first.
     """
-    thumb2 = int(not shape.saturates and not shape.adds_to_sums)
+    thumb2 = int(not (shape.saturates or shape.adds_to_sums or shape.high_words))
     evaluate = int(shape.order > 0 and shape.inverse is None)
     return {
         "thumb2": thumb2,
@@ -45,12 +45,17 @@ def assembly(shape: Shape) -> dict[str, int]:
 def form_of(shape: Shape, asked: str) -> str:
     """The arithmetic that a shape has for the one asked: that one, or the next best.
 
-    Limbs stand for Thumb-1 assembly and the portable form for the others.
+    Limbs stand for Thumb-1 assembly and the portable form for the others. Sums of high words are a
+    shape, whose form is the portable one.
     """
     given = assembly(shape)
     if asked == THUMB1 and not given["thumb1"]:
         asked = LIMBS
-    has = {THUMB2: given["thumb2"], LIMBS: shape.order or limb_split(shape)}.get(asked, True)
+    has = {
+        THUMB2: given["thumb2"],
+        LIMBS: shape.order or limb_split(shape),
+        HIGH_WORDS: False,
+    }.get(asked, True)
     return asked if has else PORTABLE
 
 

@@ -7,6 +7,7 @@ with terms beyond the linear ones (version 2) a thirteenth word of shape says wh
     quadratic: 3 x 6 words
     dT/dt: rate_min, rate_max, rate_gain, 3 words
     g-sensitivity of a gyro, whose magic is "TRXG": 3 x 3 words
+(sums of high words have that word too, and nothing here)
 CRC-32 (IEEE 802.3) of all before it.
 """
 
@@ -21,8 +22,8 @@ from triaxcal.model.methods.method import DIRECT
 MAGIC = int.from_bytes(b"TRXC", "little")
 VERSION, VERSION_WITH_TERMS = 1, 2
 GYRO_MAGIC = int.from_bytes(b"TRXG", "little")
-QUADRATIC, RATE, SENSITIVITY = 1, 2, 4
-"""Bits of the word that says which terms there are."""
+QUADRATIC, RATE, SENSITIVITY, HIGH_WORDS = 1, 2, 4, 8
+"""Bits of the word that says which terms there are, and how products are summed."""
 FORCE_Q_SHIFT = 8
 """Of a gyro, where that word has the Q of the specific force that it takes."""
 HEADER_NAMES = (
@@ -43,18 +44,22 @@ HEADER_NAMES = (
     "gain shift",
 )
 TERMS_NAME = "terms: 1 quadratic, 2 dT/dt, 4 g-sensitivity, force Q << 8"
+HIGH_WORDS_NAME = "terms: 2 dT/dt; 8 sums of high words"
 
 
 def terms_word(plan: Plan) -> int:
-    """Which terms there are beyond the linear ones."""
+    """Which terms there are beyond the linear ones, and whether sums are of high words."""
     if plan.sensitivity is not None:
         return SENSITIVITY | plan.force_q << FORCE_Q_SHIFT
     quadratic = QUADRATIC if plan.quadratic is not None else 0
-    return quadratic | (RATE if plan.rate is not None else 0)
+    rate = RATE if plan.rate is not None else 0
+    return quadratic | rate | (HIGH_WORDS if plan.shape.high_words else 0)
 
 
 def header_names(plan: Plan) -> tuple[str, ...]:
     """What each of the first words is."""
+    if plan.shape.high_words:
+        return (*HEADER_NAMES, HIGH_WORDS_NAME)
     names = (*HEADER_NAMES, TERMS_NAME) if terms_word(plan) else HEADER_NAMES
     return ("magic TRXG", *names[1:]) if plan.shape.gyro else names
 

@@ -27,10 +27,13 @@ def ties(plan: Plan, per_axis: int = PER_AXIS) -> Samples:
     """Temperature codes (n,) and raw codes (n, 3) on borders, up to `per_axis` for each axis.
 
     For each there is the same sample one raw code lower, where the range has it, and where the raw
-    codes are not shifted one whose sum is one less than a border.
+    codes are not shifted one whose sum is one less than a border. None for sums of high words: one
+    of 2^spare samples is on a border there.
     """
     rng = Random(SEED)
     shape = plan.shape
+    if shape.high_words:
+        return np.empty(0, np.int32), np.empty((0, 3), np.int32)
     codes = [rng.randint(plan.temp_min_code, plan.temp_max_code) for _ in range(per_axis)]
     state, _ = set_temperature(plan, np.array(codes, dtype=np.int64))
     rows = []

@@ -16,12 +16,13 @@ from typing import Any
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.tryout import model_error_g
 from triaxcal.fitting.core.calibration import Calibration
-from triaxcal.fixedpoint.plan import Plan, make_plan
+from triaxcal.fixedpoint.plan import Plan, make_plan, with_high_words
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.methods.compensation import Compensation, compensate
 from triaxcal.model.methods.registry import METHODS
 from triaxcal.readings.measurements import MeasurementSet
 from triaxcal.uncertainty.evaluate import uncertainty
+from triaxcal.unit.arithmetic import HIGH_WORDS
 from triaxcal.unit.description import UnitDescription
 
 ERROR_SHARE = 0.3
@@ -130,12 +131,29 @@ def choose_functions(
 ) -> Functions:
     """Functions of the lowest order that keeps the share, or the unit's own limit.
 
+    With [firmware] arithmetic = "high-words" their products are summed so where that keeps the
+    share too.
+
     Raises
     ------
     RefusedError
         When no integers of the format hold the functions, or they miss the fitted model by more
         than [compensation] model_error_max_micro_g.
     """
+    found = _lowest_order(unit, measurements, calibration)
+    if unit.arithmetic != HIGH_WORDS:
+        return found
+    plan = with_high_words(found.plan)
+    if plan is None:
+        return found
+    made = replace(found, plan=plan, bound=prove(plan))
+    return made if made.error_g <= allowed_error_g(unit, found.least_u_g) else found
+
+
+def _lowest_order(
+    unit: UnitDescription, measurements: MeasurementSet, calibration: Calibration
+) -> Functions:
+    """The same with 64-bit sums."""
     least_u_g = uncertainty(unit, measurements, calibration, None).least_standard_g
 
     def made(error_max_g: float | None) -> Functions:

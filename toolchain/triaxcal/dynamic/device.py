@@ -40,7 +40,7 @@ class Device:
         of a program its own.
     arithmetic
         How the C forms its products, as in [firmware]. The gyro has limbs for thumb1 and the
-        portable form for thumb2.
+        portable form for thumb2. Both have the portable form for high-words.
     """
 
     temperature_sensor: TemperatureSensor

@@ -71,6 +71,10 @@ def apply(
     status = np.where(_any_axis(clamped != raw_code), STATUS_RAW_RANGE, STATUS_OK)
     u = clamped << shape.raw_shift
     gain, offset = state.gain, state.offset
+    if shape.high_words:
+        words = high_word(gain * u[:, None, :])
+        sums = words[:, :, 0] + words[:, :, 1] + words[:, :, 2] + offset
+        return sums >> (shape.output_shift - 32), status
     total = np.empty_like(u)
     for i in range(3):
         total[:, i] = gain[:, i, 0] * u[:, 0] + gain[:, i, 1] * u[:, 1] + gain[:, i, 2] * u[:, 2]

@@ -218,8 +218,23 @@ def _direct_plan(plan: Plan, room: FloatArray, where: str) -> Plan:
     shape = replace(plan.shape, output_shift=32 + spare)
     real = plan.real * 2.0**spare
     preload = np.zeros(12)
-    preload[3::4] = shape.rounding_in_offset
+    preload[3::4] = shape.held_in_offset
     return replace(plan, shape=shape, real=real, segments=_quantise(plan.segments, real, preload))
+
+
+def with_high_words(plan: Plan) -> Plan | None:
+    """The same functions with sums of high words; None where the shape has none.
+
+    The 64-bit sum has one floor and these three. Their mean is added to the offset, whose
+    constants are rounded anew.
+    """
+    shape = plan.shape
+    if shape.saturates or shape.adds_to_sums or shape.inverse is not None:
+        return None
+    shape = replace(shape, high_words=True)
+    preload = np.zeros(12)
+    preload[3::4] = shape.held_in_offset
+    return replace(plan, shape=shape, segments=_quantise(plan.segments, plan.real, preload))
 
 
 def _inverse_plan(plan: Plan, room: FloatArray, where: str) -> Plan:

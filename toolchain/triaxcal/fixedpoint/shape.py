@@ -13,6 +13,10 @@ cannot overflow for any int32 raw codes (docs/explanation/fixed-point.md, step R
 ROW_LIMIT_WITH_TERMS = 3 * 2**30
 """The same where quadratic terms or a g-sensitivity need room beside the row."""
 
+FLOORS_MEAN = 1.5
+"""What the three floors of a row of high words lose on average, in units of the offset; and the
+most by which their loss differs from that (docs/explanation/fixed-point.md, step E)."""
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -40,6 +44,8 @@ class Shape:
         Whether there is a term in dT/dt.
     gyro : bool
         Whether it is a gyro triad: LSB 2^-output_q deg/s, and a g-sensitivity.
+    high_words : bool
+        Whether each product is floored to its high word before they are summed, step A.
     """
 
     form: str
@@ -54,6 +60,7 @@ class Shape:
     quadratic: bool = False
     rate: bool = False
     gyro: bool = False
+    high_words: bool = False
 
     @property
     def adds_to_sums(self) -> bool:
@@ -79,6 +86,11 @@ class Shape:
     def rounding_in_offset(self) -> int:
         """Half an output LSB, where the offset's format can hold it: added to b."""
         return 0 if self.saturates or self.quadratic else 1 << (self.output_shift - 33)
+
+    @property
+    def held_in_offset(self) -> float:
+        """What the direct form's offset holds besides b: that rounding, and the mean of floors."""
+        return self.rounding_in_offset + (FLOORS_MEAN if self.high_words else 0.0)
 
     @property
     def rounding_in_sum(self) -> int:

@@ -147,7 +147,7 @@ def _method(plan: Plan, function: int, power: int) -> Method:
     slope = lsb / 2.0**power
     centre = 0.5 if power < plan.shape.order else 0.0
     if is_offset and power == 0 and plan.shape.form != INVERSE:
-        centre += plan.shape.rounding_in_offset
+        centre += plan.shape.held_in_offset
     kind = "OFFSET" if is_offset else "GAIN"
     text = f"coefficient of x^{power}"
     return Method(f"{kind}_{power}", text, unit, slope, -centre * slope)

@@ -18,6 +18,7 @@ from triaxcal.report.words.measured import measured_words
 from triaxcal.report.words.numbers import thousands
 from triaxcal.report.words.shares import share_rows
 from triaxcal.report.words.temperatures import by_temperature, degrees
+from triaxcal.unit.arithmetic import HIGH_WORDS
 from triaxcal.unit.choices import ESTIMATOR_WORDS
 
 _LABEL = 16
@@ -222,6 +223,15 @@ def _uncertainty(made: Passport) -> str:
     return _entry("uncertainty", text)
 
 
+def _high_words(delivery: Delivery) -> list[str]:
+    """Whether what [firmware] arithmetic = "high-words" asks for was taken."""
+    if delivery.plan.arithmetic != HIGH_WORDS:
+        return []
+    if delivery.plan.shape.high_words:
+        return [_entry("", "sums of high words: an error of 3 floors is in it")]
+    return [_entry("", "64-bit sums: high words do not keep the share, or this form has none")]
+
+
 def _angles(delivery: Delivery) -> list[str]:
     """Of triax_angles, where the device has it."""
     plan, check = delivery.firmware.angles, delivery.angles_check
@@ -258,6 +268,7 @@ def _verdict(made: Passport) -> str:
             f"({delivery.firmware.error_g * 1e6:.3f} micro-g) of K(T)^-1 (U - U0(T))",
         ),
         _entry("cross-check", f"{vectors} vectors bit for bit: Python = reference = generated C"),
+        *_high_words(delivery),
         *_angles(delivery),
         "",
         _entry("verdict", verdict.words),

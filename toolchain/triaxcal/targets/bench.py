@@ -22,6 +22,7 @@ from triaxcal.targets.shapes import (
     CUBIC,
     CUBIC_LEFT,
     GYRO,
+    HIGH,
     ORDER_4,
     QUADRATIC,
     RATE_ALONE,
@@ -90,7 +91,8 @@ def _has(case: Case, form: str) -> bool:
 
 
 BENCH_SHAPES = (
-    CUBIC, CUBIC_LEFT, ORDER_4, "AT-CHERNIAK", "inverse", QUADRATIC, RATE_ALONE, GYRO,
+    CUBIC, CUBIC_LEFT, *HIGH.values(), ORDER_4, "AT-CHERNIAK", "inverse", QUADRATIC, RATE_ALONE,
+    GYRO,
 )  # fmt: skip
 
 
@@ -109,7 +111,7 @@ def run_bench(
         (subject, core)
         for subject in subjects(wanted)
         for core in CORES
-        if core.counted and _meant_for(subject.arithmetic, core)
+        if core.counted and _meant_for(subject, core)
     ]
     with tempfile.TemporaryDirectory(prefix="triaxcal-bench-") as name:
         work = Path(name)
@@ -121,7 +123,10 @@ def run_bench(
         return in_parallel(jobs, progress)
 
 
-def _meant_for(arithmetic: str, core: Core) -> bool:
+def _meant_for(subject: Subject, core: Core) -> bool:
+    arithmetic = subject.arithmetic
+    if subject.case.plan.shape.high_words:
+        return core.high_multiply and arithmetic == PORTABLE
     if arithmetic in (LIMBS, THUMB1):
         return core.no_long_multiply
     return arithmetic != THUMB2 or core.thumb2_multiply

@@ -25,6 +25,7 @@ from triaxcal.model.methods.imu import EXAMPLE_SENSITIVITY, ImuCompensation
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS, Terms
 from triaxcal.readings.measurements import MEASUREMENTS_FILE, MeasurementSet, read_measurements
 from triaxcal.unit.angles import PITCH_ROLL, ZENITH_TOOL_FACE, AnglesChoice
+from triaxcal.unit.arithmetic import HIGH_WORDS
 from triaxcal.unit.description import UnitDescription, read_unit
 
 
@@ -85,6 +86,7 @@ Change = Callable[[UnitDescription], UnitDescription]
 CUBIC = "cubic"
 ORDER_4 = "order 4"
 CUBIC_LEFT = "cubic, left-justified"
+HIGH = {name: f"{name}, high words" for name in (CUBIC, CUBIC_LEFT)}
 QUADRATIC, RATE, GYRO = "quadratic terms", "dT/dt", "gyro"
 RATE_ALONE = "cubic, dT/dt"
 ANGLES = {pair: f"angles: {pair}" for pair in (ZENITH_TOOL_FACE, PITCH_ROLL)}
@@ -107,6 +109,10 @@ def _left_justified(unit: UnitDescription) -> UnitDescription:
     return replace(unit, adc=replace(unit.adc, bits=32, code_min=-(2**31), code_max=2**31 - 1))
 
 
+def _high_words(unit: UnitDescription) -> UnitDescription:
+    return replace(unit, arithmetic=HIGH_WORDS)
+
+
 def _odd_range(unit: UnitDescription) -> UnitDescription:
     adc = replace(unit.adc, code_min=-8_000_000, code_max=8_000_000)
     return replace(_order_4(unit), adc=adc)
@@ -115,6 +121,9 @@ def _odd_range(unit: UnitDescription) -> UnitDescription:
 _SHAPES: tuple[tuple[str, str, str, Change], ...] = (
     (CUBIC, "AT-SIM", "AT-SIM as shipped: N(T) of order 3", lambda u: u),
     (CUBIC_LEFT, "AT-SIM", "raw codes that fill int32", lambda u: _left_justified(_order_3(u))),
+    (HIGH[CUBIC], "AT-SIM", "sums of high words, order 3", _high_words),
+    (HIGH[CUBIC_LEFT], "AT-SIM", "the same, raw codes that fill int32", lambda u: _high_words(
+        _left_justified(_order_3(u)))),
     (ORDER_4, "AT-SIM", "within 1 micro-g: N(T) of order 4", _order_4),
     ("AT-CHERNIAK", "AT-CHERNIAK", "as shipped: piecewise", lambda u: u),
     ("inverse", "AT-SIM", "K(T) inverted on the device", lambda u: replace(u, method="inverse")),
@@ -144,18 +153,20 @@ def shipped_cases(units: Path) -> tuple[Case, ...]:
     Raises
     ------
     RefusedError
-        When a unit is refused, or the cubic shapes are not of order 3.
+        When a unit is refused, or the cubic shapes are not of order 3 and of high words where
+        their name says so.
     """
     cases = tuple(
         made_case(units / unit, name, note, change, _TERMS.get(name, NO_TERMS))
         for name, unit, note, change in _SHAPES
     )
-    for case in cases[:2]:
-        if case.plan.shape.order != 3:
+    for case in cases[:4]:
+        found = case.plan.shape.order, case.plan.shape.high_words
+        if found != (expected := (3, case.name in HIGH.values())):
             raise RefusedError(
                 f"shape {case.name}",
-                f"N(T) is of order {case.plan.shape.order}",
-                expected="order 3",
+                f"order and high words are {found}",
+                expected=f"{expected}",
                 remedy="the measurements of AT-SIM have changed: choose another error limit",
             )
     return cases

@@ -5,7 +5,8 @@ from triaxcal.base.kinds import Kind, word
 from triaxcal.base.tomltable import shown
 
 PORTABLE, LIMBS, THUMB2, THUMB1 = "portable", "limbs", "thumb2", "thumb1"
-ARITHMETICS = (PORTABLE, LIMBS, THUMB2, THUMB1)
+HIGH_WORDS = "high-words"
+ARITHMETICS = (PORTABLE, LIMBS, THUMB2, THUMB1, HIGH_WORDS)
 
 ARITHMETIC: Kind[str] = word(ARITHMETICS)
 

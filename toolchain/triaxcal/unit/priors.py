@@ -68,10 +68,12 @@ class FirmwareChoice:
         Of triax_angles: tool face, or roll, is flagged as poor where its axis is nearer to the
         plumb line than this.
     arithmetic
-        How the C forms its products. Another one than portable gives a second file, as
+        How the C forms its products. limbs, thumb2 and thumb1 give a second file, as
         triax_comp_thumb2.c, which is compiled in place of triax_comp.c and gives the same bits.
         limbs: 32-bit products of halves. thumb2: assembly for Cortex-M3, M4, M7, M33. thumb1:
-        assembly for Cortex-M0, M0+, M1.
+        assembly for Cortex-M0, M0+, M1. high-words: for RISC-V with multiplication (RV32IM). It
+        changes triax_comp.c and the constants: fewer instructions, and a larger error. It is
+        taken where that error keeps the share of model_error_max_micro_g; else it is portable.
     """
 
     terms: str = setting(word(FIRMWARE_TERMS), AUTO)

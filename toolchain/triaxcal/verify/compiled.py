@@ -82,7 +82,7 @@ def not_covered(shape: Shape) -> str:
 
 def _by_library(shape: Shape, core: Core) -> bool:
     """Whether the compiler's library forms the products, whose instructions are not followed."""
-    return shape.adds_to_sums and core.no_long_multiply
+    return (shape.adds_to_sums or shape.high_words) and core.no_long_multiply
 
 
 def proven(work: Workspace, core: Core) -> dict[str, int]:

@@ -199,6 +199,9 @@ def script_context(work: Workspace, image: Image, axis: int, s: int) -> dict[str
         ],
         "order": image.order,
         "preload": preload,
+        "held": _dyadic(Fraction(2 * preload + 3 * image.high_words, 2)),
+        "high_words": image.high_words,
+        "rows": tuple(zip(_NAMES, "uvw", strict=False)),
         "rounding": "" if preload else " + 1b-1",
         "spare": spare,
         "x_low": _dyadic(

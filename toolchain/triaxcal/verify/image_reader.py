@@ -44,6 +44,7 @@ class Image:
     quadratic: tuple[tuple[int, ...], ...] = ()
     rate: tuple[int, ...] = ()
     sensitivity: tuple[tuple[int, ...], ...] = ()
+    high_words: bool = False
 
 
 def image_length(image: bytes) -> int:
@@ -83,7 +84,7 @@ def read_image(image: bytes) -> Image:
         bool(form), order, output_shift, raw_min, raw_max, raw_shift,
         tuple(_segment(words[at : at + step], last, order)
               for at, last in zip(starts, lasts, strict=True)),
-        quadratic, rate, sensitivity,
+        quadratic, rate, sensitivity, bool(terms & 8),
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.terms import EXAMPLE_RATE, EXAMPLE_TERMS, NO_TERMS
 from triaxcal.targets.shapes import made_case
+from triaxcal.unit.arithmetic import HIGH_WORDS
 from triaxcal.unit.description import UnitDescription
 
 
@@ -40,6 +41,10 @@ def _inverse(unit: UnitDescription) -> UnitDescription:
     return replace(unit, method="inverse")
 
 
+def _high_words(unit: UnitDescription) -> UnitDescription:
+    return replace(unit, arithmetic=HIGH_WORDS)
+
+
 def _saturating(unit: UnitDescription) -> UnitDescription:
     """So fine an output that it saturates, and a raw range that is no power of two."""
     adc = replace(unit.adc, code_min=-8_000_000, code_max=8_200_000)
@@ -51,10 +56,11 @@ SHAPES = {
     "inverse": ("AT-SIM", _inverse),
     "saturating": ("AT-SIM", _saturating),
     "quadratic": ("AT-SIM", _order_4),
+    "high words": ("AT-SIM", _high_words),
 }
 """Unit that gives the measurements, and what is changed in its description. Together: one segment
-and two, raw codes of 24 bits and 32, both range tests and none, both forms, both ends of apply, and
-quadratic terms."""
+and two, raw codes of 24 bits and 32, both range tests and none, both forms, both ends of apply,
+sums of high words, and quadratic terms."""
 
 WITH_TERMS = {"quadratic": EXAMPLE_TERMS, "rate": replace(EXAMPLE_TERMS, rate=EXAMPLE_RATE)}
 """Terms of shapes that have them."""

@@ -41,6 +41,9 @@ class Core:
         Whether it has Thumb-2 with 32x32->64 multiplications, which TRIAX_THUMB2 needs.
     no_long_multiply : bool
         Whether it has no 32x32->64 multiplication, so that TRIAX_LIMBS is meant for it.
+    high_multiply : bool
+        Whether an instruction gives the high word of a product alone, and none adds to 64 bits:
+        for sums of high words.
     thumb1_multiply : bool
         Whether TRIAX_THUMB1 is meant for it.
     hosted : bool
@@ -65,6 +68,7 @@ class Core:
     memory: dict[str, int]
     thumb2_multiply: bool = False
     no_long_multiply: bool = False
+    high_multiply: bool = False
     thumb1_multiply: bool = False
     hosted: bool = False
     compilers: tuple[str, ...] = COMPILERS

@@ -11,5 +11,6 @@ ENTRY = Core(
     ("-march=rv32im", "-mabi=ilp32"),
     ("qemu-system-riscv32", "-M", "virt", "-bios", "none", *SEMIHOSTING, "-kernel"),
     {"RAM_ORIGIN": 0x80000000, "RAM_LENGTH": 16 * 1024 * 1024},
+    high_multiply=True,
     rank=6,
 )

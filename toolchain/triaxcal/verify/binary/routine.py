@@ -2,7 +2,8 @@
 
 For every image that the loader accepts, every temperature code and all raw codes: the words that
 `set_temperature` leaves are the same function of the twelve values N_ij, b_i on every way through
-it, and from them `apply` forms floor((sum_j N_ij u_j + b_i 2^32) / 2^output_shift).
+it, and from them `apply` forms floor((sum_j N_ij u_j + b_i 2^32) / 2^output_shift), or with sums of
+high words floor((sum_j floor(N_ij u_j / 2^32) + b_i) / 2^(output_shift - 32)).
 """
 
 from __future__ import annotations
@@ -290,7 +291,10 @@ def _refuse_result(
     shape, row = routine.shape, routine.values[4 * i : 4 * i + 4]
     total = row[3].poly * (1 << 32)
     for n, u in zip(row[:3], used, strict=True):
-        total = total + n.poly * u.poly * (1 << shape.raw_shift)
+        product = n.poly * u.poly * (1 << shape.raw_shift)
+        if shape.high_words:
+            product = routine.atoms.floor(product, 32) * (1 << 32)
+        total = total + product
     for k, force in zip(routine.sensitivity[i] if shape.gyro else (), routine.forces, strict=True):
         total = total + k.poly * force.poly
     wanted = routine.atoms.floor(total, shape.output_shift)
