@@ -111,7 +111,7 @@ def real_of(shape: Shape, rows: Coefficients, rounded_by: float = 0.0) -> list[l
     result = []
     for f, row in enumerate(rows):
         preload = shape.rounding_in_offset if f % 4 == 3 and shape.inverse is None else 0
-        preload += 1.5 if f % 4 == 3 and shape.high_words else 0
+        preload += 1 if f % 4 == 3 and shape.high_words else 0
         centred = [
             c - (0.5 if k < shape.order else 0) - (preload if k == 0 else 0)
             for k, c in enumerate(row)

@@ -10,6 +10,7 @@ import pytest
 
 from plans import INT32_MAX, INT32_MIN, integer_plan, integer_shape
 from triaxcal.codegen.image import image_bytes
+from triaxcal.fixedpoint.plan import with_high_words
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.model.terms import EXAMPLE_RATE, Terms
 from triaxcal.targets.shapes import made_case
@@ -31,7 +32,7 @@ def _few_slices(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gappa, "SLICES", 2)
 
 
-def small(folder: Path) -> Workspace:
+def small(folder: Path, *, high_words: bool = False) -> Workspace:
     """Three rows alike, functions of order 1, codes that fill 32 bits: seconds for Coq."""
     rows = [GAIN, CROSS, CROSS, OFFSET] * 3
     plan = integer_plan(
@@ -40,13 +41,19 @@ def small(folder: Path) -> Workspace:
         temp=(-800, 800),
         rounded_by=0.25,
     )
+    if high_words:
+        plan = with_high_words(plan) or plan
     return Workspace.create(folder, {IMAGE: image_bytes(plan)}, plan, prove(plan))
 
 
 @PROVERS
 @pytest.mark.long
-def test_coq_accepts_the_bound_and_nothing_below_the_largest_error(tmp_path: Path) -> None:
-    work = small(tmp_path)
+@pytest.mark.parametrize("high_words", [False, True])
+def test_coq_accepts_the_bound_and_nothing_below_the_largest_error(
+    tmp_path: Path, high_words: bool
+) -> None:
+    work = small(tmp_path, high_words=high_words)
+    assert work.plan.shape.high_words == high_words
     outcome, files = certificate.certify(work, "")
     assert outcome.result == PASSED, outcome
     assert sorted(files) == ["error_x_0.v", "error_y_0.v", "error_z_0.v"]
@@ -127,7 +134,9 @@ def test_what_has_no_theorem_says_so(plant: Planter, shape: str) -> None:
 
 @PROVERS
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", ["direct-two-segments", "saturating", "rate alone", "gyro"])
+@pytest.mark.parametrize(
+    "shape", ["direct-two-segments", "saturating", "high words", "rate alone", "gyro"]
+)
 def test_coq_accepts_every_shape(tmp_path: Path, shape: str) -> None:
     made = subject(shape, UNITS) if shape in ALL_SHAPES else rate_alone()
     work = Workspace.create(tmp_path, made.files, made.plan, made.bound)

@@ -16,6 +16,7 @@ from triaxcal.codegen.forms import row_words
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.render import arithmetic_of
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
+from triaxcal.fixedpoint.plan import with_high_words
 from triaxcal.fixedpoint.proof import prove
 from triaxcal.verify.campaign import CHECKS
 from triaxcal.verify.outcome import NOT_DONE, PASSED
@@ -220,6 +221,20 @@ def test_a_wrong_sensitivity_is_not_proven(subjects, tmp_path: Path) -> None:
     listing.replace(replace(changed, operands=operands))
     with pytest.raises(UnprovenError, match=r"is not the specified floor|may leave its type"):
         proven(work, "Cortex-M3", listing)
+
+
+@COMPILERS
+def test_sums_of_high_words_are_proven_and_are_no_64_bit_sums(subjects, tmp_path: Path) -> None:
+    made = subjects[SHAPE]
+    plan = with_high_words(made.plan)
+    work = Workspace.create(tmp_path / "work", made.files, plan, made.bound)
+    listing = Listing(compiled.disassembled(work, core_of("RV32IM")))
+    _, applied = proven(work, "RV32IM", listing)
+    assert applied.ways == 2
+    with pytest.raises(UnprovenError, match=r"accel\[0\] is not the specified floor"):
+        prove_routine(
+            made.plan.shape, 4, compiled.instructions(core_of("RV32IM")), listing, functions(work)
+        )
 
 
 def test_a_core_whose_products_are_a_librarys_is_not_done(subjects, tmp_path, monkeypatch) -> None:

@@ -45,9 +45,9 @@ TRIAX_CALIB_SECTION const triax_calib_t triax_calib_constants = {
                     -769639, /* x^1: -0.0005734263 g/V, rounding +2e-10 */
                     5229, /* x^2: 1.94786e-06 g/V, rounding +9e-11 */
                 },
-                /* bx = 0.0084254425 g at the origin; integer_k in 2^-(27 + k) g, 5.5 of integer_0 is rounding */
+                /* bx = 0.00842544623 g at the origin; integer_k in 2^-(27 + k) g, 5 of integer_0 is rounding */
                 {
-                    1130850, /* x^0: 0.008425443 g, rounding +2e-9 */
+                    1130850, /* x^0: 0.008425446 g, rounding +2e-9 */
                     -1567374, /* x^1: -0.005838926 g, rounding +9e-10 */
                     3148, /* x^2: 5.8631e-06 g, rounding +5e-10 */
                 },
@@ -69,9 +69,9 @@ TRIAX_CALIB_SECTION const triax_calib_t triax_calib_constants = {
                     -97123, /* x^1: -7.23628e-05 g/V, rounding +2e-10 */
                     2178, /* x^2: 8.1128e-07 g/V, rounding +9e-11 */
                 },
-                /* by = -0.00761898048 g at the origin; integer_k in 2^-(27 + k) g, 5.5 of integer_0 is rounding */
+                /* by = -0.00761897676 g at the origin; integer_k in 2^-(27 + k) g, 5 of integer_0 is rounding */
                 {
-                    -1022596, /* x^0: -0.00761898 g, rounding +2e-9 */
+                    -1022596, /* x^0: -0.007618977 g, rounding +2e-9 */
                     -2159328, /* x^1: -0.0080441264 g, rounding +9e-10 */
                     10033, /* x^2: 1.86875e-05 g, rounding +5e-10 */
                 },
@@ -93,9 +93,9 @@ TRIAX_CALIB_SECTION const triax_calib_t triax_calib_constants = {
                     5109165, /* x^1: 0.003806624 g/V, rounding +2e-10 */
                     -20429, /* x^2: -7.61049e-06 g/V, rounding +9e-11 */
                 },
-                /* bz = -0.0064764265 g at the origin; integer_k in 2^-(27 + k) g, 5.5 of integer_0 is rounding */
+                /* bz = -0.00647642277 g at the origin; integer_k in 2^-(27 + k) g, 5 of integer_0 is rounding */
                 {
-                    -869245, /* x^0: -0.006476426 g, rounding +2e-9 */
+                    -869245, /* x^0: -0.006476423 g, rounding +2e-9 */
                     -200917, /* x^1: -0.0007484769 g, rounding +9e-10 */
                     2296, /* x^2: 4.2762e-06 g, rounding +5e-10 */
                 },

@@ -110,8 +110,8 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
 }
 
 /*
- * The high word of each product: its floor loses 1/2 on average. The offset holds 3/2 for the three,
- * and half an output LSB. The sum stays within int32_t: |sum| <= ROW_LIMIT / 2 + 3.
+ * The high word of each product. Three floors add up to the floor of the sum less 0, 1 or 2: the offset
+ * holds 1 for that, and half an output LSB. No sum leaves int32_t: all are within ROW_LIMIT / 2 + 3.
  */
 static int32_t apply_row(const int32_t row[TRIAX_ROW_WORDS], int32_t ux, int32_t uy, int32_t uz)
 {

@@ -172,8 +172,8 @@ def _function_context(plan: Plan, s: int, f: int) -> dict[str, Any]:
     """One function's coefficients with physical value and rounding.
 
     The value of an integer is what it contributes at x = 1: 1/2 for the floor after it and the
-    preloaded half LSB of the output, with high words 3/2 more, are taken off before the rounding is
-    stated.
+    preloaded half LSB of the output (and 1 for the floors of high words) are taken off before the
+    rounding is stated.
     """
     unit, lsb, bits = function_format(plan, f)
     order = plan.shape.order
@@ -192,7 +192,7 @@ def _function_context(plan: Plan, s: int, f: int) -> dict[str, Any]:
         )
     notes = f"integer_k in 2^-({bits} + k) {_raw_unit(plan, f)}"
     if preload:
-        notes += f", {preload:g} of integer_0 is rounding"
+        notes += f", {preload} of integer_0 is rounding"
     return {
         "name": FUNCTION_NAMES[plan.shape.form][f],
         "unit": unit,

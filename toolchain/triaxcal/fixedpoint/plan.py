@@ -24,7 +24,7 @@ from triaxcal.fixedpoint.formats import choose_inverse, choose_matrix_bits, choo
 from triaxcal.fixedpoint.horner import Segment, horner, segment_of
 from triaxcal.fixedpoint.quadratic import quadratic_log2, quantise_quadratic
 from triaxcal.fixedpoint.rate import RatePlan, largest_offset_g, plan_rate
-from triaxcal.fixedpoint.shape import Shape
+from triaxcal.fixedpoint.shape import FLOORS_LOSS, Shape
 from triaxcal.model.methods.compensation import Compensation
 from triaxcal.model.methods.method import INVERSE
 from triaxcal.model.types import FloatArray, IntArray
@@ -218,23 +218,24 @@ def _direct_plan(plan: Plan, room: FloatArray, where: str) -> Plan:
     shape = replace(plan.shape, output_shift=32 + spare)
     real = plan.real * 2.0**spare
     preload = np.zeros(12)
-    preload[3::4] = shape.held_in_offset
+    preload[3::4] = shape.rounding_in_offset
     return replace(plan, shape=shape, real=real, segments=_quantise(plan.segments, real, preload))
 
 
 def with_high_words(plan: Plan) -> Plan | None:
     """The same functions with sums of high words; None where the shape has none.
 
-    The 64-bit sum has one floor and these three. Their mean is added to the offset, whose
-    constants are rounded anew.
+    The offset holds what their floors lose more than the one of a 64-bit sum.
     """
     shape = plan.shape
     if shape.saturates or shape.adds_to_sums or shape.inverse is not None:
         return None
-    shape = replace(shape, high_words=True)
-    preload = np.zeros(12)
-    preload[3::4] = shape.held_in_offset
-    return replace(plan, shape=shape, segments=_quantise(plan.segments, plan.real, preload))
+    segments = []
+    for segment in plan.segments:
+        coefficients = segment.coefficients.copy()
+        coefficients[3::4, 0] += FLOORS_LOSS
+        segments.append(replace(segment, coefficients=coefficients))
+    return replace(plan, shape=replace(shape, high_words=True), segments=tuple(segments))
 
 
 def _inverse_plan(plan: Plan, room: FloatArray, where: str) -> Plan:

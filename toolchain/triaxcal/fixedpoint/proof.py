@@ -6,7 +6,7 @@ largest distance from the exact value over the raw box is that of a corner:
 
     error_i <= (sum_j |n_ij - n_ij exact| u_max / 2^32 + |b_i - b_i exact|) / 2^spare + 1/2.
 
-Sums of high words have a floor for each product, which adds 3/2 before the division.
+Sums of high words have a floor for each product, which adds 1 before the division.
 
 Every code of the working range is visited. docs/explanation/fixed-point.md, step E.
 """
@@ -34,7 +34,7 @@ from triaxcal.fixedpoint.proof_terms import (
     rate_reach,
     sensitivity_errors,
 )
-from triaxcal.fixedpoint.shape import FLOORS_MEAN
+from triaxcal.fixedpoint.shape import FLOORS_LOSS
 from triaxcal.model.types import IntArray
 
 _GUARD_BITS = 20
@@ -154,8 +154,7 @@ def _broken(what: str) -> RefusedError:
 def _exact_values(plan: Plan, functions: Sequence[int]) -> tuple[list[list[int]], int]:
     """Exact values of functions at every code, as integers over 2^shift, and the shift."""
     segments = range(len(plan.segments))
-    # 1 at least: the mean of floors is a half.
-    shift = max(1, *(_dyadic_shift(plan, s, f) for s in segments for f in functions))
+    shift = max(_dyadic_shift(plan, s, f) for s in segments for f in functions)
     return [_exact_function(plan, f, shift) for f in functions], shift
 
 
@@ -214,11 +213,9 @@ def _dyadic_shift(plan: Plan, s: int, function: int) -> int:
 def _direct_errors(plan: Plan, state: State, axis: int) -> list[float]:
     """Error in LSB, less the final 1/2, at every code that may be the worst; 0 elsewhere."""
     columns = [state.gain[:, axis, j] for j in range(3)]
-    columns.append(state.offset[:, axis] - plan.shape.rounding_in_offset)
+    columns.append(state.offset[:, axis] - plan.shape.held_in_offset)
     exact, shift = _exact_values(plan, range(4 * axis, 4 * axis + 4))
-    floors = int(2 * FLOORS_MEAN) << shift + 31 if plan.shape.high_words else 0
-    # The offset holds their mean too, and their loss differs from it by as much.
-    exact[3] = [value + (floors >> 32) for value in exact[3]]
+    floors = FLOORS_LOSS << (shift + 32) if plan.shape.high_words else 0
     box = plan.shape.raw_box
     denominator = 1 << (shift + plan.shape.output_shift)
     errors = [0.0] * len(exact[0])

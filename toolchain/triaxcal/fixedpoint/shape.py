@@ -13,9 +13,9 @@ cannot overflow for any int32 raw codes (docs/explanation/fixed-point.md, step R
 ROW_LIMIT_WITH_TERMS = 3 * 2**30
 """The same where quadratic terms or a g-sensitivity need room beside the row."""
 
-FLOORS_MEAN = 1.5
-"""What the three floors of a row of high words lose on average, in units of the offset; and the
-most by which their loss differs from that (docs/explanation/fixed-point.md, step E)."""
+FLOORS_LOSS = 1
+"""The sum of three floors is the floor of the sum less 0, 1 or 2: the mean of these, and the most
+by which they differ from it (docs/explanation/fixed-point.md, step E)."""
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,9 @@ class Shape:
         return 0 if self.saturates or self.quadratic else 1 << (self.output_shift - 33)
 
     @property
-    def held_in_offset(self) -> float:
-        """What the direct form's offset holds besides b: that rounding, and the mean of floors."""
-        return self.rounding_in_offset + (FLOORS_MEAN if self.high_words else 0.0)
+    def held_in_offset(self) -> int:
+        """What the direct form's offset holds besides b: that rounding, and what floors lose."""
+        return self.rounding_in_offset + (FLOORS_LOSS if self.high_words else 0)
 
     @property
     def rounding_in_sum(self) -> int:

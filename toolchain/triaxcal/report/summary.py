@@ -228,7 +228,9 @@ def _high_words(delivery: Delivery) -> list[str]:
     if delivery.plan.arithmetic != HIGH_WORDS:
         return []
     if delivery.plan.shape.high_words:
-        return [_entry("", "sums of high words: an error of 3 floors is in it")]
+        return [
+            _entry("", "products are summed by their high words, whose floors are in the error")
+        ]
     return [_entry("", "64-bit sums: high words do not keep the share, or this form has none")]
 
 

@@ -43,6 +43,7 @@ CLASSICAL_REALS = frozenset(
     }
 )
 """What Coq's own library of real numbers takes for granted."""
+_AS_IN_THE_SCRIPT = ("axis", "segment", "rate", "sensitivity", "preload", "high_words")
 _FUNCTIONS = ("nx", "ny", "nz", "b")
 
 
@@ -182,7 +183,7 @@ def _certificate(work: Workspace, image: Image, part: str, axis: int, s: int) ->
         "low": _real(low),
         "high": _real(high),
         **_statement(work, image, axis, s),
-        **{key: known[key] for key in ("axis", "segment", "rate", "sensitivity", "preload")},
+        **{key: known[key] for key in _AS_IN_THE_SCRIPT},
     }
     path = work.render(file, "verify/certificate.v.j2", context)
     return Certificate(file, axis, s, path.read_text(encoding="utf-8"), low, high)

@@ -199,7 +199,7 @@ def script_context(work: Workspace, image: Image, axis: int, s: int) -> dict[str
         ],
         "order": image.order,
         "preload": preload,
-        "held": _dyadic(Fraction(2 * preload + 3 * image.high_words, 2)),
+        "held": preload + image.high_words,
         "high_words": image.high_words,
         "rows": tuple(zip(_NAMES, "uvw", strict=False)),
         "rounding": "" if preload else " + 1b-1",
