@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from triaxcal.dynamic.poses import static_poses
 from triaxcal.dynamic.recording import ImuRecording, ImuSamples
 from triaxcal.dynamic.survey import survey
 from triaxcal.simulation.imu import simulate_imu
-from triaxcal.simulation.imu_motion import ImuMotion, Mounting, Move, three_axes
+from triaxcal.simulation.imu_grades import MEMS, draw_truth
+from triaxcal.simulation.imu_motion import PRECISE_TABLE, ImuMotion, Mounting, Move, three_axes
 
 
 def _samples() -> ImuSamples:
@@ -206,6 +208,54 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
         ("turns about axis z by 0.2", "each axis x, y, z"),
     ),
 }
+
+
+@cache
+def _with_angles() -> ImuRecording:
+    """On a table whose angle is read."""
+    motion = replace(short_motion(), table=PRECISE_TABLE)
+    return held(simulate_imu(draw_truth(MEMS, 3), motion, 50.0, 1))
+
+
+def _angles(spoil: Callable[[np.ndarray], np.ndarray]) -> ImuRecording:
+    angle = _with_angles().all().table_angle_rad
+    assert angle is not None
+    return changed(_with_angles(), table_angle_rad=spoil(angle))
+
+
+def _mountings_in_another_order() -> ImuRecording:
+    table = _with_angles().table
+    assert table is not None
+    return replace(_with_angles(), table=replace(table, mountings=table.mountings[::-1]))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (
+            lambda: _angles(lambda angle: -angle),
+            ("the table's angle rises while the gyros read", 'put "-" in front of'),
+        ),
+        (lambda: _angles(np.degrees), ("of each degree of the table's angle", "about x")),
+        (
+            _mountings_in_another_order,
+            ("of each degree of the table's angle", "mounting with number 1"),
+        ),
+    ],
+    ids=["of the wrong sign", "in another unit", "mountings in another order"],
+)
+def test_a_table_whose_angles_the_gyros_contradict_is_refused(
+    make: Callable[[], ImuRecording], words: tuple[str, ...]
+) -> None:
+    with pytest.raises(RefusedError) as refusal:
+        survey(make())
+    for word in words:
+        assert word in str(refusal.value), str(refusal.value)
+
+
+def test_a_table_whose_angles_agree_is_not_refused() -> None:
+    for spoil in (lambda angle: angle, lambda angle: angle % (2 * np.pi)):
+        assert len(survey(_angles(spoil)).stages) == 3
 
 
 @pytest.mark.parametrize("case", CASES)

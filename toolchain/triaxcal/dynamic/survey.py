@@ -16,6 +16,7 @@ from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.restless import no_rest, refuse_few_rests, refuse_missing_axis
 from triaxcal.dynamic.rests import REST_MIN_S, Quiet, even_in_runs, guard_of, quiet_windows, runs_of
 from triaxcal.dynamic.stages import Stage, find_stages
+from triaxcal.dynamic.tablesense import refuse_other_angles
 from triaxcal.dynamic.windows import WINDOW_S, Windows, read_windows
 from triaxcal.model.types import BoolArray, FloatArray, IntArray
 
@@ -161,6 +162,7 @@ def survey(recording: ImuRecording) -> Survey:
     if quiet is None:
         raise no_rest(recording.name, windows)
     stages, turning = find_stages(windows, quiet, recording)
+    refuse_other_angles(recording, windows, stages, quiet.bias)
     if stages:  # no hand holds the unit: what moves as slowly as one is the start of handling
         quiet = replace(quiet, calm=even_in_runs(windows, quiet))
     use, guard = _used(windows, quiet, turning)
