@@ -23,6 +23,7 @@ from triaxcal.delivery import imu as imudelivery
 from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.imumodel import imu_model
+from triaxcal.evidence.check import Check
 from triaxcal.model.methods.imu import ImuModel, compensate_imu
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
@@ -232,7 +233,25 @@ def test_what_is_written_and_said(ran: Ran) -> None:
     assert "verdict         passed\n" in ran.output
     for check in said["checks"]:
         assert check["held"]
-        assert f"<td>{html.escape(check['words'])}</td><td>held</td>" in page
+        assert f"<td>{html.escape(check['words'])}</td><td>passed</td>" in page
+
+
+def test_a_file_keeps_its_name_and_a_constant_has_one(ran: Ran) -> None:
+    done = ran.made.done
+    renamed = replace(done.unit, recordings=(replace(done.unit.recordings[0], file="a_b_c.csv"),))
+    check = Check(
+        "rests alone", True, "Gamma21 differs, Gamma2 and xGamma21 do not", 1.0, 3.0, "", 1
+    )
+    evidence = replace(ran.made.evidence, checks=(check,))
+    made = replace(ran.made, done=replace(done, unit=renamed), evidence=evidence)
+    assert "recording       a_b_c.csv: " in dynamic_summary(made, ["a"], "build")
+    page = html.unescape(dynamic_page(made, {}).decode())
+    assert (
+        "<td>misalignment of accelerometer y about z differs, Gamma2 and xGamma21 do not</td>"
+        in page
+    )
+    rests = done.result.survey.rests
+    assert f'<p class="note">{len(rests)} rests of ' in page
 
 
 def test_the_page_warns_of_what_was_left_out(ran: Ran) -> None:
@@ -241,13 +260,19 @@ def test_the_page_warns_of_what_was_left_out(ran: Ran) -> None:
     page = dynamic_page(made, {}).decode()
     assert '<div class="badge"><b>PASSED</b><small>innovations ' in page
     assert '<p class="warning">' not in page
-    shown = replace(made.done, off=(replace(first, shown=True, moves_sd=0.4), *others))
+    shown = replace(made.done, off=(replace(first, shown=True, moves_sd=0.6), *others))
     page = html.unescape(dynamic_page(replace(made, done=shown), {}).decode())
     assert (
         f"The recording shows an effect that is switched off, {first.title}: it would move no "
-        "constant by more than 0.4 standard deviations. Switch on "
+        "constant by more than 0.6 standard deviations. Switch on "
         f'"{first.name}" in [dynamic] blocks.</p>'
     ) in page
+    small = replace(made.done, off=(replace(first, shown=True, moves_sd=0.4), *others))
+    page = html.unescape(dynamic_page(replace(made, done=small), {}).decode())
+    assert '<p class="warning">' not in page
+    advice = "moves no constant by more than 0.4 standard deviations; it may stay off"
+    assert f'<b class="notok">significant</b>: {advice}' in page
+    assert advice in dynamic_summary(replace(made, done=small), ["a"], "build")
     untested = replace(made.evidence, not_tested=("D11 not observable",))
     page = dynamic_page(replace(made, evidence=untested), {}).decode()
     assert '<div class="badge"><b>PASSED ON THE RECORDING</b>' in page

@@ -7,8 +7,6 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
 from triaxcal import __version__
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.base.plaindata import plain
@@ -17,11 +15,11 @@ from triaxcal.delivery.imu import ImuDelivery
 from triaxcal.delivery.imuverdict import ImuVerdict
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.observability import Observability
-from triaxcal.dynamic.survey import Survey
 from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.dynamicpage import digits, dynamic_page, weak_words
 from triaxcal.report.imuc import imu_c_files, imu_c_lines
 from triaxcal.report.imunoise import noise_document, noise_lines
+from triaxcal.report.imurecording import effect_words, recorded_words
 from triaxcal.report.overtemperature import over_document, over_lines
 from triaxcal.report.stated.statements import statements_of
 from triaxcal.unit.measured import MEASURED
@@ -106,23 +104,6 @@ def _states(result: DynamicResult) -> list[dict[str, Any]]:
     ]
 
 
-def axis_up(result: DynamicResult) -> str:
-    """The instrument axis that pointed up most at the start, by the force: "+z"."""
-    force = result.survey.sections[0].force
-    axis = int(np.argmax(np.abs(force)))
-    return f"{'+' if force[axis] > 0 else '-'}{'xyz'[axis]}"
-
-
-def rests_words(found: Survey) -> str:
-    """Rests, their guards, and that no turn is the table's where none is."""
-    lengths = [rest.duration_s for rest in found.rests]
-    turns = "" if found.stages else "; no turns on a table"
-    return (
-        f"{len(lengths)} rests of {min(lengths):.1f} to {max(lengths):.1f} s, guards of "
-        f"{found.guard_s:.1f} s{turns}"
-    )
-
-
 def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str:
     """Text for the screen; `files` lie in the folder `target`."""
     done = made.done
@@ -130,14 +111,13 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
     layout = result.layout
     found = result.survey
     last = result.passes[-1]
+    samples = f"{found.sections[-1].last + 1:_}".replace("_", " ")
+    sections = f"{len(found.sections)} section{'s' * (len(found.sections) > 1)}"
     lines = [
         f"unit            {unit.name}  (serial {unit.serial})",
-        f"recording       {unit.recording_words}: {found.sections[-1].last + 1:_} samples, "
-        f"{len(found.sections)} section{'s' * (len(found.sections) > 1)}".replace("_", " "),
-        *(f"                {finding}" for finding in done.findings),
-        f"                first {found.sections[0].still_s:.0f} s at rest, {axis_up(result)} up",
+        f"recording       {unit.recording_words}: {samples} samples, {sections}",
+        *(f"                {words}" for words in recorded_words(done)),
     ]
-    lines.append(" " * 16 + rests_words(found))
     for stage in found.stages:
         lines.append(
             f"  axis {'xyz'[stage.axis]}        {stage.start_s:7.0f} to {stage.end_s:6.0f} s, "
@@ -163,9 +143,10 @@ def dynamic_summary(made: ImuDelivery, files: Iterable[str], target: str) -> str
     if done.off:
         lines += ["", "effects switched off, chi-square of their states in this recording:"]
         for effect in done.off:
-            call = "  SIGNIFICANT: switch it on" if effect.shown else ""
+            call = "  SIGNIFICANT" if effect.shown else ""
             size = f"{effect.chi_square:.1f} of {effect.states}"
-            lines.append(f"  {effect.name:24s} {size:>14s}{call}")
+            lines.append(f"  {effect.name:26s} {size:>12s}{call}")
+            lines += [" " * 8 + effect_words(effect)] if effect.shown else []
             lines += [" " * 8 + effect.hint] if effect.hint else []
     lines += seen_lines(seen)
     lines += ["", *imu_c_lines(made), "", f"files           {target}/", " " * 16 + ", ".join(files)]

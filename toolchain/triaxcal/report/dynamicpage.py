@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -18,6 +19,7 @@ from triaxcal.dynamic.observability import Weak
 from triaxcal.evidence.chance import innovation_words
 from triaxcal.report.imuc import NO_C, imu_verification
 from triaxcal.report.imunoise import noise_words
+from triaxcal.report.imurecording import STAYS_OFF_SD, effect_words, recorded_words
 from triaxcal.report.overtemperature import over_context
 from triaxcal.report.stated.statements import statements_of
 from triaxcal.report.stated.words import label, value_words
@@ -31,6 +33,10 @@ from triaxcal.unit.passport import ENGLISH
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
 BAND = 10.0
 """Panels show so many final standard deviations on each side."""
+FAR = 50.0
+"""Half panels: so far out a line has the right slope where it comes in."""
+FEW = 12
+"""Points of a short recording: each is marked."""
 COVERAGE = 1.96
 """k of 95 % of a normal distribution."""
 PLOT_LEFT, PLOT_WIDTH = 30.0, 670.0
@@ -67,7 +73,8 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
         "badge": _badge(made),
         "facts": _facts(made),
         "warnings": _warnings(made),
-        "checks": [(c.name, c.words, c.held) for c in made.verdict.checks],
+        "checks": [(c.name, _named(c.words, labels), c.held) for c in made.verdict.checks],
+        "recorded": [_sentence(words) for words in recorded_words(done)],
         "notes": made.verdict.notes,
         "stages": [
             {
@@ -89,7 +96,8 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
         "innovations": _innovations(result),
         "minutes": f"{(time[-1] - time[0]) / 60:.0f}",
         "off": [
-            (e.title, f"{e.chi_square:.1f}", e.states, e.name, e.shown, e.hint) for e in done.off
+            (e.title, f"{e.chi_square:.1f}", e.states, e.name, e.shown, effect_words(e), e.hint)
+            for e in done.off
         ],
         "unseen": [[labels[name] for name in names] for names in seen.unseen],
         "weak": [weak_words(_for_people(w, labels)) for w in seen.weak],
@@ -110,6 +118,18 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
         ],
     }
     return page("dynamic.html.j2", t=speaker(ENGLISH), **context)
+
+
+def _sentence(words: str) -> str:
+    """With a capital and a full stop; the name of an axis stays small."""
+    first = words[0] if words[1:2] == " " else words[0].upper()
+    return signed(f"{first}{words[1:]}.")
+
+
+def _named(words: str, labels: Mapping[str, str]) -> str:
+    """The same with the labels of states in place of their names."""
+    names = "|".join(map(re.escape, sorted(labels, key=len, reverse=True)))
+    return re.sub(rf"\b(?:{names})\b", lambda found: labels[found[0]], words)
 
 
 def _for_people(weak: Weak, labels: Mapping[str, str]) -> Weak:
@@ -170,7 +190,7 @@ def _warnings(made: ImuDelivery) -> list[str]:
     words = [] if verdict.passed else [verdict.words]
     found = [f"{text[0].upper()}{text[1:]}." for text in (*words, *verdict.not_tested)]
     for effect in made.done.off:
-        if effect.shown:
+        if effect.shown and effect.moves_sd >= STAYS_OFF_SD:
             found.append(
                 f"The recording shows an effect that is switched off, {effect.title}: it would "
                 f"move no constant by more than {effect.moves_sd:.2g} standard deviations. Switch "
@@ -183,7 +203,7 @@ def _range(place: slice) -> range:
     return range(place.start, place.stop)
 
 
-def _panel(result: DynamicResult, i: int) -> dict[str, str]:
+def _panel(result: DynamicResult, i: int) -> dict[str, Any]:
     """Estimate and its expanded uncertainty over time, about the final estimate."""
     state, history = result.layout.states[i], result.passes[-1].history
     time = np.array(history.time_s)
@@ -194,7 +214,7 @@ def _panel(result: DynamicResult, i: int) -> dict[str, str]:
     x = PANEL_WIDTH * (time - time[0]) / max(time[-1] - time[0], 1e-9)
 
     def y(values: Any) -> Any:
-        return PANEL_HEIGHT / 2 * (1 - np.clip((values - result.p[i]) / span, -1, 1))
+        return PANEL_HEIGHT / 2 * (1 - np.clip((values - result.p[i]) / span, -FAR, FAR))
 
     upper = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p + COVERAGE * sd), strict=True)]
     lower = [f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p - COVERAGE * sd), strict=True)]
@@ -205,6 +225,9 @@ def _panel(result: DynamicResult, i: int) -> dict[str, str]:
         "scale": digits(BAND * unit_sd, BAND * unit_sd),
         "band": " ".join(upper + lower[::-1]),
         "line": " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y(p), strict=True)),
+        "points": [(f"{a:.1f}", f"{b:.1f}") for a, b in zip(x, y(p), strict=True)]
+        if len(x) <= FEW
+        else [],
     }
 
 
