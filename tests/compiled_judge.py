@@ -12,7 +12,7 @@ from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
 from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
 from triaxcal.dynamic.blocks.base import LOWER
 from triaxcal.dynamic.recording import INSTANT, ImuRecording
-from triaxcal.dynamic.thermalbasis import GROUPS
+from triaxcal.dynamic.thermalbasis import GROUPS, OF_GYROS
 from triaxcal.dynamic.thermalcurves import covariance_at
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.imu_motion import ImuMotion, Mounting, Move
@@ -36,8 +36,9 @@ REST_RAD_PER_S = np.radians(0.05)
 
 def toml_of(files: list[str], device: str = DEVICE, more: str = "") -> str:
     recordings = "".join(f'[[dynamic.recording]]\nfile = "{name}"\n' for name in files)
+    own = 'gyro_temp_column = "gyro_temp_degc"\n' * ("gyro_degc_per_code" in device)
     toml = UNIT_TOML.replace('recording = "recording.csv"\n', "").replace(
-        "[noise]", f'temp_column = "temp_degc"\n{recordings}[noise]'
+        "[noise]", f'temp_column = "temp_degc"\n{own}{recordings}[noise]'
     )
     return toml + device + more
 
@@ -65,8 +66,10 @@ class Ran:
     generated: GeneratedImu
 
 
-def delivered(base: Path, truth: ImuTruth, recordings: list[ImuRecording]) -> Ran:
-    unit = folder_of(base, recordings)
+def delivered(
+    base: Path, truth: ImuTruth, recordings: list[ImuRecording], device: str = DEVICE
+) -> Ran:
+    unit = folder_of(base, recordings, device)
     made = deliver_imu(unit)
     assert made.c is not None
     for name, content in made.c.build.files.items():
@@ -99,28 +102,38 @@ class Answers:
     rate_least: float
 
 
-def fast_motion(degc: float) -> ImuMotion:
-    """Rests and turns at up to 200 deg/s about each axis, at one temperature."""
+def fast_motion(degc: float, gyro_degc: float | None = None) -> ImuMotion:
+    """Rests and turns at up to 200 deg/s about each axis, at one temperature of each triad."""
+    own = None if gyro_degc is None else TemperatureDrift(gyro_degc, gyro_degc)
     return ImuMotion(
-        tuple(Mounting(FAST, 4.0) for _ in range(3)), temperature=TemperatureDrift(degc, degc)
+        tuple(Mounting(FAST, 4.0) for _ in range(3)),
+        temperature=TemperatureDrift(degc, degc),
+        gyro_temperature=own,
     )
 
 
-def judged_c(ran: Ran, degc: float) -> Answers:
+def judged_c(ran: Ran, degc: float, gyro_degc: float | None = None) -> Answers:
     """What the C makes of readings without noise, from a motion that no recording has."""
     truth = replace(ran.truth, rate_convention=INSTANT, force_convention=INSTANT)
-    motion = fast_motion(degc)
+    motion = fast_motion(degc, gyro_degc)
     at = Moments.of(truth, motion, np.arange(0.0, motion.duration_s, 0.05))
     force, rate = at.force(np.zeros(3)).T / G, at.body.rate.T
     device = ran.c.device
     lsb = device.accel_adc.volts_per_code, device.gyro_adc.volts_per_code
     readings = accel_readings(truth, at).T / G, gyro_readings(truth, at).T
     accel, gyro = (np.rint(r / v).astype(np.int32) for r, v in zip(readings, lsb, strict=True))
-    temp = np.full(len(force), device.temperature_sensor.code(degc), np.int32)
+    gyro_degc = degc if gyro_degc is None else gyro_degc
+    temp, gyro_temp = (
+        np.full(len(force), sensor.code(t), np.int32)
+        for sensor, t in (
+            (device.temperature_sensor, degc),
+            (device.gyro_temperature_sensor, gyro_degc),
+        )
+    )
     raw = np.ascontiguousarray(accel), np.ascontiguousarray(gyro)
-    _, (found, turned, status) = ran.generated.run(None, temp, *raw)
+    _, (found, turned, status) = ran.generated.run(None, temp, *raw, gyro_temp)
     assert not status.any()
-    accel_sd, rate_sd = stated_sd(ran, degc, force, rate)
+    accel_sd, rate_sd = stated_sd(ran, (degc, gyro_degc), force, rate)
     return Answers(
         np.linalg.norm(rate, axis=1) < REST_RAD_PER_S,
         found * 2.0**-device.accel_q - force,
@@ -134,7 +147,7 @@ def judged_c(ran: Ran, degc: float) -> Answers:
 
 
 def stated_sd(
-    ran: Ran, degc: float, force_g: FloatArray, rate: FloatArray
+    ran: Ran, temps_degc: tuple[float, float], force_g: FloatArray, rate: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Standard deviations (n, 3), g and rad/s, of the covariance that the delivery states.
 
@@ -143,13 +156,15 @@ def stated_sd(
     """
     over = ran.made.done.over
     assert over is not None
-    fit, known, at = over.choice.fit, over.known, np.array([degc])
-    sd = np.array([np.interp(degc, known.temps_degc, column) for column in known.sd.T])
+    fit, known = over.choice.fit, over.known
     start, variances = 0, []
     for block, signal in zip(GROUPS, (None, force_g * G, None, rate), strict=True):
         count = len(block.states)
-        own = covariance_at(fit, block, at, None)[0]  # type: ignore[arg-type]
-        wider = sd[start : start + count] / np.sqrt(np.diag(own))
+        gyro = block.name in OF_GYROS
+        degc, grid = temps_degc[gyro], known.gyro_temps_degc if gyro else known.temps_degc
+        own = covariance_at(fit, block, np.array([degc]), None)[0]  # type: ignore[arg-type]
+        sd = np.array([np.interp(degc, grid, known.sd[:, start + k]) for k in range(count)])
+        wider = sd / np.sqrt(np.diag(own))
         C = own * np.outer(wider, wider)
         start += count
         if signal is None:

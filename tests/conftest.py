@@ -103,6 +103,7 @@ LONG = {
     "test_imu_compiled_truth.py",
     "test_imu_over_temperature.py",
     "test_imu_series.py",
+    "test_imu_two_thermometers.py",
     "test_imu_verdict.py",
     "test_page_languages.py",
     "test_series_page.py",

@@ -105,21 +105,22 @@ accel_lsb = 10
 gyro_bias_instability_deg_per_h = 0
 accel_bias_instability_ug = 0
 """
-COLUMNS = ("time_s", "gx", "gy", "gz", "ax", "ay", "az", "temp_degc")
+COLUMNS = ("time_s", "gx", "gy", "gz", "ax", "ay", "az", "temp_degc", "gyro_temp_degc")
 
 
 def table_of(recording: ImuRecording) -> np.ndarray:
-    """Columns of the file, shape (n, 8)."""
+    """Columns of the file, shape (n, 8), or (n, 9) where the gyros have a thermometer."""
     s = recording.all()
     assert s.temp_degc is not None
-    return np.column_stack([s.time_s, s.rate, s.force, s.temp_degc])
+    own = () if s.gyro_temp_degc is None else (s.gyro_temp_degc,)
+    return np.column_stack([s.time_s, s.rate, s.force, s.temp_degc, *own])
 
 
 def write_unit(folder: Path, table: np.ndarray, toml: str = UNIT_TOML) -> Path:
     """Folder of a unit with its recording as CSV."""
     folder.mkdir(parents=True)
     (folder / "unit.toml").write_text(toml, encoding="utf-8")
-    header = ",".join(COLUMNS)
+    header = ",".join(COLUMNS[: table.shape[1]])
     np.savetxt(
         folder / "recording.csv", table, fmt="%.17g", delimiter=",", header=header, comments=""
     )

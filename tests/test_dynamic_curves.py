@@ -53,7 +53,7 @@ def test_polynomials_are_in_the_span_of_a_ramp_exactly(order: int) -> None:
 
 def test_rows_over_temperature_are_the_block_s_rows_times_the_functions() -> None:
     basis = Basis.spanning(SHAPES, 20.0, np.linspace(-40.0, 85.0, 50))
-    block = block_over_temperature(GYRO_MATRIX, basis)
+    block = block_over_temperature(GYRO_MATRIX, basis, 20.0)
     rate = np.array([[0.1, -0.2, 0.3], [0.5, 0.4, -0.6]])
     degc = np.array([-30.0, 60.0])
     signals = Signals(rate, rate, rate, degc - 20.0, 9.81)
@@ -134,7 +134,7 @@ def test_cubics_are_found_in_every_group_from_points() -> None:
 def test_the_curves_of_the_c_are_those_of_the_groups() -> None:
     over = of_points().solved.over
     fit, temps = over.choice.fit, np.array([-33.0, 12.0, 71.0])
-    accel, gyro = thermal_models(fit, over.nodes.t0_degc)
+    accel, gyro = thermal_models(fit, over.nodes.t0_degc, over.gyro_nodes.t0_degc)
     bias = values_at(fit, GROUPS[0], temps) / 9.80665
     assert np.allclose(accel.constants_at(temps)[:, 9:], bias, atol=1e-12)
     theta = values_at(fit, GROUPS[3], temps)

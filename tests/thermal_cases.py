@@ -36,6 +36,20 @@ def at_point(truth: ImuTruth, degc: float, seed: int) -> ImuRecording:
     return held(simulate_imu(truth, motion, RATE_HZ, seed))
 
 
+def own_degc(degc: float) -> float:
+    """Temperature of gyros that warm themselves, beside accelerometers at `degc`."""
+    return 1.04 * degc + 7.0
+
+
+def apart_at_point(truth: ImuTruth, degc: float, seed: int) -> ImuRecording:
+    """As `at_point`; the gyros have their own temperature, and are sooner at it."""
+    drift = TemperatureDrift(degc - 2.0, degc, 60.0)
+    own = TemperatureDrift(own_degc(degc) - 4.0, own_degc(degc), 20.0)
+    mountings = tuple(Mounting(TURNS, 12.0) for _ in range(3))
+    motion = ImuMotion(mountings, temperature=drift, gyro_temperature=own)
+    return held(simulate_imu(truth, motion, RATE_HZ, seed))
+
+
 def points_of(truth: ImuTruth, seed: int) -> list[ImuRecording]:
     return [at_point(truth, degc, 100 * seed + k) for k, degc in enumerate(POINTS)]
 

@@ -155,6 +155,37 @@ def test_a_planted_mistake_in_what_joins_the_triads_is_found(
     assert any(says in detail for detail in outcome.details), outcome.details
 
 
+@pytest.fixture(scope="module")
+def apart() -> ImuBuild:
+    """An IMU whose gyro has a thermometer of its own."""
+    both = (PROVENANCE, PROVENANCE)
+    return build_imu(imu_of(), triads(), both, 1000, two_thermometers=True)
+
+
+@needs("frama-c", "cppcheck", "clang")
+@pytest.mark.parametrize("key", list(CHECK))
+def test_every_check_of_what_joins_the_triads_passes_with_two_thermometers(
+    apart: ImuBuild, tmp_path: Path, key: str
+) -> None:
+    outcome = CHECK[key](imu.Both.create(tmp_path, apart))
+    assert outcome.result == PASSED, outcome
+
+
+@needs("clang")
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("gyro_calib, gyro_temp_code);", "gyro_calib, accel_temp_code + (0 * gyro_temp_code));"),
+        ("accel_calib, accel_temp_code);", "accel_calib, gyro_temp_code + (0 * accel_temp_code));"),
+    ],
+)
+def test_the_code_of_the_other_thermometer_is_found(
+    apart: ImuBuild, tmp_path: Path, old: str, new: str
+) -> None:
+    outcome = CHECK["clang_sanitizers"](broken(apart, tmp_path, old, new))
+    assert outcome.result == FAILED
+
+
 def test_of_a_gyro_a_cost_that_varies_is_told_and_fails_where_it_is_promised(
     build: ImuBuild, tmp_path: Path
 ) -> None:

@@ -94,6 +94,8 @@ class ImuCalibration:
         Temperature of the biases and scales; the others follow the temperature blocks.
     range_degc : tuple of two floats, or None
         Working range; no other temperature is answered. None where no temperature was recorded.
+    gyro_range_degc : tuple of two floats, or None
+        The same by the gyros' thermometer; None where they have none of their own.
     document : dict
         calibration.json.
     source : str
@@ -109,6 +111,8 @@ class ImuCalibration:
         self.reference_degc = float(document["reference_degc"])
         limits = document.get("range_degc")  # files of triaxcal 0.1.0 have none
         self.range_degc = limits and (float(limits[0]), float(limits[1]))
+        limits = document.get("gyro_range_degc")
+        self.gyro_range_degc = limits and (float(limits[0]), float(limits[1]))
         self.covariance: FloatArray = np.array(document["covariance"], dtype=np.float64)
         rows = document["states"]
         self.states = {
@@ -163,23 +167,30 @@ class ImuCalibration:
         """Whether every check that was made holds, and nothing is left in doubt."""
         return self.verdict.passed
 
-    def constants(self, temp_degc: Any = None) -> ImuConstants:
+    def constants(self, temp_degc: Any = None, gyro_temp_degc: Any = None) -> ImuConstants:
         """Constants at temperatures; None is `reference_degc`.
+
+        Where the gyros have a thermometer of their own, theirs are at `gyro_temp_degc`.
 
         Raises
         ------
         RefusedError
-            For a temperature that is no number, or outside of `range_degc`.
+            For a temperature that is no number, or outside of `range_degc`; where one of the two
+            is missing.
         """
-        temp = self._temperature(temp_degc)
+        temp, gyro_temp = self._temperatures(temp_degc, gyro_temp_degc)
         (K, U0), (L, W0) = (
-            unpack_constants(triad.constants_at(temp))
-            for triad in (self._model.accel, self._model.gyro)
+            unpack_constants(triad.constants_at(t))
+            for triad, t in ((self._model.accel, temp), (self._model.gyro, gyro_temp))
         )
         return ImuConstants(K, U0 * STANDARD_GRAVITY_M_PER_S2, L, W0, self._model.g_sensitivity)
 
     def apply(
-        self, force_m_per_s2: Any, rate_rad_per_s: Any, temp_degc: Any = None
+        self,
+        force_m_per_s2: Any,
+        rate_rad_per_s: Any,
+        temp_degc: Any = None,
+        gyro_temp_degc: Any = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Compensated specific force in m/s^2 and rate in rad/s, by the fitted model, in floats.
 
@@ -189,11 +200,14 @@ class ImuCalibration:
             Readings, axes x, y, z.
         temp_degc : array_like, shape () or (n,), or None
             None is `reference_degc`.
+        gyro_temp_degc : array_like, shape () or (n,), or None
+            By the gyros' own thermometer, where they have one.
 
         Raises
         ------
         RefusedError
-            For another shape, a number that is not finite, or a temperature out of `range_degc`.
+            For another shape, a number that is not finite, or a temperature out of `range_degc`;
+            where one of two temperatures is missing.
         """
         force = finite("force_m_per_s2", force_m_per_s2, 3)
         rate = finite("rate_rad_per_s", rate_rad_per_s, 3)
@@ -201,10 +215,11 @@ class ImuCalibration:
             raise RefusedError(
                 "rate_rad_per_s", f"found the shape {rate.shape}", expected=f"{force.shape}"
             )
-        temp, model = self._temperature(temp_degc), self._model
-        refuse_other_length(force, temp_degc=temp)
+        temp, gyro_temp = self._temperatures(temp_degc, gyro_temp_degc)
+        model = self._model
+        refuse_other_length(force, temp_degc=temp, gyro_temp_degc=gyro_temp)
         a = force_from_voltage(model.accel.constants_at(temp), force / STANDARD_GRAVITY_M_PER_S2)
-        w = force_from_voltage(model.gyro.constants_at(temp), rate) - a @ model.g_sensitivity.T
+        w = force_from_voltage(model.gyro.constants_at(gyro_temp), rate) - a @ model.g_sensitivity.T
         return a * STANDARD_GRAVITY_M_PER_S2, w
 
     def save(self, path: str | Path) -> Path:
@@ -215,10 +230,22 @@ class ImuCalibration:
         renew({target.name: json_bytes(self.document)}, target.parent)
         return target
 
-    def _temperature(self, temp_degc: Any) -> FloatArray:
+    def _temperatures(self, temp_degc: Any, gyro_temp_degc: Any) -> tuple[FloatArray, FloatArray]:
+        """Temperatures of both triads."""
+        own = self.gyro_range_degc is not None
+        if gyro_temp_degc is not None and not own:
+            raise RefusedError(
+                "gyro_temp_degc", "given", expected="none: both triads have one thermometer"
+            )
+        if own and (gyro_temp_degc is None) != (temp_degc is None):
+            name = "gyro_temp_degc" if gyro_temp_degc is None else "temp_degc"
+            raise RefusedError(
+                name, "not given", expected="the temperature of each triad: it has a thermometer"
+            )
         if temp_degc is None:
-            return np.array(self.reference_degc)
-        return temperatures(temp_degc, self.range_degc)
+            return np.array(self.reference_degc), np.array(self._model.gyro.t0_degc)
+        temp = temperatures(temp_degc, self.range_degc)
+        return temp, temperatures(gyro_temp_degc, self.gyro_range_degc) if own else temp
 
     @cached_property
     def fitted(self) -> FittedImu:
@@ -234,7 +261,8 @@ class ImuCalibration:
         document = self.document
         saved = read_saved_for_c(self.source, document)
         frame = self.reference_degc, float(document["local_gravity_m_per_s2"])
-        model = model_of_states(self.layout, self._p, *frame, saved.device.range_degc)
+        range_degc, own = saved.device.range_degc, saved.device.gyro_range
+        model = model_of_states(self.layout, self._p, *frame, range_degc, gyro_range_degc=own)
         model = self._with_curves(model)
         inputs, name = str(document["inputs_sha256"]), str(document["unit"])
         return FittedImu(name, self.serial, inputs, self.source, self.layout, model, saved)

@@ -70,6 +70,7 @@ def _refuse_damage(path: str, found: ImuCalibration) -> None:
         "reference_degc": found.reference_degc,
         "local_gravity_m_per_s2": float(document["local_gravity_m_per_s2"]),
         "range_degc": found.range_degc or 0.0,
+        "gyro_range_degc": found.gyro_range_degc or 0.0,
     }
     for key, value in numbers.items():
         if not np.isfinite(value).all():

@@ -19,6 +19,12 @@ from triaxcal.delivery.imu import ImuC, imu_c
 from triaxcal.unit.arithmetic import checked_arithmetic
 from triaxcal.unit.prefix import checked_prefix
 
+_THERMOMETERS = {
+    True: ("not given", "codes of the gyros' own thermometer"),
+    False: ("given", "none: both triads have one thermometer"),
+}
+"""What is wrong with codes of the gyros' thermometer, and expected, by whether there is one."""
+
 
 class ImuFirmware:
     """The fixed-point routines of both triads, in Python's integers: the same bits as the C.
@@ -49,7 +55,7 @@ class ImuFirmware:
         return self.build.accel.prefix
 
     def apply(
-        self, raw_accel: Any, raw_gyro: Any, temp_codes: Any
+        self, raw_accel: Any, raw_gyro: Any, temp_codes: Any, gyro_temp_codes: Any = None
     ) -> tuple[Int32Array, Int32Array, UInt32Array]:
         """Results of `triax_imu_apply`.
 
@@ -57,6 +63,8 @@ class ImuFirmware:
         ----------
         raw_accel, raw_gyro : array_like of whole numbers, shape (n, 3)
         temp_codes : array_like of whole numbers, shape () or (n,)
+        gyro_temp_codes : the same, or None
+            Of the gyros' own thermometer, where they have one.
 
         Returns
         -------
@@ -67,18 +75,25 @@ class ImuFirmware:
         Raises
         ------
         RefusedError
-            For another shape, or a number beyond int32.
+            For another shape, or a number beyond int32; for codes of a thermometer that is not
+            there, or none of one that is.
         """
+        if (gyro_temp_codes is None) == self.build.two_thermometers:
+            found, expected = _THERMOMETERS[self.build.two_thermometers]
+            raise RefusedError("gyro_temp_codes", found, expected=expected)
         accel, gyro = int32("raw_accel", raw_accel, 3), int32("raw_gyro", raw_gyro, 3)
-        temp = int32("temp_codes", temp_codes)
-        if accel.ndim != 2 or gyro.shape != accel.shape or temp.shape not in ((), (len(accel),)):
+        temps = [int32("temp_codes", temp_codes)]
+        if gyro_temp_codes is not None:
+            temps.append(int32("gyro_temp_codes", gyro_temp_codes))
+        fits = all(temp.shape in ((), (len(accel),)) for temp in temps)
+        if accel.ndim != 2 or gyro.shape != accel.shape or not fits:
             raise RefusedError(
                 "raw_accel, raw_gyro, temp_codes",
-                f"found the shapes {accel.shape}, {gyro.shape}, {temp.shape}",
+                f"found the shapes {accel.shape}, {gyro.shape}, {temps[0].shape}",
                 expected="(n, 3), (n, 3), (n,)",
             )
-        temp = np.ascontiguousarray(np.broadcast_to(temp, (len(accel),)))
-        return imu_answers(self.build.accel, self.build.gyro, temp, accel, gyro)
+        temps = [np.ascontiguousarray(np.broadcast_to(t, (len(accel),))) for t in temps]
+        return imu_answers(self.build.accel, self.build.gyro, (temps[0], accel, gyro, temps[-1]))
 
     def check(self) -> int:
         """Vectors on which Python, the reference C and the generated C agreed."""
@@ -111,8 +126,11 @@ class ImuFirmware:
         from triaxcal.api.a2lfile import write_linked_a2l, xcp_on_can  # noqa: PLC0415
 
         fitted, build = self.c.fitted, self.build
-        sensor, provenance = fitted.device.temperature_sensor, fitted.provenances[0]
-        triads = ((build.accel, sensor), (build.gyro, sensor))
+        device, provenance = fitted.device, fitted.provenances[0]
+        triads = (
+            (build.accel, device.temperature_sensor),
+            (build.gyro, device.gyro_temperature_sensor),
+        )
         xcp = xcp_on_can(can_ids, bitrate)
         return write_linked_a2l(elf, path, triads, provenance, variables=variables, xcp=xcp)
 

@@ -60,6 +60,8 @@ class ImuBuild:
         Name and content.
     compiler : str
         The compiler of the check, and its version.
+    two_thermometers : bool
+        Whether the gyro is compensated by the codes of a thermometer of its own.
     """
 
     accel: Plan
@@ -72,6 +74,7 @@ class ImuBuild:
     vectors: int
     files: dict[str, bytes]
     compiler: str
+    two_thermometers: bool = False
 
 
 def build_imu(
@@ -79,6 +82,8 @@ def build_imu(
     triads: tuple[Triad, Triad],
     provenances: tuple[Provenance, Provenance],
     random_vectors: int = RANDOM_VECTORS,
+    *,
+    two_thermometers: bool = False,
 ) -> ImuBuild:
     """Plan, render, prove and check the C of an IMU; pairs are of accelerometer and gyro.
 
@@ -89,7 +94,7 @@ def build_imu(
     """
     accel = replace(make_plan(imu.accel, triads[0]), reading="g")
     gyro = replace(make_gyro_plan(imu, triads[1], accel.shape.output_q), reading="rad/s")
-    files = render_imu(accel, gyro, triads, provenances)
+    files = render_imu(accel, gyro, triads, provenances, two_thermometers=two_thermometers)
     bounds = prove(accel), prove(gyro)
     with library_folder() as folder:
         for file, content in files.items():
@@ -104,9 +109,9 @@ def build_imu(
         )
         for plan, provenance in zip((accel, gyro), provenances, strict=True):
             check_selftest(plan, provenance, library)
-        vectors = _check_both(
-            accel, gyro, GeneratedImu(library), files[names_of(accel).file(IMU_IMAGE_FILE)]
-        )
+        image = files[names_of(accel).file(IMU_IMAGE_FILE)]
+        samples = imu_vectors(accel, gyro, two_thermometers=two_thermometers)
+        vectors = _check_both(accel, gyro, GeneratedImu(library), image, samples)
     for what, bound, check in zip(("accelerometer", "gyro"), bounds, checks, strict=True):
         if check.largest_error_lsb > bound.lsb:
             raise RefusedError(
@@ -116,7 +121,8 @@ def build_imu(
                 remedy="the proof is wrong: this is a fault in triaxcal, report it",
             )
     carried = rate_bound(gyro, bounds[1], bounds[0])
-    return ImuBuild(accel, gyro, *bounds, carried, *checks, vectors, files, compiler)
+    found = ImuBuild(accel, gyro, *bounds, carried, *checks, vectors, files, compiler)
+    return replace(found, two_thermometers=two_thermometers)
 
 
 def render_imu(
@@ -124,6 +130,8 @@ def render_imu(
     gyro: Plan,
     triads: tuple[Triad, Triad],
     provenances: tuple[Provenance, Provenance],
+    *,
+    two_thermometers: bool = False,
 ) -> dict[str, bytes]:
     """Every file of an IMU, by name."""
     texts = {**render_routine(accel), **render_routine(gyro)}
@@ -131,7 +139,8 @@ def render_imu(
     for plan, triad, provenance in each:
         texts |= render_constants(plan, triad.temperature_sensor, provenance)
         texts |= render_selftest(plan, provenance)
-    names, context = names_of(accel), imu_context(accel, gyro)
+    names = names_of(accel)
+    context = imu_context(accel, gyro, two_thermometers=two_thermometers)
     shapes = f"shapes {names.shape} and {names_of(gyro).shape}"
     texts |= dict(render(name, shapes, names, **context) for name in IMU_FILES)
     files = {name: text.encode() for name, text in texts.items()}
@@ -164,13 +173,15 @@ def _check(plan: Plan, routines: tuple[Generated, Reference], count: int) -> Cro
     return replace(check, images=check_images(plan, image_cases(plan, image), generated, reference))
 
 
-def _check_both(accel: Plan, gyro: Plan, generated: GeneratedImu, image: bytes) -> int:
+def _check_both(
+    accel: Plan, gyro: Plan, generated: GeneratedImu, image: bytes, samples: ImuVectors
+) -> int:
     """Random samples of both triads, in range and any, against Python; and the joint image."""
-    temp, raw_accel, raw_gyro = imu_vectors(accel, gyro)
-    expected = imu_answers(accel, gyro, temp, raw_accel, raw_gyro)
+    temp, raw_accel, raw_gyro, gyro_temp = samples
+    expected = imu_answers(accel, gyro, samples)
     bare = image_bytes(accel) + image_bytes(gyro)
     for given in (None, image, bare):
-        loaded, found = generated.run(given, temp, raw_accel, raw_gyro)
+        loaded, found = generated.run(given, *samples)
         if loaded != STATUS_OK:
             raise RefusedError("triax_imu_calib_load", f"refused its own image: status {loaded}")
         differs = np.zeros(len(temp), np.bool_)
@@ -179,8 +190,8 @@ def _check_both(accel: Plan, gyro: Plan, generated: GeneratedImu, image: bytes) 
         if differs.any():
             i = int(differs.argmax())
             raise RefusedError(
-                f"cross-check of triax_imu_apply, temp_code {temp[i]}, raw_accel "
-                f"{raw_accel[i].tolist()}, raw_gyro {raw_gyro[i].tolist()}",
+                f"cross-check of triax_imu_apply, temp_code {temp[i]}, of the gyro {gyro_temp[i]}, "
+                f"raw_accel {raw_accel[i].tolist()}, raw_gyro {raw_gyro[i].tolist()}",
                 f"{found[0][i].tolist()}, {found[1][i].tolist()}, status {found[2][i]}",
                 expected=f"{expected[0][i].tolist()}, {expected[1][i].tolist()}, "
                 f"status {expected[2][i]}",
@@ -193,7 +204,7 @@ def _check_both(accel: Plan, gyro: Plan, generated: GeneratedImu, image: bytes) 
         _flipped(image, accel_size - 1), "gyro's last byte": _flipped(image, len(image) - 1),
     }  # fmt: skip
     for name, wrong in damaged.items():
-        loaded, _ = generated.run(wrong, temp[:1], raw_accel[:1], raw_gyro[:1])
+        loaded, _ = generated.run(wrong, *(values[:1] for values in samples))
         if loaded != STATUS_BAD_IMAGE:
             raise RefusedError(
                 f"triax_imu_calib_load, image '{name}'",
@@ -208,7 +219,11 @@ def _flipped(image: bytes, at: int) -> bytes:
     return image[:at] + bytes([image[at] ^ 1]) + image[at + 1 :]
 
 
-def imu_vectors(accel: Plan, gyro: Plan) -> tuple[Int32Array, Int32Array, Int32Array]:
+ImuVectors = tuple[Int32Array, Int32Array, Int32Array, Int32Array]
+"""Temperature codes, raw codes of accelerometer and gyro, temperature codes of the gyro."""
+
+
+def imu_vectors(accel: Plan, gyro: Plan, *, two_thermometers: bool = False) -> ImuVectors:
     """Temperature codes and raw codes of both triads: half in range, half any int32.
 
     Either triad alone is out of its range in a quarter each, to distinguish their status bits.
@@ -225,17 +240,20 @@ def imu_vectors(accel: Plan, gyro: Plan) -> tuple[Int32Array, Int32Array, Int32A
     temp = codes(accel.temp_min_code, accel.temp_max_code, 1)[:, 0].copy()
     raw_accel = codes(accel.shape.raw_min, accel.shape.raw_max, 3)
     raw_gyro = np.roll(codes(gyro.shape.raw_min, gyro.shape.raw_max, 3), count // 2, axis=0)
-    return temp, raw_accel, raw_gyro
+    if not two_thermometers:
+        return temp, raw_accel, raw_gyro, temp
+    own = codes(gyro.temp_min_code, gyro.temp_max_code, 1)[:, 0]
+    return temp, raw_accel, raw_gyro, np.roll(own, count // 4)
 
 
 def imu_answers(
-    accel: Plan, gyro: Plan, temp: Int32Array, raw_accel: Int32Array, raw_gyro: Int32Array
+    accel: Plan, gyro: Plan, samples: ImuVectors
 ) -> tuple[Int32Array, Int32Array, UInt32Array]:
     """What Python makes of samples of both triads: accelerations, rates and status."""
-    code = temp.astype(np.int64)
-    state, accel_status = set_temperature(accel, code)
+    temp, raw_accel, raw_gyro, gyro_temp = samples
+    state, accel_status = set_temperature(accel, temp.astype(np.int64))
     force, flags = apply(accel, state, raw_accel.astype(np.int64))
-    state, gyro_status = set_temperature(gyro, code)
+    state, gyro_status = set_temperature(gyro, gyro_temp.astype(np.int64))
     rate, gyro_flags = apply(gyro, state, raw_gyro.astype(np.int64), force)
     status = (accel_status | flags) | (gyro_status | gyro_flags) * GYRO_STATUS
     return force.astype(np.int32), rate.astype(np.int32), status.astype(np.uint32)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass, replace
+from typing import Any
 
 from triaxcal.codegen.image import header_words
 from triaxcal.fixedpoint.plan import Plan
@@ -77,13 +78,17 @@ def shape_id(plan: Plan) -> str:
     return f"{zlib.crc32(b''.join(w.to_bytes(4, 'little') for w in words)):08x}"
 
 
-def imu_context(accel: Plan, gyro: Plan) -> dict[str, str]:
-    """Names in the C of both triads together, beside the accelerometer's."""
-    ids = shape_id(accel), shape_id(gyro)
+def imu_context(accel: Plan, gyro: Plan, *, two_thermometers: bool) -> dict[str, Any]:
+    """Names in the C of both triads together, beside the accelerometer's.
+
+    With two thermometers a function has one more argument, and other link names.
+    """
+    ids = shape_id(accel), shape_id(gyro), *["two thermometers"] * two_thermometers
     both = f"{zlib.crc32(''.join(ids).encode()):08x}"
     return {
         "gyro_shape_word": _word(ids[1]),
         "imu_shape_word": _word(both),
+        "two_thermometers": two_thermometers,
         "imu_linked": f"{accel.prefix}_imu_{both}",
     }
 

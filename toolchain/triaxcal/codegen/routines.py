@@ -203,15 +203,24 @@ class GeneratedImu:
     library: ctypes.CDLL
 
     def run(
-        self, image: bytes | None, temp: Int32Array, raw_accel: Int32Array, raw_gyro: Int32Array
+        self,
+        image: bytes | None,
+        temp: Int32Array,
+        raw_accel: Int32Array,
+        raw_gyro: Int32Array,
+        gyro_temp: Int32Array | None = None,
     ) -> tuple[int, tuple[Int32Array, Int32Array, UInt32Array]]:
-        """Status of the loader (0 without an image); accelerations, rates and status."""
+        """Status of the loader (0 without an image); accelerations, rates and status.
+
+        `gyro_temp` are codes of the gyros' own thermometer, where they have one.
+        """
+        gyro_temp = temp if gyro_temp is None else gyro_temp
         accel, status = _outputs(len(temp))
         rate = np.zeros_like(accel)
         loaded = self.library.triax_imu_batch(
             image, ctypes.c_size_t(len(image or b"")), ctypes.c_size_t(len(temp)), _pointer(temp),
-            _pointer(raw_accel), _pointer(raw_gyro), _pointer(accel), _pointer(rate),
-            _pointer(status),
+            _pointer(gyro_temp), _pointer(raw_accel), _pointer(raw_gyro), _pointer(accel),
+            _pointer(rate), _pointer(status),
         )  # fmt: skip
         return int(loaded), (accel, rate, status)
 

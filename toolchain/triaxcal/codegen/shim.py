@@ -15,7 +15,7 @@ _NAMES = (
     "calib_t", "state_t", "set_temperature", "set_temperature_rate", "apply", "calib_load",
     "selftest", "angles", "angle_t",
 )  # fmt: skip
-_MACROS = ("CALIB", "IMAGE_SIZE", "RAW_MIN", "RAW_MAX", "RATE_Q", "SHAPE")
+_MACROS = ("CALIB", "IMAGE_SIZE", "RAW_MIN", "RAW_MAX", "RATE_Q", "SHAPE", "TWO_THERMOMETERS")
 
 
 def write_shim(folder: Path, prefix: str) -> tuple[Path, ...]:

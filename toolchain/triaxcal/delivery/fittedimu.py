@@ -96,7 +96,7 @@ def fitted_imu(done: DynamicUnit, verdict: ImuVerdict, inputs_sha256: str) -> Fi
     """What the C of a dynamic calibration with [device] is made of."""
     unit, layout, device = done.unit, done.result.layout, done.unit.device
     assert device is not None
-    model = imu_model(done.result, device.range_degc, done.over)
+    model = imu_model(done.result, device.range_degc, done.over, device.gyro_range)
     saved = saved_for_c(done, device, verdict)
     return FittedImu(unit.name, unit.serial, inputs_sha256, str(unit.path), layout, model, saved)
 
@@ -109,6 +109,7 @@ def saved_for_c(done: DynamicUnit, device: Device, verdict: ImuVerdict) -> Saved
     header = (
         f"both triads from {done.unit.recording_words}, {low:g} to {high:g} degC",
         f"accelerometer code: {accel.bits} bits for {accel.full_scale_v:.9g} g full scale",
+        *_own_thermometer(device),
         f"gyro code: {gyro.bits} bits for {gyro_deg_per_s:.9g} deg/s full scale",
         *turned_columns(done.unit),
         *(f"not corrected: {title}" for title in left_out(done.result.layout)),
@@ -119,6 +120,13 @@ def saved_for_c(done: DynamicUnit, device: Device, verdict: ImuVerdict) -> Saved
     axes = ", ".join(columns["force"][0]), ", ".join(columns["rate"][0])
     date = done.unit.measured.date
     return SavedForC(device, header, axes, "" if date is None else date.isoformat())
+
+
+def _own_thermometer(device: Device) -> tuple[str, ...]:
+    if not device.two_thermometers:
+        return ()
+    low, high = device.gyro_range
+    return (f"the gyro has a thermometer of its own: {low:g} to {high:g} degC by it",)
 
 
 def _unknown_temperature(done: DynamicUnit) -> tuple[str, ...]:

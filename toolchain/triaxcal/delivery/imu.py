@@ -26,7 +26,6 @@ from triaxcal.evidence.check import Evidence
 from triaxcal.evidence.examine import examine
 from triaxcal.evidence.unsettled import explained
 from triaxcal.fixedpoint.gyro import TriadDescription
-from triaxcal.fixedpoint.plan import Plan
 from triaxcal.model.curves import ThermalModel
 from triaxcal.model.methods.compensation import Compensation
 from triaxcal.model.methods.imu import ImuCompensation, ImuModel, compensate_imu
@@ -168,30 +167,45 @@ def imu_c(fitted: FittedImu) -> ImuC:
     adcs = device.accel_adc, device.gyro_adc
     limits = ACCEL_MODEL_ERROR_MAX_G, math.radians(GYRO_MODEL_ERROR_MAX_DEG_PER_H / 3600)
     functions = compensate_imu(
-        model, METHOD, device.range_degc, (adcs[0].largest_v, adcs[1].largest_v), limits
+        model,
+        METHOD,
+        device.range_degc,
+        (adcs[0].largest_v, adcs[1].largest_v),
+        limits,
+        gyro_range_degc=device.gyro_range,
     )
-    name, sensor = fitted.name, device.temperature_sensor
+    name, sensors = fitted.name, (device.temperature_sensor, device.gyro_temperature_sensor)
     triads = (
-        TriadDescription(name, adcs[0], sensor, device.accel_q, device.prefix, device.arithmetic),
         TriadDescription(
-            name, adcs[1], sensor, device.gyro_rate_q, device.prefix, device.arithmetic
+            name, adcs[0], sensors[0], device.accel_q, device.prefix, device.arithmetic
+        ),
+        TriadDescription(
+            name, adcs[1], sensors[1], device.gyro_rate_q, device.prefix, device.arithmetic
         ),
     )
-    build = build_imu(functions, triads, fitted.provenances)
-    errors = _model_errors(model, functions, device, build.accel)
+    build = build_imu(
+        functions, triads, fitted.provenances, two_thermometers=device.two_thermometers
+    )
+    errors = _model_errors(model, functions, device, build)
     _refuse_model_errors(fitted.source, errors)
     return ImuC(fitted, build, *errors)
 
 
 def _model_errors(
-    model: ImuModel, functions: ImuCompensation, device: Device, plan: Plan
+    model: ImuModel, functions: ImuCompensation, device: Device, build: ImuBuild
 ) -> tuple[float, float]:
     """In g and in deg/h; the accelerometer's passes to the gyro through the g-sensitivity."""
-    sensor = device.temperature_sensor
-    temps = plan.temp_codes.astype(np.float64) * sensor.degc_per_code + sensor.degc_at_zero
+    temps, gyro_temps = (
+        plan.temp_codes.astype(np.float64) * sensor.degc_per_code + sensor.degc_at_zero
+        for plan, sensor in (
+            (build.accel, device.temperature_sensor),
+            (build.gyro, device.gyro_temperature_sensor),
+        )
+    )
     accel = _triad_error(model.accel, functions.accel, temps, device.accel_adc)
-    gyro = _triad_error(model.gyro, functions.gyro, temps, device.gyro_adc)
-    gyro = gyro + accel @ np.abs(model.g_sensitivity).T
+    gyro = _triad_error(model.gyro, functions.gyro, gyro_temps, device.gyro_adc)
+    carried = accel.max(axis=0) if device.two_thermometers else accel
+    gyro = gyro + carried @ np.abs(model.g_sensitivity).T
     return float(accel.max()), float(np.rad2deg(gyro.max()) * 3600)
 
 

@@ -133,8 +133,11 @@ class DynamicTable(WrittenFile, _Recorded):
         A second accelerometer triad, in the same unit.
     temp_column
         Temperature; required by the blocks of temperature.
+    gyro_temp_column
+        Temperature of the gyros, where they have a thermometer of their own; `temp_column` is that
+        of the accelerometers then.
     temperature_unit
-        Unit of `temp_column`.
+        Unit of the temperatures.
     table_angle_column
         Angle of the table; required by the blocks of the table's angle.
     reference_degc
@@ -163,6 +166,7 @@ class DynamicTable(WrittenFile, _Recorded):
     up_at_start: str | None = setting(word(UPWARD), None, words="not checked", example='"+z"')
     force2_columns: tuple[SignedColumn, ...] | None = setting(SIGNED_COLUMNS, None)
     temp_column: Column | None = setting(COLUMN, None)
+    gyro_temp_column: Column | None = setting(COLUMN, None, words="`temp_column`")
     temperature_unit: str = setting(word(TEMPERATURE_UNITS[:3]), TEMPERATURE_UNITS[0])
     table_angle_column: Column | None = setting(COLUMN, None, "deg")
     reference_degc: float = setting(number(*PLAUSIBLE_DEGC), 20.0, "degC")
@@ -184,6 +188,8 @@ def dynamic_table() -> TableKeys:
 def refuse_two_temperatures(values: Values, found: DynamicTable) -> None:
     """Refuse temperatures that are both stated and recorded, or stated of some recordings only.
 
+    And those of the gyros alone.
+
     Raises
     ------
     RefusedError
@@ -194,6 +200,12 @@ def refuse_two_temperatures(values: Values, found: DynamicTable) -> None:
             values.where("recording"),
             "temp_degc and temp_column are both given",
             expected="one of them: a column of temperatures, or the temperature of each recording",
+        )
+    if found.gyro_temp_column is not None and found.temp_column is None:
+        raise RefusedError(
+            values.where("gyro_temp_column"),
+            "given, and no temp_column",
+            expected="temp_column as well: the temperature of the accelerometers",
         )
     if any(stated) and not all(stated):
         raise RefusedError(

@@ -21,7 +21,7 @@ from triaxcal.dynamic.columns import (
     dynamic_table,
     refuse_two_temperatures,
 )
-from triaxcal.dynamic.device import DEVICE, Device, device_of
+from triaxcal.dynamic.device import DEVICE, Device, device_of, refuse_other_thermometers
 from triaxcal.dynamic.limits import IMU_LIMITS, ImuLimits
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.quantities import ForcesApart, forces_apart, names_of, quantities_of
@@ -226,6 +226,8 @@ def read_dynamic(folder: Path) -> DynamicDescription:
             f"one file of the accelerometers, and {len(found.recording)} recordings",
             expected="one recording, or both triads in each file",
         )
+    device = device_of(tables["device"])
+    refuse_other_thermometers(device, found.gyro_temp_column is not None, path)
     return DynamicDescription(
         name=folder.absolute().name,
         serial=tables[""][SERIAL],
@@ -243,7 +245,7 @@ def read_dynamic(folder: Path) -> DynamicDescription:
         blocks=blocks_of(dynamic, found),
         noise=tables["noise"].record(DataSheet),
         table=_table(tables["table"]),
-        device=device_of(tables["device"]),
+        device=device,
         measured=tables["measured"].record(Measured),
         limits=tables["limits"].record(ImuLimits),
         forces=forces_apart(found, clock),

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.base.keys import TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import interval, number, whole
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
@@ -31,6 +33,12 @@ class Device:
         Reading of the code 2^(gyro_bits - 1).
     range_degc
         Working range.
+    gyro_degc_per_code
+        Of the gyros' thermometer, where they have one of their own: [dynamic] `gyro_temp_column`.
+    gyro_degc_at_zero
+        Temperature of its code 0.
+    gyro_range_degc
+        Working range by it.
     accel_q
         LSB of an acceleration: 2^-accel_q g.
     gyro_rate_q
@@ -51,10 +59,32 @@ class Device:
     range_degc: tuple[float, float] = setting(
         interval(*PLAUSIBLE_DEGC), unit="degC", example="[-40, 85]"
     )
+    gyro_degc_per_code: float | None = setting(number(1e-6, 10.0), None, "degC", example="0.01")
+    gyro_degc_at_zero: float | None = setting(number(-1e4, 1e4), None, "degC", words="0")
+    gyro_range_degc: tuple[float, float] | None = setting(
+        interval(*PLAUSIBLE_DEGC), None, "degC", words="`range_degc`"
+    )
     accel_q: int = setting(whole(*OUTPUT_Q_RANGE), 24)
     gyro_rate_q: int = setting(whole(*OUTPUT_Q_RANGE), 19)
     prefix: str = setting(PREFIX, DEFAULT_PREFIX)
     arithmetic: str = setting(ARITHMETIC, PORTABLE)
+
+    @property
+    def two_thermometers(self) -> bool:
+        """Whether the gyros have a thermometer of their own."""
+        return self.gyro_degc_per_code is not None
+
+    @property
+    def gyro_temperature_sensor(self) -> TemperatureSensor:
+        """Thermometer of the gyros."""
+        if self.gyro_degc_per_code is None:
+            return self.temperature_sensor
+        return TemperatureSensor(self.gyro_degc_per_code, self.gyro_degc_at_zero or 0.0)
+
+    @property
+    def gyro_range(self) -> tuple[float, float]:
+        """Working range by the gyros' thermometer."""
+        return self.gyro_range_degc or self.range_degc
 
     @property
     def accel_adc(self) -> Adc:
@@ -78,7 +108,40 @@ REQUIRED = tuple(key.name for key in DEVICE.keys if key.required)
 
 
 def device_of(values: Values) -> Device | None:
-    """[device], or None if there is none."""
+    """[device], or None if there is none.
+
+    Raises
+    ------
+    RefusedError
+        When keys of a thermometer of the gyros are given without its scale.
+    """
     if not values:
         return None
-    return values.record(Device, temperature_sensor=values.record(TemperatureSensor))
+    found = values.record(Device, temperature_sensor=values.record(TemperatureSensor))
+    for key in ("gyro_degc_at_zero", "gyro_range_degc"):
+        if key in values and not found.two_thermometers:
+            raise RefusedError(
+                values.where(key),
+                "given, and no gyro_degc_per_code",
+                expected="gyro_degc_per_code as well: the gyros have a thermometer of their own",
+            )
+    return found
+
+
+def refuse_other_thermometers(device: Device | None, own_column: bool, path: Path) -> None:
+    """Refuse a thermometer of the gyros that was recorded and that the device lacks, or reverse.
+
+    Raises
+    ------
+    RefusedError
+    """
+    if device is None or device.two_thermometers == own_column:
+        return
+    key, other = "[dynamic] gyro_temp_column", "[device] gyro_degc_per_code"
+    given, missing = (key, other) if own_column else (other, key)
+    raise RefusedError(
+        f"{path}, {given}",
+        f"given, and no {missing}",
+        expected=f"{missing} as well, or neither",
+        remedy="the device must read the thermometer that was recorded",
+    )

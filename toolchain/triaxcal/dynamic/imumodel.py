@@ -38,12 +38,15 @@ def left_out(layout: Layout) -> tuple[str, ...]:
 
 
 def imu_model(
-    result: DynamicResult, range_degc: tuple[float, float], over: OverTemperature | None = None
+    result: DynamicResult,
+    range_degc: tuple[float, float],
+    over: OverTemperature | None = None,
+    gyro_range_degc: tuple[float, float] | None = None,
 ) -> ImuModel:
     """Model of both triads of a result, over `range_degc`; by the curves where there are some."""
     frame = result.frame
     about = frame.reference_degc, frame.gravity, range_degc
-    model = model_of_states(result.layout, result.p, *about)
+    model = model_of_states(result.layout, result.p, *about, gyro_range_degc=gyro_range_degc)
     return model if over is None else replace(model, accel=over.accel, gyro=over.gyro)
 
 
@@ -53,8 +56,12 @@ def model_of_states(
     reference_degc: float,
     gravity_m_per_s2: float,
     range_degc: tuple[float, float],
+    *,
+    gyro_range_degc: tuple[float, float] | None = None,
 ) -> ImuModel:
     """Model of both triads over `range_degc`; constant where no temperature block was on.
+
+    `gyro_range_degc` is that of the gyro's own thermometer, where it has one.
 
     `p`, shape (n,), are the constants of the layout in SI units, at `reference_degc`.
 
@@ -73,7 +80,7 @@ def model_of_states(
         layout.part(p, "gyro-bias")[:3],
         theta,
         _slopes(layout.part(p, "gyro-thermal"), 1.0),
-        (reference_degc, range_degc),
+        (reference_degc, gyro_range_degc or range_degc),
     )
     # D is per local g; the device's unit is the standard one.
     drift = layout.part(p, "g-drift").reshape(3, 3) * (g / gravity_m_per_s2)

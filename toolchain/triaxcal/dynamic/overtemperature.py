@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from triaxcal.base.progress import Progress
-from triaxcal.dynamic.blocks.base import ACCELEROMETER_BIAS, GYRO_BIAS
+from triaxcal.dynamic.blocks.base import (
+    ACCELEROMETER_BIAS,
+    ACCELEROMETER_MATRIX,
+    GYRO_BIAS,
+    GYRO_MATRIX,
+)
 from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.layout import Layout
@@ -16,10 +22,10 @@ from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.soak import Soak, soak_blocks, soak_information, split_soaks
 from triaxcal.dynamic.survey import Section
 from triaxcal.dynamic.temperatures import Recorded, recorded_temperatures
-from triaxcal.dynamic.thermalbasis import GROUPS, Basis, block_over_temperature
+from triaxcal.dynamic.thermalbasis import GROUPS, OF_GYROS, Basis, block_over_temperature
 from triaxcal.dynamic.thermalchoice import Choice, Curves, choose, folds_of
 from triaxcal.dynamic.thermalcurves import Known, known_at, thermal_models
-from triaxcal.dynamic.thermalnodes import Nodes, cut_at_nodes, nodes_of
+from triaxcal.dynamic.thermalnodes import Nodes, cut_at_nodes, gyro_nodes_of, nodes_of
 from triaxcal.dynamic.thermalparts import (
     Information,
     constants_of,
@@ -62,7 +68,8 @@ class OverTemperature:
 
     Attributes
     ----------
-    nodes : Nodes
+    nodes, gyro_nodes : Nodes
+        The same where the gyros have no thermometer of their own.
     choice : Choice
     known : Known
         On a grid over the recorded range.
@@ -73,6 +80,7 @@ class OverTemperature:
     """
 
     nodes: Nodes
+    gyro_nodes: Nodes
     choice: Choice
     known: Known
     accel: ThermalModel
@@ -122,14 +130,18 @@ def solve_over_temperature(
     """
     recorded = at.recorded
     nodes = nodes_of(recorded, at.reference_degc)
+    gyro_nodes = gyro_nodes_of(recorded, nodes, at.reference_degc)
     turning, soaks = split_soaks(recording)
     moved = recorded if turning is recording else recorded_temperatures(turning)
     assert moved is not None
-    seen = _seen(nodes, moved)
+    seen = _seen(nodes, gyro_nodes, moved)
     shapes = {name: shapes_of(at.stated, own, at.where) for name, own in seen.items()}
-    spanned = tuple(dict.fromkeys(s for n, own in seen.items() for s in with_folds(shapes[n], own)))
-    basis = Basis.spanning(spanned, nodes.t0_degc, recorded.degc)
-    terms = tuple(block_over_temperature(block, basis) for block in GROUPS) if basis.terms else ()
+    bases = _bases(seen, shapes, recorded, (nodes.t0_degc, gyro_nodes.t0_degc))
+    terms = tuple(
+        block_over_temperature(block, bases[block.name], nodes.t0_degc)
+        for block in GROUPS
+        if bases[block.name].terms
+    )
     full = calibrate_dynamic(
         turning,
         noise,
@@ -139,23 +151,50 @@ def solve_over_temperature(
     )
     everything, by_node, layout = _information(turning, full, (moved, nodes), soaks, report)
     free = tuple(name for name, own in seen.items() if len(own.degc) < len(nodes.degc))
-    curves = Curves(layout, basis, {name: own.degc for name, own in seen.items()}, free)
-    choice = choose(curves, everything, folds_of(nodes, by_node), shapes)
-    grid = np.linspace(*recorded.ends_degc, GRID)
-    known = known_at(curves, everything, choice, grid)
-    models = thermal_models(choice.fit, nodes.t0_degc)
-    over = OverTemperature(nodes, choice, known, *models, _findings(recorded, moved))
-    own = Curves(constants_of(full), basis, curves.seen).map_of(choice.fit.shapes)[0]
+    curves = Curves(layout, bases, {name: own.degc for name, own in seen.items()}, free)
+    choice = choose(curves, everything, folds_of(nodes, gyro_nodes, by_node), shapes)
+    grids = (np.linspace(*ends, GRID) for ends in (recorded.ends_degc, recorded.gyro_ends_degc))
+    known = known_at(curves, everything, choice, *grids)
+    models = thermal_models(choice.fit, nodes.t0_degc, gyro_nodes.t0_degc)
+    over = OverTemperature(nodes, gyro_nodes, choice, known, *models, _findings(recorded, moved))
+    own = Curves(constants_of(full), bases, curves.seen).map_of(choice.fit.shapes)[0]
     return Solved(full, _shown(full, curves, choice), over, turning, own)
 
 
-def _seen(nodes: Nodes, moved: Recorded) -> dict[str, Nodes]:
+def _seen(nodes: Nodes, gyro_nodes: Nodes, moved: Recorded) -> dict[str, Nodes]:
     """Temperatures at which each group was seen: a matrix only where the unit turned."""
-    degc = nodes.degc[sorted({int(k) for k in nodes.nearest(moved.degc)})]
-    nearest = float(degc[int(np.argmin(np.abs(degc - nodes.t0_degc)))])
-    turned = Nodes(degc, nodes.t0_degc if nodes.t0_degc in degc else nearest)
-    biases = ACCELEROMETER_BIAS.name, GYRO_BIAS.name
-    return {block.name: nodes if block.name in biases else turned for block in GROUPS}
+    turned = sorted({int(k) for k in nodes.nearest(moved.degc)})
+    return {
+        ACCELEROMETER_BIAS.name: nodes,
+        ACCELEROMETER_MATRIX.name: _part(nodes, turned),
+        GYRO_BIAS.name: gyro_nodes,
+        GYRO_MATRIX.name: _part(gyro_nodes, turned),
+    }
+
+
+def _part(nodes: Nodes, numbers: list[int]) -> Nodes:
+    """Some of the nodes; T0 is that of all, or the nearest of them."""
+    degc = nodes.degc[numbers]
+    return Nodes(degc, float(degc[int(np.argmin(np.abs(degc - nodes.t0_degc)))]))
+
+
+def _bases(
+    seen: Mapping[str, Nodes],
+    shapes: Mapping[str, Sequence[ThermalShape]],
+    recorded: Recorded,
+    t0_degc: tuple[float, float],
+) -> dict[str, Basis]:
+    """Functions of each group: those of a triad span what its own groups may follow."""
+    bases: dict[str, Basis] = {}
+    for names, t0, degc in zip(
+        ((ACCELEROMETER_BIAS.name, ACCELEROMETER_MATRIX.name), OF_GYROS),
+        t0_degc,
+        (recorded.degc, recorded.gyro_degc),
+        strict=True,
+    ):
+        spanned = dict.fromkeys(s for n in names for s in with_folds(tuple(shapes[n]), seen[n]))
+        bases |= dict.fromkeys(names, Basis.spanning(tuple(spanned), t0, degc))
+    return bases
 
 
 def _findings(recorded: Recorded, moved: Recorded) -> tuple[str, ...]:

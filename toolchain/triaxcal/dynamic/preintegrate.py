@@ -150,15 +150,19 @@ def _trajectory(
     C = window.outward(window.time[window.inside][middle]) @ matrix_of(q[middle])
     mean_rate = window.angles[window.inside] / window.step_s[window.inside, None]
     mean_rate = mean_rate.reshape(-1, part, 3).mean(axis=1)
-    degc = window.delta_degc[window.inside].reshape(-1, part).mean(axis=1)
+    degc, gyro_degc = (
+        delta[window.inside].reshape(-1, part).mean(axis=1)
+        for delta in (window.delta_degc, window.gyro_delta_degc)
+    )
     spacing_s = part * frame.interval_s
     acceleration = np.gradient(mean_rate, spacing_s, axis=0)
-    nodes = _points(window, mean_rate, C, degc)
+    nodes = _points(window, mean_rate, C, gyro_degc)
     at = window.lead + frame.block * np.arange(window.blocks + 1)
     if frame.force_is_increment:
         q = quaternion_product(q, quaternion_of(-0.5 * turns))
         edges = _points(window, window.edge_rate(0.0), C_ends, window.delta_degc[at])
-        return _Trajectory(q, nodes, _changing(nodes, acceleration), edges)
+        own = _points(window, mean_rate, C, degc)
+        return _Trajectory(q, nodes, _changing(own, acceleration), edges)
     half_s = frame.interval_s / 2
     edge_rate = window.edge_rate(0.5)
     later = C_ends @ rotation_of((window.edge_rate(0.0) + edge_rate) / 2 * half_s)

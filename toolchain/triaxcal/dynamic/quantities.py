@@ -113,9 +113,13 @@ def quantities_of(values: Values, found: DynamicTable) -> tuple[Quantity, ...]:
     ]
     if found.force2_columns is not None:
         quantities.append(signed("force2", "force2_columns", found.force2_columns, force_scale))
-    if found.temp_column is not None:
-        degc = to_degc(found.temperature_unit)
-        quantities.append(Quantity("temp_degc", "temp_column", (found.temp_column,), degc))
+    degc = to_degc(found.temperature_unit)
+    for name, key, temp in (
+        ("temp_degc", "temp_column", found.temp_column),
+        ("gyro_temp_degc", "gyro_temp_column", found.gyro_temp_column),
+    ):
+        if temp is not None:
+            quantities.append(Quantity(name, key, (temp,), degc))
     if found.table_angle_column is not None:
         column = (found.table_angle_column,)
         quantities.append(Quantity("table_angle_rad", "table_angle_column", column, np.radians))
@@ -148,5 +152,5 @@ def _counts(values: Values, triad: str, size: str) -> bool:
 def names_of(found: DynamicTable) -> list[Column]:
     """Columns, single or in triads."""
     triads = (*found.rate_columns, *found.force_columns, *(found.force2_columns or ()))
-    single = (found.temp_column, found.table_angle_column)
+    single = (found.temp_column, found.gyro_temp_column, found.table_angle_column)
     return [*found.time_column, *(c.column for c in triads), *(c for c in single if c is not None)]

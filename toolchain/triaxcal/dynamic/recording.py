@@ -40,6 +40,8 @@ class ImuSamples:
     force : array, shape (n, 3)
         Accelerometer triad: m/s^2 or m/s.
     temp_degc : array, shape (n,), or None
+    gyro_temp_degc : array, shape (n,), or None
+        Of the gyros, where they have a thermometer of their own.
     force2 : array, shape (n, 3), or None
         Second accelerometer triad, as `force`.
     table_angle_rad : array, shape (n,), or None
@@ -58,6 +60,7 @@ class ImuSamples:
     table_angle_rad: FloatArray | None = None
     turn_variance: FloatArray | None = None
     force_variance: FloatArray | None = None
+    gyro_temp_degc: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time_s)
@@ -80,6 +83,7 @@ _SHAPES: dict[str, tuple[int, ...]] = {
     "rate": (3,),
     "force": (3,),
     "temp_degc": (),
+    "gyro_temp_degc": (),
     "force2": (3,),
     "table_angle_rad": (),
     "turn_variance": (),

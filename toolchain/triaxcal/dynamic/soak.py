@@ -44,7 +44,7 @@ class Soak:
     Attributes
     ----------
     start_s : float
-    degc : array, shape (k,)
+    degc, gyro_degc : arrays, shape (k,)
     rate, force : arrays, shape (k, 3)
         rad/s, m/s^2.
     samples : int
@@ -53,6 +53,7 @@ class Soak:
 
     start_s: float
     degc: FloatArray
+    gyro_degc: FloatArray
     rate: FloatArray
     force: FloatArray
     samples: int
@@ -86,25 +87,27 @@ def split_soaks(recording: ImuRecording) -> tuple[ImuRecording, tuple[Soak, ...]
 
 
 def _mean(samples: ImuSamples, recording: ImuRecording) -> FloatArray:
-    """Temperature, rate and force, shape (7,)."""
+    """Temperatures of accelerometers and gyros, rate and force, shape (8,)."""
     per_rate = recording.rate_hz if recording.rate_convention == INCREMENT else 1.0
     per_force = recording.rate_hz if recording.force_convention == INCREMENT else 1.0
-    degc = np.nan if samples.temp_degc is None else float(np.median(samples.temp_degc))
+    own = samples.gyro_temp_degc is not None
+    temps = samples.temp_degc, samples.gyro_temp_degc if own else samples.temp_degc
+    degc = [np.nan if t is None else float(np.median(t)) for t in temps]
     rate, force = samples.rate.mean(axis=0) * per_rate, samples.force.mean(axis=0) * per_force
-    return np.array([degc, *rate, *force])
+    return np.array([*degc, *rate, *force])
 
 
 def _soak(part: list[tuple[float, FloatArray]], samples: int) -> Soak | None:
     if not part:
         return None
     rows = np.array([row for _, row in part])
-    degc, rate, force = rows[:, 0], rows[:, 1:4], rows[:, 4:]
+    degc, gyro_degc, rate, force = rows[:, 0], rows[:, 1], rows[:, 2:5], rows[:, 5:]
     direction = force / np.linalg.norm(force, axis=1)[:, None]
     leans = np.arccos(np.clip(direction @ direction.mean(axis=0), -1, 1)).max()
     drifts = np.abs(rate - np.median(rate, axis=0)).max()
     if leans > LEANS_RAD or drifts > DRIFTS_RAD_PER_S or np.isnan(degc).any():
         return None
-    return Soak(part[0][0], degc, rate, force, samples)
+    return Soak(part[0][0], degc, gyro_degc, rate, force, samples)
 
 
 def soak_blocks(soaks: tuple[Soak, ...]) -> tuple[StateBlock, ...]:
@@ -125,16 +128,18 @@ def soak_information(
 
     By node of temperature; linear about the `result`.
     """
-    frame, noise = result.frame, result.noise
+    frame, noise, gravity = result.frame, result.noise, result.frame.gravity
     part = result.layout.part
     A = np.eye(3) + gamma_matrix(part(result.p, "accelerometer-matrix"))
     nearest = int(np.argmin(np.abs(soak.degc - nodes.t0_degc)))
     bias = part(result.p, "accelerometer-bias")[:3]
     force = inverse_of_one_plus(A - np.eye(3)) @ (soak.force[nearest] - bias)
-    force *= frame.gravity / np.linalg.norm(force)
+    force *= gravity / np.linalg.norm(force)
     zero, one = np.zeros_like(soak.rate), np.ones((len(soak.degc), 1))
-    signals = Signals(zero, zero, one * force, soak.degc - frame.reference_degc, frame.gravity)
-    of_force, of_rate = layout.rows("force", signals), layout.rows("rate", signals)
+    of_force, of_rate = (
+        layout.rows(kind, Signals(zero, zero, one * force, degc - frame.reference_degc, gravity))
+        for kind, degc in (("force", soak.degc), ("rate", soak.gyro_degc))
+    )
     own = layout.place(block.name)
     of_force[:, :, own.start : own.start + 2] = A @ np.linalg.svd(force[None])[2][1:].T
     of_rate[:, :, own.start + 2 : own.stop] = np.eye(3)

@@ -32,15 +32,41 @@ class Recorded:
     ----------
     start_s, degc : arrays, shape (k,)
         Medians over `PIECE_S`, and when each begins.
+    gyro : array, shape (k,), or None
+        The same by the gyros' own thermometer, where they have one.
     """
 
     start_s: FloatArray
     degc: FloatArray
+    gyro: FloatArray | None = None
 
     @property
     def ends_degc(self) -> tuple[float, float]:
         """Lowest and highest."""
         return ends_of(self.degc)
+
+    @property
+    def gyro_degc(self) -> FloatArray:
+        """Temperatures of the gyros."""
+        return self.degc if self.gyro is None else self.gyro
+
+    @property
+    def gyro_ends_degc(self) -> tuple[float, float]:
+        """Lowest and highest of them."""
+        return ends_of(self.gyro_degc)
+
+
+@dataclass(frozen=True)
+class _Thermometer:
+    """Name of its samples in `ImuSamples`, what messages call its readings, and its key."""
+
+    samples: str
+    words: str
+    key: str
+
+
+_COMMON = _Thermometer("temp_degc", "temperature", "temp_column")
+_OF_GYROS = _Thermometer("gyro_temp_degc", "temperature of the gyros", "gyro_temp_column")
 
 
 def recorded_temperatures(recording: ImuRecording) -> Recorded | None:
@@ -51,41 +77,53 @@ def recorded_temperatures(recording: ImuRecording) -> Recorded | None:
     RefusedError
         When the thermometer is stuck, or reads what no thermometer of an IMU reads.
     """
+    start_s, degc = _medians(recording, _COMMON)
+    if degc is None:
+        return None
+    return Recorded(start_s, degc, _medians(recording, _OF_GYROS)[1])
+
+
+def _medians(
+    recording: ImuRecording, thermometer: _Thermometer
+) -> tuple[FloatArray, FloatArray | None]:
+    """Medians of a thermometer over `PIECE_S`, and when each begins; None where there is none."""
     length = max(1, round(PIECE_S * recording.rate_hz))
-    start, degc = [], []
-    steps, ahead = _Steps(), list(recording.starts_s)
+    start, medians = [], []
+    steps, ahead = _Steps(thermometer), list(recording.starts_s)
     known: list[_Steps] = []
     for piece in recording.pieces():
-        if piece.temp_degc is None:
-            return None
+        degc: FloatArray | None = getattr(piece, thermometer.samples)
+        if degc is None:
+            return np.empty(0), None
         if ahead and piece.time_s[0] >= ahead[0]:
             known.append(steps)
-            steps, ahead = _Steps(), ahead[1:]
+            steps, ahead = _Steps(thermometer), ahead[1:]
         for k in range(0, len(piece), length):
             start.append(float(piece.time_s[k]))
-            degc.append(float(np.median(piece.temp_degc[k : k + length])))
-        steps.add(piece.time_s, piece.temp_degc)
+            medians.append(float(np.median(degc[k : k + length])))
+        steps.add(piece.time_s, degc)
     known.append(steps)
     usual_degc = max(each.usual_degc for each in known)
     names = recording.names or (recording.name,) * len(known)
     for name, each in zip(names, known, strict=True):
         each.refuse_stuck(name, usual_degc)
-    found = Recorded(np.array(start), np.array(degc))
-    low, high = found.ends_degc
+    found = np.array(medians)
+    low, high = ends_of(found)
     if not (PLAUSIBLE_DEGC[0] <= low and high <= PLAUSIBLE_DEGC[1]):
         raise RefusedError(
             recording.name,
             f"temperatures of {low:.5g} to {high:.5g} degC",
             expected=f"{PLAUSIBLE_DEGC[0]:g} to {PLAUSIBLE_DEGC[1]:g} degC",
-            remedy="check temp_column and temperature_unit in [dynamic]",
+            remedy=f"check {thermometer.key} and temperature_unit in [dynamic]",
         )
-    return found
+    return np.array(start), found
 
 
 class _Steps:
     """Runs of equal readings, and how large the steps between others are."""
 
-    def __init__(self) -> None:
+    def __init__(self, thermometer: _Thermometer) -> None:
+        self.words = thermometer.words
         self.since_s = self.longest_s = self.longest_start_s = self.value = math.nan
         self.sizes: list[FloatArray] = []
 
@@ -122,8 +160,9 @@ class _Steps:
         if usual_degc and self.longest_s >= STUCK_S:
             raise RefusedError(
                 f"{name}, {self.longest_start_s:.1f} s",
-                f"the temperature reads the same for {self.longest_s:.0f} s, and elsewhere changes "
-                f"by {usual_degc:.2g} degC from reading to reading: the thermometer is stuck",
+                f"the {self.words} reads the same for {self.longest_s:.0f} s, and elsewhere "
+                f"changes by {usual_degc:.2g} degC from reading to reading: the thermometer is "
+                "stuck",
                 expected="a thermometer that follows the unit",
                 remedy="record again, or cut the recording there",
             )
@@ -138,16 +177,25 @@ def refuse_beyond(unit: DynamicDescription, recorded: Recorded | None) -> tuple[
     """
     if unit.device is None:
         return ()
-    low, high = unit.device.range_degc
     if recorded is None:
+        low, high = unit.device.range_degc
         text = f"that the constants hold over the {low:g} to {high:g} degC of [device]"
         return (f"no temperature was recorded: it is not shown {text}",)
-    first, last = recorded.ends_degc
+    _refuse_range(f"{unit.path}, [device] range_degc", unit.device.range_degc, recorded.ends_degc)
+    key = "gyro_range_degc" if unit.device.two_thermometers else "range_degc"
+    _refuse_range(f"{unit.path}, [device] {key}", unit.device.gyro_range, recorded.gyro_ends_degc)
+    return ()
+
+
+def _refuse_range(
+    where: str, range_degc: tuple[float, float], ends_degc: tuple[float, float]
+) -> None:
+    (low, high), (first, last) = range_degc, ends_degc
     if first - EDGE_DEGC <= low and high <= last + EDGE_DEGC:
-        return ()
+        return
     inner = math.ceil(10 * (first - EDGE_DEGC)) / 10, math.floor(10 * (last + EDGE_DEGC)) / 10
     raise RefusedError(
-        f"{unit.path}, [device] range_degc",
+        where,
         f"{low:g} to {high:g} degC, and the temperatures recorded are {first:.1f} to {last:.1f} "
         "degC",
         expected=f"at most {EDGE_DEGC:g} degC beyond what was recorded: nothing is extrapolated",

@@ -29,6 +29,8 @@ from triaxcal.model.types import FloatArray
 
 GROUPS = (ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX, GYRO_BIAS, GYRO_MATRIX)
 """Blocks whose states follow the temperature; each has a function of its own."""
+OF_GYROS = (GYRO_BIAS.name, GYRO_MATRIX.name)
+"""Those that follow the gyros' thermometer."""
 PRIOR = {"ppm": 1e4, "arcsec": 400.0}
 """Of a term of a matrix: 1 %, 2 mrad. Over temperature a unit changes by less than it is off."""
 PART = 0.2
@@ -118,8 +120,11 @@ def _less_t0(shapes: tuple[ThermalShape, ...], t0_degc: float, temp_degc: FloatA
     return np.concatenate(parts, axis=-1)
 
 
-def block_over_temperature(block: StateBlock, basis: Basis) -> StateBlock:
-    """The change of a block's states with temperature: `terms` states for each, in its unit."""
+def block_over_temperature(block: StateBlock, basis: Basis, reference_degc: float) -> StateBlock:
+    """The change of a block's states with temperature: `terms` states for each, in its unit.
+
+    Signals count their temperatures from `reference_degc`.
+    """
     states = tuple(
         State(f"{s.name}~{k + 1}", s.unit, s.per_unit, prior_of_term(s), f"{s.label}, {k + 1}")
         for s in block.states
@@ -129,8 +134,8 @@ def block_over_temperature(block: StateBlock, basis: Basis) -> StateBlock:
         over_temperature(block.name),
         f"{block.title} over temperature",
         states,
-        rate=_rows(block.rate, basis),
-        force=_rows(block.force, basis),
+        rate=_rows(block.rate, basis, reference_degc),
+        force=_rows(block.force, basis, reference_degc),
         needs="temp_degc",
         shown=False,
     )
@@ -146,12 +151,12 @@ def over_temperature(name: str) -> str:
     return f"{name}-over-temperature"
 
 
-def _rows(rows: Rows | None, basis: Basis) -> Rows | None:
+def _rows(rows: Rows | None, basis: Basis, reference_degc: float) -> Rows | None:
     if rows is None:
         return None
 
     def times(signals: Signals) -> FloatArray:
-        values = basis(signals.delta_degc + basis.t0_degc)
+        values = basis(signals.delta_degc + reference_degc)
         own = rows(signals)
         product: FloatArray = own[:, :, :, None] * values[:, None, None, :]
         return product.reshape(*own.shape[:2], -1)

@@ -25,7 +25,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from triaxcal.dynamic.layout import Layout
-from triaxcal.dynamic.thermalbasis import GROUPS, Basis, over_temperature, prior_of_term
+from triaxcal.dynamic.thermalbasis import (
+    GROUPS,
+    OF_GYROS,
+    Basis,
+    over_temperature,
+    prior_of_term,
+)
 from triaxcal.dynamic.thermalnodes import Nodes
 from triaxcal.dynamic.thermalparts import Information
 from triaxcal.model.thermal.shape import ThermalShape
@@ -38,9 +44,13 @@ Shapes = Mapping[str, ThermalShape]
 
 @dataclass(frozen=True)
 class Fold:
-    """What lies at a held-out temperature, and what lies at all others."""
+    """What lies at a held-out temperature, and what lies at all others.
+
+    Of the accelerometers; the gyros had `gyro_degc` then.
+    """
 
     degc: float
+    gyro_degc: float
     held_out: Information
     others: Information
 
@@ -68,19 +78,20 @@ class Fit:
 class Curves:
     """Fits of any functions to normal equations of all terms.
 
-    `seen` are the temperatures at which each group was seen, by the name of its block; groups that
-    were not seen at all of them are `free` to differ from their function by the prior of its terms.
+    `seen` are the temperatures at which each group was seen, by the name of its block, and `bases`
+    its functions; groups that were not seen at all temperatures are `free` to differ from their
+    function by the prior of its terms.
     """
 
     def __init__(
         self,
         layout: Layout,
-        basis: Basis,
+        bases: Mapping[str, Basis],
         seen: Mapping[str, FloatArray],
         free: tuple[str, ...] = (),
     ) -> None:
-        self.layout, self.basis, self.seen, self.free = layout, basis, seen, free
-        self._maps: dict[ThermalShape, tuple[FloatArray, FloatArray]] = {}
+        self.layout, self.bases, self.seen, self.free = layout, bases, seen, free
+        self._maps: dict[tuple[str, ThermalShape], tuple[FloatArray, FloatArray]] = {}
 
     def map_of(
         self, shapes: Shapes, free: tuple[str, ...] = ()
@@ -95,10 +106,10 @@ class Curves:
         used = np.zeros(len(layout), dtype=bool)
         start = 0
         for block in GROUPS:
-            shape = shapes[block.name]
-            if shape not in self._maps:
-                self._maps[shape] = self.basis.of_shape(shape)
-            value, change = self._maps[shape]
+            name, shape = block.name, shapes[block.name]
+            if (name, shape) not in self._maps:
+                self._maps[name, shape] = self.bases[name].of_shape(shape)
+            value, change = self._maps[name, shape]
             base = index[layout.place(block.name)]
             terms = index[layout.place(over_temperature(block.name))].reshape(len(base), -1)
             P = shape.parameters
@@ -110,10 +121,11 @@ class Curves:
             columns.append(part.reshape(len(layout), -1))
             places[block.name] = start + np.arange(len(base) * P).reshape(len(base), P)
             start += len(base) * P
-        for name in map(over_temperature, free):
+        for group in free:
+            name = over_temperature(group)
             own = index[layout.place(name)]
             columns.append(np.eye(len(layout))[:, own])
-            places[name] = (start + np.arange(len(own))).reshape(-1, self.basis.terms)
+            places[name] = (start + np.arange(len(own))).reshape(-1, self.bases[group].terms)
             start += len(own)
         return np.column_stack([*columns, np.eye(len(layout))[:, ~used]]), places
 
@@ -126,9 +138,9 @@ class Curves:
 
     def without(self, group: str, shape: ThermalShape, fold: Fold) -> ThermalShape:
         """What is left of a function of a group where a temperature is held out."""
-        seen = self.seen[group]
-        remaining = seen[seen != fold.degc]
-        return shape if len(remaining) == len(seen) else shape.without(remaining, fold.degc)
+        seen, degc = self.seen[group], fold.gyro_degc if group in OF_GYROS else fold.degc
+        remaining = seen[seen != degc]
+        return shape if len(remaining) == len(seen) else shape.without(remaining, degc)
 
     def score(self, folds: Sequence[Fold], shapes: Shapes) -> float:
         """Minus twice the log density of what was held out, up to a constant."""
@@ -170,7 +182,9 @@ class Choice:
     held_out_degc: tuple[float, ...]
 
 
-def folds_of(nodes: Nodes, by_node: Mapping[int, Information]) -> tuple[Fold, ...]:
+def folds_of(
+    nodes: Nodes, gyro_nodes: Nodes, by_node: Mapping[int, Information]
+) -> tuple[Fold, ...]:
     """Each inner temperature held out in turn."""
     folds = []
     for k in range(1, len(nodes.degc) - 1):
@@ -178,7 +192,8 @@ def folds_of(nodes: Nodes, by_node: Mapping[int, Information]) -> tuple[Fold, ..
             continue
         first, *others = (found for j, found in by_node.items() if j != k)
         rest = sum(others, start=first)
-        folds.append(Fold(float(nodes.degc[k]), by_node[k], rest))
+        degc = float(nodes.degc[k]), float(gyro_nodes.degc[k])
+        folds.append(Fold(*degc, by_node[k], rest))
     return tuple(folds)
 
 

@@ -9,7 +9,13 @@ import numpy as np
 
 from triaxcal.dynamic.blocks.base import LOWER
 from triaxcal.dynamic.blocks.block import StateBlock
-from triaxcal.dynamic.thermalbasis import GROUPS, Basis, over_temperature, prior_of_term
+from triaxcal.dynamic.thermalbasis import (
+    GROUPS,
+    OF_GYROS,
+    Basis,
+    over_temperature,
+    prior_of_term,
+)
 from triaxcal.dynamic.thermalchoice import Choice, Curves, Fit, Scored
 from triaxcal.dynamic.thermalparts import Information
 from triaxcal.model.curves import PiecewisePolynomial, ThermalModel, on_common_breaks
@@ -65,18 +71,20 @@ def averaged_covariance(
         shapes = {**choice.fit.shapes, block.name: row.shape}
         fit = curves.fit(known, shapes, curves.free)
         off = values_at(fit, block, temps_degc) - chosen
-        own = covariance_at(fit, block, temps_degc, curves.basis)
+        own = covariance_at(fit, block, temps_degc, curves.bases[block.name])
         total += row.weight * (own + off[:, :, None] * off[:, None, :])
     return total / sum(row.weight for row in rows)
 
 
-def thermal_models(fit: Fit, t0_degc: float) -> tuple[ThermalModel, ThermalModel]:
+def thermal_models(
+    fit: Fit, t0_degc: float, gyro_t0_degc: float
+) -> tuple[ThermalModel, ThermalModel]:
     """Twelve functions of accelerometer, readings in g of 9.80665 m/s^2, and gyro, in rad/s."""
     accel_bias, accel_matrix, gyro_bias, gyro_matrix = (_curves(fit, block) for block in GROUPS)
     g = STANDARD_GRAVITY_M_PER_S2
     return (
         ThermalModel(t0_degc, _triad(accel_bias, 1 / g, accel_matrix, LOWER, t0_degc)),
-        ThermalModel(t0_degc, _triad(gyro_bias, 1.0, gyro_matrix, FULL, t0_degc)),
+        ThermalModel(gyro_t0_degc, _triad(gyro_bias, 1.0, gyro_matrix, FULL, gyro_t0_degc)),
     )
 
 
@@ -110,7 +118,8 @@ class Known:
 
     Attributes
     ----------
-    temps_degc : array, shape (k,)
+    temps_degc, gyro_temps_degc : arrays, shape (k,)
+        By the thermometers of accelerometers and gyros: the constants of each triad are at its own.
     names, units : tuples of str
     per_unit : array, shape (c,)
         SI value of each unit.
@@ -121,6 +130,7 @@ class Known:
     """
 
     temps_degc: FloatArray
+    gyro_temps_degc: FloatArray
     names: tuple[str, ...]
     units: tuple[str, ...]
     per_unit: FloatArray
@@ -130,12 +140,19 @@ class Known:
     gyro_sd_rad_per_s: FloatArray
 
 
-def known_at(curves: Curves, known: Information, choice: Choice, temps_degc: FloatArray) -> Known:
-    """Constants of all groups at temperatures (k,), with their uncertainty."""
+def known_at(
+    curves: Curves,
+    known: Information,
+    choice: Choice,
+    temps_degc: FloatArray,
+    gyro_temps_degc: FloatArray,
+) -> Known:
+    """Constants of all groups at temperatures (k,) of each triad, with their uncertainty."""
+    at = {b.name: gyro_temps_degc if b.name in OF_GYROS else temps_degc for b in GROUPS}
     states = [state for block in GROUPS for state in block.states]
-    values = [values_at(choice.fit, block, temps_degc) for block in GROUPS]
+    values = [values_at(choice.fit, block, at[block.name]) for block in GROUPS]
     variances = [
-        np.diagonal(averaged_covariance(curves, known, choice, block, temps_degc), 0, 1, 2)
+        np.diagonal(averaged_covariance(curves, known, choice, block, at[block.name]), 0, 1, 2)
         for block in GROUPS
     ]
     bias, matrix = variances[0], np.zeros((len(temps_degc), 3, 3))
@@ -146,6 +163,7 @@ def known_at(curves: Curves, known: Information, choice: Choice, temps_degc: Flo
     force = np.sqrt((bias[:, :, None] + matrix * g**2).max(axis=(1, 2))) / g
     return Known(
         temps_degc,
+        gyro_temps_degc,
         tuple(s.name for s in states),
         tuple(s.unit for s in states),
         np.array([s.per_unit for s in states]),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.rests import runs_of
 from triaxcal.dynamic.survey import Section, Survey
 from triaxcal.dynamic.temperatures import Recorded
@@ -66,6 +67,31 @@ def nodes_of(recorded: Recorded, reference_degc: float) -> Nodes:
     if abs(nodes[k] - reference_degc) <= GROUP_GAP_DEGC:
         nodes[k] = reference_degc
     return Nodes(nodes, float(nodes[k]))
+
+
+def gyro_nodes_of(recorded: Recorded, nodes: Nodes, reference_degc: float) -> Nodes:
+    """Temperatures that the gyros' thermometer had at the nodes; T0 is nearest to the reference.
+
+    Raises
+    ------
+    RefusedError
+        When the two thermometers do not rise together.
+    """
+    if recorded.gyro is None:
+        return nodes
+    by_degc = np.argsort(recorded.degc, kind="stable")
+    degc = np.interp(nodes.degc, recorded.degc[by_degc], recorded.gyro[by_degc])
+    steps = np.diff(degc)
+    if np.any(steps < GROUP_GAP_DEGC):
+        k = int(np.argmin(steps))
+        raise RefusedError(
+            "gyro_temp_column in [dynamic]",
+            f"{degc[k]:.1f} degC where temp_column is {nodes.degc[k]:.1f} degC, and "
+            f"{degc[k + 1]:.1f} degC where it is {nodes.degc[k + 1]:.1f} degC",
+            expected="two thermometers that rise together",
+            remedy="check the columns, or leave gyro_temp_column out",
+        )
+    return Nodes(degc, float(degc[np.argmin(np.abs(degc - reference_degc))]))
 
 
 def cut_at_nodes(found: Survey, recorded: Recorded, nodes: Nodes) -> tuple[Survey, IntArray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
@@ -47,6 +47,8 @@ class DynamicUnit:
         Lowest and highest temperature that was recorded.
     recording : ImuRecording or None
         None for a plan.
+    gyro_range_degc : tuple of two floats, or None
+        As `range_degc`, by the gyros' own thermometer; None where they have none.
     over : OverTemperature, or None
         The curves of the constants, where they follow the temperature.
     terms : DynamicResult, or None
@@ -63,6 +65,7 @@ class DynamicUnit:
     recording: ImuRecording | None = field(default=None, repr=False)
     over: OverTemperature | None = None
     terms: DynamicResult | None = field(default=None, repr=False)
+    gyro_range_degc: tuple[float, float] | None = None
 
     @property
     def filtered(self) -> DynamicResult:
@@ -108,9 +111,14 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     seen = observability(result.layout, result.covariance)
     recorded = None if temperatures is None else temperatures.ends_degc
     range_degc = recorded if unit.device is None else unit.device.range_degc
+    gyro_range_degc = None
+    if temperatures is not None and temperatures.gyro is not None:
+        ends = temperatures.gyro_ends_degc
+        gyro_range_degc = ends if unit.device is None else unit.device.gyro_range
     findings = (*recording.findings, *result.survey.findings, *unknown, *differ)
     about = unit, result, seen, off, findings, range_degc, recorded, recording
-    return DynamicUnit(*about) if over is None else DynamicUnit(*about, over.over, full)
+    done = DynamicUnit(*about) if over is None else DynamicUnit(*about, over.over, full)
+    return replace(done, gyro_range_degc=gyro_range_degc)
 
 
 def _solve(

@@ -126,6 +126,14 @@ class Window:
         delta: FloatArray = self.samples.temp_degc - self.frame.reference_degc
         return delta
 
+    @cached_property
+    def gyro_delta_degc(self) -> FloatArray:
+        """The same by the gyros' thermometer, where they have one of their own."""
+        if self.samples.gyro_temp_degc is None:
+            return self.delta_degc
+        delta: FloatArray = self.samples.gyro_temp_degc - self.frame.reference_degc
+        return delta
+
     def summed(self, variance: FloatArray | None) -> FloatArray:
         """Sums (blocks,) of the variances of samples; zeros where none were lost."""
         if variance is None:
@@ -170,7 +178,7 @@ class Window:
         if extra:
             force = self._force()
             for _ in range(2):  # each round leaves what the effects do to themselves: squares
-                signals = Signals(rate, rate, force, self.delta_degc, self.frame.gravity)
+                signals = Signals(rate, rate, force, self.gyro_delta_degc, self.frame.gravity)
                 errors = [rows(signals) @ self.about.p[place] for rows, place in extra if rows]
                 rate = (raw - sum(errors)) @ self.inverse_b.T
         return rate

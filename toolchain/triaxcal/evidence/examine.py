@@ -13,6 +13,7 @@ from triaxcal.dynamic.limits import ImuLimits, demanded
 from triaxcal.dynamic.missing import Effect
 from triaxcal.dynamic.observability import Observability
 from triaxcal.dynamic.shares import variance_shares
+from triaxcal.dynamic.thermalbasis import GROUPS, OF_GYROS
 from triaxcal.dynamic.unit import DynamicUnit
 from triaxcal.evidence.case import Case
 from triaxcal.evidence.causes import causes_of
@@ -40,10 +41,17 @@ def _worst_sd(done: DynamicUnit) -> FloatArray | None:
     """Deviations of the states; of base constants the largest over the working range."""
     if done.over is None or done.range_degc is None:
         return None
-    known, (low, high) = done.over.known, done.range_degc
-    inside = (known.temps_degc >= low) & (known.temps_degc <= high)
-    worst = done.filtered.sd.copy()
-    worst[: len(known.names)] = known.sd[inside | ~inside.any()].max(axis=0)
+    known, worst = done.over.known, done.filtered.sd.copy()
+    gyro_range = done.gyro_range_degc or done.range_degc
+    start = 0
+    for block in GROUPS:
+        own = block.name in OF_GYROS
+        temps = known.gyro_temps_degc if own else known.temps_degc
+        low, high = gyro_range if own else done.range_degc
+        inside = (temps >= low) & (temps <= high)
+        place = slice(start, start + len(block.states))
+        worst[place] = known.sd[inside | ~inside.any(), place].max(axis=0)
+        start = place.stop
     return worst
 
 

@@ -134,12 +134,12 @@ def triads_of(imu: FittedImu) -> tuple[Triad, Gyro]:
     )
     gyro = Triad(
         model.gyro,
-        accel.t0_degc,
-        device.range_degc,
+        _inside(model.gyro.t0_degc, device.gyro_range),
+        device.gyro_range,
         device.gyro_adc,
         "rad/s",
         np.ones(3),
-        _modelled("", model.gyro, device.range_degc, 0.0),
+        _modelled("", model.gyro, device.gyro_range, 0.0),
     )
     return accel, Gyro(gyro, model.g_sensitivity)
 

@@ -51,6 +51,7 @@ def calibration_document(made: ImuDelivery) -> dict[str, Any]:
         "recording": unit.recording_words,
         "reference_degc": result.frame.reference_degc,
         "range_degc": done.range_degc and list(done.range_degc),
+        **({"gyro_range_degc": list(done.gyro_range_degc)} if done.gyro_range_degc else {}),
         "local_gravity_m_per_s2": unit.gravity_m_per_s2,
         "latitude_deg": unit.latitude_deg,
         "measured": {s.key: s.json for s in statements_of(MEASURED, unit.measured)},

@@ -170,9 +170,12 @@ def _facts(made: ImuDelivery) -> list[tuple[str, str]]:
     ]
     if made.c is not None:
         low, high = made.c.device.range_degc
+        own = ""
+        if made.c.device.two_thermometers:
+            own = "; gyros {:g} to {:g} °C".format(*made.c.device.gyro_range)
         q = superscript(-made.c.device.accel_q), superscript(-made.c.device.gyro_rate_q)
         facts += [
-            ("Working range", signed(f"{low:g} to {high:g} °C")),
+            ("Working range", signed(f"{low:g} to {high:g} °C{own}")),
             ("Firmware", f"LSB 2{q[0]} g, 2{q[1]} °/s"),
         ]
     stated, t = statements_of(MEASURED, unit.measured), speaker(ENGLISH)

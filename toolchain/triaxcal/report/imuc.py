@@ -57,9 +57,11 @@ def imu_c_files(made: ImuDelivery) -> dict[str, bytes]:
 
 def imu_a2l(c: ImuC) -> bytes:
     """The constants of both triads for calibration tools; addresses are 0 until it is linked."""
-    sensor = c.device.temperature_sensor
     inputs = c.fitted.inputs_sha256
-    triads = tuple(Triad(plan, sensor, inputs) for plan in (c.build.accel, c.build.gyro))
+    triads = (
+        Triad(c.build.accel, c.device.temperature_sensor, inputs),
+        Triad(c.build.gyro, c.device.gyro_temperature_sensor, inputs),
+    )
     return linked_a2l(triads, c.fitted.provenances[0])
 
 
@@ -76,6 +78,7 @@ def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:
         "compiler_flags": list(FLAGS),
         "method": METHOD,
         "range_degc": list(c.device.range_degc),
+        **({"gyro_range_degc": list(c.device.gyro_range)} if c.device.two_thermometers else {}),
         "not_corrected": list(c.fitted.left_out),
         "accelerometer": {
             **_triad(build.accel, build.accel_bound, build.accel_check),
@@ -172,6 +175,15 @@ def constant_triads(made: ImuDelivery) -> list[str]:
     return [what for what in ("accelerometer", "gyro") if f"{what}-thermal" not in names]
 
 
+def _own_thermometer(c: ImuC) -> list[str]:
+    if not c.device.two_thermometers:
+        return []
+    low, high = c.device.gyro_range
+    codes = thousands(c.build.gyro_bound.codes, " ")
+    text = f"gyro by its own thermometer: {low:g} to {high:g} degC, {codes} temperature codes"
+    return [f"                {text}"]
+
+
 def imu_c_lines(made: ImuDelivery) -> list[str]:
     """Lines of the summary."""
     if made.c is None:
@@ -193,6 +205,7 @@ def imu_c_lines(made: ImuDelivery) -> list[str]:
     agree = f"{thousands(checked, ' ')} vectors: Python, reference C and generated C agree"
     lines = [
         f"C               both triads, {low:g} to {high:g} degC, {codes} temperature codes",
+        *_own_thermometer(c),
         f"  accelerometer LSB 2^-{accel_q} g; proven within {proven[0]},",
         f"                {together[0]} micro-g",
         f"  gyro          LSB 2^-{gyro_q} deg/s; proven within {proven[1]},",

@@ -11,7 +11,7 @@ import numpy as np
 from triaxcal.base.plaindata import plain
 from triaxcal.dynamic.noise import MICRO_G
 from triaxcal.dynamic.overtemperature import OverTemperature
-from triaxcal.dynamic.thermalbasis import GROUPS
+from triaxcal.dynamic.thermalbasis import GROUPS, OF_GYROS
 from triaxcal.dynamic.thermalchoice import Scored
 from triaxcal.report.words.numbers import signed
 from triaxcal.unit.site import STANDARD_GRAVITY_M_PER_S2
@@ -26,6 +26,15 @@ EVERY = 4
 def over_document(over: OverTemperature) -> dict[str, Any]:
     """The key `over_temperature` of calibration.json."""
     known = over.known
+    gyro = (
+        {}
+        if not _apart(over)
+        else {
+            "gyro_reference_degc": over.gyro_nodes.t0_degc,
+            "gyro_seen_at_degc": over.gyro_nodes.degc.tolist(),
+            "gyro_temps_degc": known.gyro_temps_degc.tolist(),
+        }
+    )
     return {
         "reference_degc": over.nodes.t0_degc,
         "seen_at_degc": over.nodes.degc.tolist(),
@@ -42,6 +51,7 @@ def over_document(over: OverTemperature) -> dict[str, Any]:
             for block in GROUPS
         ],
         "temps_degc": known.temps_degc.tolist(),
+        **gyro,
         "constants": [
             {
                 "name": name,
@@ -58,13 +68,25 @@ def over_document(over: OverTemperature) -> dict[str, Any]:
     }
 
 
+def _apart(over: OverTemperature) -> bool:
+    """Whether the gyros have a thermometer of their own."""
+    return over.gyro_nodes is not over.nodes
+
+
 def over_lines(over: OverTemperature) -> list[str]:
     """Lines of the summary."""
-    lines = ["", f"over temperature, constants above at {over.nodes.t0_degc:g} degC:"]
+    own = f", gyros at {over.gyro_nodes.t0_degc:.4g} degC" if _apart(over) else ""
+    lines = ["", f"over temperature, constants above at {over.nodes.t0_degc:g} degC{own}:"]
     lines += [f"  {title:46s} {function}" for title, function, _ in _functions(over)]
-    lines += [f"  {_held_out(over)}", "", "  degC   accelerometer sd   gyro sd"]
-    for degc, accel, gyro in _uncertainty(over):
-        lines.append(f"  {degc:5.0f} {accel:>9s} micro-g {gyro:>9s} deg/h")
+    lines += [f"  {_held_out(over)}", ""]
+    if not _apart(over):
+        lines.append("  degC   accelerometer sd   gyro sd")
+        for degc, accel, _, gyro in _uncertainty(over):
+            lines.append(f"  {degc:5.0f} {accel:>9s} micro-g {gyro:>9s} deg/h")
+        return lines
+    lines.append("  degC   accelerometer sd   degC   gyro sd")
+    for degc, accel, gyro_degc, gyro in _uncertainty(over):
+        lines.append(f"  {degc:5.0f} {accel:>9s} micro-g {gyro_degc:5.0f} {gyro:>9s} deg/h")
     return lines
 
 
@@ -72,7 +94,7 @@ def over_context(over: OverTemperature | None) -> dict[str, Any] | None:
     """What the page shows of it; None where the constants follow no temperature."""
     if over is None:
         return None
-    known, panels, start = over.known, [], 0
+    panels, start = [], 0
     for block in GROUPS:
         count = len(block.states)
         panels.append(
@@ -84,12 +106,14 @@ def over_context(over: OverTemperature | None) -> dict[str, Any] | None:
         start += count
     return {
         "t0": signed(f"{over.nodes.t0_degc:g}"),
+        "gyro_t0": signed(f"{over.gyro_nodes.t0_degc:.4g}") if _apart(over) else "",
         "functions": list(_functions(over)),
         "held_out": signed(_held_out(over)),
-        "rows": [(signed(f"{t:.0f}"), a, g) for t, a, g in _uncertainty(over)],
+        "rows": [
+            (signed(f"{t:.0f}"), a, signed(f"{gyro_t:.0f}"), g)
+            for t, a, gyro_t, g in _uncertainty(over)
+        ],
         "blocks": panels,
-        "low": signed(f"{known.temps_degc[0]:.0f}"),
-        "high": signed(f"{known.temps_degc[-1]:.0f}"),
         "width": WIDTH,
         "height": HEIGHT,
         "coverage": COVERAGE,
@@ -123,13 +147,14 @@ def _held_out(over: OverTemperature) -> str:
     return f"chosen by what was read at {words} degC, each held out in turn"
 
 
-def _uncertainty(over: OverTemperature) -> Iterator[tuple[float, str, str]]:
-    """Temperature, and standard deviations in micro-g and deg/h."""
+def _uncertainty(over: OverTemperature) -> Iterator[tuple[float, str, float, str]]:
+    """Temperature and standard deviation, in micro-g, and those of the gyros, in deg/h."""
     known = over.known
     accel = known.accel_sd_g * STANDARD_GRAVITY_M_PER_S2 / MICRO_G
     gyro = np.degrees(known.gyro_sd_rad_per_s) * 3600
     for k in range(0, len(known.temps_degc), EVERY):
-        yield float(known.temps_degc[k]), _two(float(accel[k])), _two(float(gyro[k]))
+        degc, gyro_degc = float(known.temps_degc[k]), float(known.gyro_temps_degc[k])
+        yield degc, _two(float(accel[k])), gyro_degc, _two(float(gyro[k]))
 
 
 def _two(value: float) -> str:
@@ -141,12 +166,14 @@ def _two(value: float) -> str:
 def _panel(over: OverTemperature, i: int) -> dict[str, str]:
     """Change of a constant from T0, with its expanded uncertainty, over temperature."""
     known = over.known
-    state = [s for block in GROUPS for s in block.states][i]
-    at_t0 = float(np.interp(over.nodes.t0_degc, known.temps_degc, known.value[:, i]))
+    block, state = [(block, s) for block in GROUPS for s in block.states][i]
+    own = block.name in OF_GYROS
+    t = known.gyro_temps_degc if own else known.temps_degc
+    nodes = over.gyro_nodes if own else over.nodes
+    at_t0 = float(np.interp(nodes.t0_degc, t, known.value[:, i]))
     change = (known.value[:, i] - at_t0) / state.per_unit
     expanded = COVERAGE * known.sd[:, i] / state.per_unit
     span = float((np.abs(change) + expanded).max()) or 1.0
-    t = known.temps_degc
     x = WIDTH * (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)
 
     def points(values: Any) -> list[str]:
@@ -158,6 +185,8 @@ def _panel(over: OverTemperature, i: int) -> dict[str, str]:
         "unit": state.unit.replace("^2", "²"),
         "scale": _two(span / 0.92),
         "largest": _two(float(expanded.max())),
+        "low": signed(f"{t[0]:.0f}"),
+        "high": signed(f"{t[-1]:.0f}"),
         "band": " ".join(points(change + expanded) + points(change - expanded)[::-1]),
         "line": " ".join(points(change)),
     }

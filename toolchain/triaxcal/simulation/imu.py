@@ -17,7 +17,15 @@ from triaxcal.dynamic.recording import INCREMENT, ImuRecording, ImuSamples
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.imu_kinematics import rippled
 from triaxcal.simulation.imu_motion import ImuMotion
-from triaxcal.simulation.imu_noise import ACCEL, SECOND, TABLE, TEMPERATURE, Channel, white
+from triaxcal.simulation.imu_noise import (
+    ACCEL,
+    GYRO_TEMPERATURE,
+    SECOND,
+    TABLE,
+    TEMPERATURE,
+    Channel,
+    white,
+)
 from triaxcal.simulation.imu_sensors import Moments, accel_readings, gyro_readings, second_readings
 from triaxcal.simulation.imu_truth import ARCSEC, ImuTruth
 
@@ -54,10 +62,15 @@ def _pieces(
     accel = Channel.accelerometers(truth, step_s, seed, ACCEL)
     second = Channel.accelerometers(truth, step_s, seed, SECOND)
     temp, table = white(seed, TEMPERATURE), white(seed, TABLE)
+    gyro_temp = white(seed, GYRO_TEMPERATURE)
     for start in range(0, count, PIECE):
         time_s = np.arange(start + 1, min(start + PIECE, count) + 1) / rate_hz
         rate, force, force2 = _ideal(truth, motion, time_s, step_s)
         thermometer = truth.noise.temp_sd_degc * temp.standard_normal(len(time_s))
+        gyro_degc = None
+        if motion.gyro_temperature is not None:
+            gyro_degc = motion.gyro_temperature.at(time_s)
+            gyro_degc += truth.noise.temp_sd_degc * gyro_temp.standard_normal(len(time_s))
         angle = None
         if motion.table.reads_angle:
             sd = ARCSEC * truth.noise.table_sd_arcsec
@@ -70,6 +83,7 @@ def _pieces(
             temp_degc=motion.temperature.at(time_s) + thermometer,
             force2=None if force2 is None else second.read(force2),
             table_angle_rad=angle,
+            gyro_temp_degc=gyro_degc,
         )
 
 

@@ -109,6 +109,8 @@ class ImuMotion:
         Instrument axis 1, 2, 3 along the table's axis in turn.
     table : RoughTable
     temperature : TemperatureDrift or TemperatureRamp
+    gyro_temperature : TemperatureDrift, TemperatureRamp or None
+        Of the gyros, where they have a temperature and a thermometer of their own.
     latitude_deg, gravity_m_per_s2 : float
         Gravity is that of a plumb line: with the centrifugal part.
     remount_s, lift_m : float
@@ -122,6 +124,7 @@ class ImuMotion:
     gravity_m_per_s2: float = 9.8107
     remount_s: float = 20.0
     lift_m: float = 0.2
+    gyro_temperature: TemperatureDrift | TemperatureRamp | None = None
     _built: _Built = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -15,7 +15,7 @@ from triaxcal.dynamic.recording import INCREMENT
 from triaxcal.model.types import FloatArray
 from triaxcal.simulation.imu_truth import ARCSEC, DEG_PER_H, MICRO_G, ImuTruth
 
-GYRO, ACCEL, SECOND, TEMPERATURE, TABLE = range(1000, 1005)
+GYRO, ACCEL, SECOND, TEMPERATURE, TABLE, GYRO_TEMPERATURE = range(1000, 1006)
 """Beside those of the constants, which are drawn from the same seed."""
 _WALK = 10
 

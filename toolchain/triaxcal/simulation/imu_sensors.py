@@ -41,6 +41,11 @@ class Moments:
         """Temperature above the reference, K, shape (n,)."""
         return self.motion.temperature.at(self.time_s) - truth.reference_degc
 
+    def gyros_warmer_k(self, truth: ImuTruth) -> FloatArray:
+        """The same of the gyros."""
+        own = self.motion.gyro_temperature or self.motion.temperature
+        return own.at(self.time_s) - truth.reference_degc
+
     def force(self, place_m: FloatArray) -> FloatArray:
         """Specific force at a point of the unit given from M, m/s^2, shape (3, n)."""
         position = [place_m[:, None], np.zeros((3, 1)), np.zeros((3, 1))]
@@ -56,7 +61,7 @@ class Moments:
 
 def gyro_readings(truth: ImuTruth, at: Moments) -> FloatArray:
     """Readings of the gyros, rad/s, shape (3, n): (2), (13), (20), (24), bent characteristics."""
-    warm, rate = at.warmer_k(truth), at.body.rate
+    warm, rate = at.gyros_warmer_k(truth), at.body.rate
     bias = DEG_PER_H * _column(truth.gyro_bias_deg_per_h)
     bias = bias + DEG_PER_H * _column(truth.gyro_bias_deg_per_h_per_k) * warm
     scale = PPM * _column(truth.gyro_scale_ppm_per_k) * warm

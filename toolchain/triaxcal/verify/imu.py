@@ -137,7 +137,8 @@ def _ranges(build: ImuBuild) -> dict[str, object]:
     lists = [eva.range_literals(plan) for plan in (build.accel, build.gyro)]
     count = max(map(len, lists))
     accel, gyro = (ranges + ranges[-1:] * (count - len(ranges)) for ranges in lists)
-    return {"accel_ranges": accel, "gyro_ranges": gyro, "count": count}
+    own = {"two_thermometers": build.two_thermometers}
+    return {"accel_ranges": accel, "gyro_ranges": gyro, "count": count, **own}
 
 
 def _cppcheck(work: Both) -> Outcome:
@@ -151,8 +152,9 @@ def _cppcheck(work: Both) -> Outcome:
 
 def _sanitizer(work: Both, sanitizer: analyzers.Sanitizer) -> Outcome:
     build = work.build
-    temp, raw_accel, raw_gyro = imu_vectors(build.accel, build.gyro)
-    accel, rate, status = imu_answers(build.accel, build.gyro, temp, raw_accel, raw_gyro)
+    samples = imu_vectors(build.accel, build.gyro, two_thermometers=build.two_thermometers)
+    temp, raw_accel, raw_gyro, gyro_temp = samples
+    accel, rate, status = imu_answers(build.accel, build.gyro, samples)
     answers = np.column_stack([accel, rate, status.view(np.int32)]).astype(np.int32).tobytes()
     subject = analyzers.Subject(
         work.folder,
@@ -162,7 +164,7 @@ def _sanitizer(work: Both, sanitizer: analyzers.Sanitizer) -> Outcome:
             for form in (PORTABLE, LIMBS)
         },
         names_of(build.accel).file(IMU_IMAGE_FILE),
-        np.column_stack([temp, raw_accel, raw_gyro]).astype(np.int32).tobytes(),
+        np.column_stack([temp, gyro_temp, raw_accel, raw_gyro]).astype(np.int32).tobytes(),
         answers * 2,
     )
     return analyzers.run_sanitizer(sanitizer, subject, len(temp))

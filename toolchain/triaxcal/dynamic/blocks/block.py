@@ -63,7 +63,8 @@ class Signals:
     force : array, shape (n, 3)
         Specific force at M, m/s^2, instrument axes.
     delta_degc : array, shape (n,)
-        Temperature less the reference temperature; zero where none was recorded.
+        Temperature of the sensors that the rows are for less the reference temperature; zero where
+        none was recorded.
     gravity : float
         m/s^2.
     acceleration : array, shape (n, 3), or None

@@ -61,7 +61,7 @@ class ImuCompensation:
     accel : Compensation
         Functions in g.
     gyro : Compensation
-        Functions in rad/s, over the same temperatures.
+        Functions in rad/s, over the temperatures of its own thermometer.
     g_sensitivity : array, shape (3, 3)
         G in (rad/s)/g.
     """
@@ -73,7 +73,10 @@ class ImuCompensation:
     def __call__(
         self, accel_v: FloatArray, gyro_v: FloatArray, temp_degc: FloatArray | float
     ) -> tuple[FloatArray, FloatArray]:
-        """Specific force in g and angular rate in rad/s, each (..., 3), of readings in V."""
+        """Specific force in g and angular rate in rad/s, each (..., 3), of readings in V.
+
+        At one temperature of both.
+        """
         force_g = self.accel.evaluate(accel_v, temp_degc)
         rate = self.gyro.evaluate(gyro_v, temp_degc) - force_g @ self.g_sensitivity.T
         return force_g, rate
@@ -94,10 +97,13 @@ def compensate_imu(
     range_degc: tuple[float, float],
     readings_max_v: tuple[float, float],
     errors_max: tuple[float, float],
+    *,
+    gyro_range_degc: tuple[float, float] | None = None,
 ) -> ImuCompensation:
     """Functions that the device evaluates; pairs are of accelerometer (g) and gyro (rad/s).
 
-    As `compensate` for each triad by the same method.
+    As `compensate` for each triad by the same method. `gyro_range_degc` is that of the gyro's own
+    thermometer, where it has one.
     """
     accel = compensate(
         model.accel,
@@ -107,7 +113,8 @@ def compensate_imu(
         errors_max[0],
         terms=model.accel_terms,
     )
-    gyro = compensate(model.gyro, method, range_degc, readings_max_v[1], errors_max[1])
+    own = range_degc if gyro_range_degc is None else gyro_range_degc
+    gyro = compensate(model.gyro, method, own, readings_max_v[1], errors_max[1])
     return ImuCompensation(accel, gyro, model.g_sensitivity)
 
 
