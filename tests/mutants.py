@@ -36,7 +36,7 @@ MUTANTS: dict[str, list[Mutant]] = {
         Mutant("raw clamp to one more", "result = TRIAX_RAW_MIN;", "result = TRIAX_RAW_MIN + 1;"),
         Mutant("raw range one narrower", ">> 24u", ">> 23u"),
         Mutant("raw range one wider", ">> 24u", ">> 25u"),
-        Mutant("z not looked at", "((uint32_t)uz - (uint32_t)TRIAX_RAW_MIN)", "0u"),
+        Mutant("z not looked at", "| above_min(uz)", "| 0u"),
         Mutant("swapped row and column", "times(row[1], uy)", "times(row[0], uy)"),
         Mutant("swapped axis", "times(row[0], ux)", "times(row[0], uy)"),
         Mutant(
@@ -124,8 +124,8 @@ MUTANTS: dict[str, list[Mutant]] = {
         Mutant("range test one narrow", "> 14500000u", "> 14499999u"),
         Mutant(
             "one axis tested twice",
-            "((uint32_t)uy - (uint32_t)TRIAX_RAW_MIN) > ",
-            "((uint32_t)ux - (uint32_t)TRIAX_RAW_MIN) > ",
+            "(above_min(uy) > ",
+            "(above_min(ux) > ",
         ),
     ],
 }

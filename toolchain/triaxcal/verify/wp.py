@@ -36,16 +36,14 @@ OPTIONS = (
 )  # fmt: skip
 OF_VALUES = (
     "s32", "high_word", "asr32", "asr64", "saturate32", "magnitude", "times", "evaluate",
-    "x_q31_of", "reciprocal",
+    "x_q31_of", "reciprocal", "above_min", "beyond_range", "out_of_range",
 )  # fmt: skip
 """Functions proven with every definition."""
 OF_MEMORY = (
     "horner_step", "evaluate_column", "evaluate_rows", "rounded", "clamp_raw", "apply_row",
-    "apply_rows", "set_temperature", "sensitivity_sum", "copy_terms",
+    "apply_rows", "set_temperature", "apply", "sensitivity_sum", "copy_terms",
     "minor_of", "invert", "clear_rows",
 )  # fmt: skip
-WRAPPING = ("apply",)
-"""Its test of the raw range subtracts modulo 2^32, as C defines."""
 SMOKE = "_wp_smoke_"
 """Name of a goal that asks whether anything follows from nothing: WP must not prove it."""
 _LINE = re.compile(r"^\[wp\] \[(.+?)\] Goal (\w+)( : Valid.*)?", re.MULTILINE)
@@ -159,7 +157,7 @@ def prepared(work: Workspace, folder: Path) -> Place:
 
 def _known(texts: dict[str, str], versions: dict[str, str]) -> Path:
     """Where the goals are kept that these texts gave to these programs."""
-    content = json.dumps([texts, versions, OPTIONS, GOAL_S, OF_VALUES, OF_MEMORY, WRAPPING])
+    content = json.dumps([texts, versions, OPTIONS, GOAL_S, OF_VALUES, OF_MEMORY])
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     name = hashlib.sha256(content.encode()).hexdigest()
     return Path(home) / "triaxcal" / "wp" / f"{name}.json"
@@ -194,12 +192,10 @@ def parts_of(present: Sequence[str]) -> list[Part]:
     def of(names: Sequence[str]) -> tuple[str, ...]:
         return tuple(p for p in present if re.sub(r"_\d+$", "", p) in names)
 
-    no_wrap = ("-warn-unsigned-overflow",)
-    functions = ("-wp-prop=-@lemma",)
+    options = ("-warn-unsigned-overflow", "-wp-prop=-@lemma")
     parts = [
-        Part(of(OF_VALUES), "specification.h", no_wrap + functions),
-        Part(of(OF_MEMORY), "opaque.h", no_wrap + functions),
-        Part(of(WRAPPING), "opaque.h", functions),
+        Part(of(OF_VALUES), "specification.h", options),
+        Part(of(OF_MEMORY), "opaque.h", options),
     ]
     grouped = [name for part in parts for name in part.functions]
     if sorted(grouped) != sorted(present):
