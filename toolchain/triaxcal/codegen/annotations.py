@@ -37,6 +37,5 @@ def not_covered(shape: Shape) -> str:
         "terms added to the sums": shape.adds_to_sums,
         "a term in dT/dt": shape.rate,
         "sums of high words": shape.high_words,
-        "functions that do not depend on temperature": not shape.order,
     }
     return next((name for name, has in parts.items() if has), "")

@@ -36,7 +36,7 @@ OPTIONS = (
 )  # fmt: skip
 OF_VALUES = (
     "s32", "high_word", "asr32", "asr64", "saturate32", "magnitude", "times", "evaluate",
-    "x_q31_of", "reciprocal", "above_min", "beyond_range", "out_of_range",
+    "x_q31_of", "reciprocal", "above_min", "beyond_range", "out_of_range", "copy_rows",
 )  # fmt: skip
 """Functions proven with every definition."""
 OF_MEMORY = (
