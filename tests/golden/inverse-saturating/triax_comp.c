@@ -183,11 +183,6 @@ static uint32_t above_min(int32_t code)
                                  : (uint32_t)((int64_t)code - TRIAX_RAW_MIN);
 }
 
-static uint32_t out_of_range(int32_t ux, int32_t uy, int32_t uz)
-{
-    return ((above_min(ux) > 14500000u) || (above_min(uy) > 14500000u) || (above_min(uz) > 14500000u)) ? 1u : 0u;
-}
-
 static void clear_rows(int32_t row[3][TRIAX_ROW_WORDS])
 {
     uint32_t i;
@@ -238,7 +233,7 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
     int64_t sum_y;
     int64_t sum_z;
 
-    if (out_of_range(ux, uy, uz) != 0u) {
+    if ((above_min(ux) > 14500000u) || (above_min(uy) > 14500000u) || (above_min(uz) > 14500000u)) {
         ux = clamp_raw(ux);
         uy = clamp_raw(uy);
         uz = clamp_raw(uz);

@@ -1,0 +1,154 @@
+"""WP on raw codes of fewer than 32 bits, orders and segments: proven, and no planted mistake is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from plans import integer_plan, integer_shape
+from triaxcal.codegen.render import annotated_routine, render_routine, specification
+from triaxcal.fixedpoint.proof import prove
+from triaxcal.fixedpoint.shape import Shape
+from triaxcal.verify import wp
+from triaxcal.verify.outcome import FAILED, PASSED
+from triaxcal.verify.workspace import Workspace
+from verify.conftest import needs
+from verify.test_wp import nothing_known
+
+__all__ = ["nothing_known"]
+
+PROVERS = needs("frama-c", "why3", "cvc4", "z3")
+SHAPES = {
+    "cubic, 24 bits": integer_shape(order=3),
+    "order 5, 16 bits, three segments": integer_shape(
+        order=5, segments=3, raw=(-(2**15), 2**15 - 1)
+    ),
+    "order 1, a range that is no power of two": integer_shape(raw=(-8_000_000, 8_200_000)),
+    "order 4, codes without sign": integer_shape(order=4, raw=(0, 2**12 - 1)),
+    "constants": integer_shape(order=0),
+}
+CUBIC, ODD, CONSTANT = (list(SHAPES)[i] for i in (0, 2, 4))
+
+
+def workspace(shape: Shape, folder: Path) -> Workspace:
+    """The routine of a shape, with constants that WP does not read."""
+    one = [[[1] * (shape.order + 1) for _ in range(12)] for _ in range(shape.segments)]
+    plan = integer_plan(shape, one)
+    files = {name: text.encode() for name, text in render_routine(plan).items()}
+    return Workspace.create(folder, files, plan, prove(plan))
+
+
+@PROVERS
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_every_goal_is_proven(tmp_path: Path, name: str) -> None:
+    outcome = wp.check(workspace(SHAPES[name], tmp_path / "work"))
+    assert outcome.result == PASSED, outcome
+    assert {"set_temperature", "apply", "lemmas"} <= set(outcome.figures["goals"])
+
+
+@PROVERS
+def test_test_of_the_range_is_proven(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ["above_min", "beyond_range", "out_of_range", "clamp_raw"]
+    monkeypatch.setattr(wp, "functions_of", lambda *_: names)
+    monkeypatch.setattr(wp, "_LEMMAS", ())
+    outcome = wp.check(workspace(SHAPES[CUBIC], tmp_path / "work"))
+    assert outcome.result == PASSED, outcome
+    assert set(outcome.figures["goals"]) == set(names)
+
+
+C, SPECIFICATION = "annotated_routine", "specification"
+FAULTS = {
+    "one less above the minimum": (
+        CUBIC,
+        C,
+        "above_min",
+        "INT64_C(4294967296)",
+        "INT64_C(4294967295)",
+    ),
+    "the minimum itself below it": (
+        CUBIC,
+        C,
+        "above_min",
+        "(code < TRIAX_RAW",
+        "(code <= TRIAX_RAW",
+    ),
+    "a range of one bit less": (CUBIC, C, "beyond_range", ">> 24u", ">> 23u"),
+    "z not looked at": (CUBIC, C, "out_of_range", "| above_min(uz)", "| above_min(uy)"),
+    "and for or": (CUBIC, C, "out_of_range", "(ux) | above", "(ux) & above"),
+    "a clamp to one less": (
+        CUBIC,
+        C,
+        "clamp_raw",
+        "result = TRIAX_RAW_MAX",
+        "result = TRIAX_RAW_MAX - 1",
+    ),
+    "y clamped to x": (CUBIC, C, "apply", "uy = clamp_raw(uy)", "uy = clamp_raw(ux)"),
+    "half the left shift": (CUBIC, C, "apply", "uz *= 256", "uz *= 128"),
+    "a range test of one code less": (
+        ODD,
+        C,
+        "apply",
+        "above_min(uy) > 16200000u",
+        "above_min(uy) > 16199999u",
+    ),
+    "y tested twice": (ODD, C, "apply", "above_min(uz) > 1", "above_min(uy) > 1"),
+    "a column left out": (CONSTANT, C, "copy_rows", "j < 4u; j", "j < 3u; j"),
+    "a row of another axis": (CONSTANT, C, "copy_rows", "(4u * i) + j", "(3u * i) + j"),
+    "specification: the maximum flagged": (
+        CUBIC,
+        SPECIFICATION,
+        "out_of_range",
+        "y <= TRIAX_RAW_MAX",
+        "y < TRIAX_RAW_MAX",
+    ),
+    "specification: half the shift": (
+        CUBIC,
+        SPECIFICATION,
+        "apply",
+        "TRIAX_RAW_MAX) * 256",
+        "TRIAX_RAW_MAX) * 128",
+    ),
+    "specification: no wrap": (CUBIC, SPECIFICATION, "above_min", "? 4294967296 : 0", "? 0 : 0"),
+    "specification: a shorter range": (
+        CUBIC,
+        SPECIFICATION,
+        "out_of_range",
+        "< 16777216 <==> in_range",
+        "< 8388608 <==> in_range",
+    ),
+    "specification: constants of another axis": (
+        CONSTANT,
+        SPECIFICATION,
+        "copy_rows",
+        "coefficient[f + j]",
+        "coefficient[f]",
+    ),
+}
+"""Shape, text that has the mistake, function whose goals or lemmas fail, and the mistake."""
+
+
+@PROVERS
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(FAULTS))
+def test_a_planted_mistake_is_not_proven(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    shape, text, function, old, new = FAULTS[name]
+    work = workspace(SHAPES[shape], tmp_path / "work")
+    original = {C: annotated_routine, SPECIFICATION: specification}[text]
+    assert old in str(original(work.plan, **({} if text == C else {"opaque": False})))
+
+    def changed(*args: object, **options: object) -> str:
+        return str(original(*args, **options)).replace(old, new, 1)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(wp, text, changed)
+    monkeypatch.setattr(wp, "functions_of", lambda *_: [function])
+    monkeypatch.setattr(wp, "GOAL_S", 5)
+    # A mistake in a lemma is a lemma that is not proven.
+    lemmas = [part for part in wp._LEMMAS if "<==>" in old]
+    monkeypatch.setattr(wp, "_LEMMAS", lemmas)
+    outcome = wp.check(work)
+    assert outcome.result == FAILED
+    assert "not proven: " in outcome.finding
