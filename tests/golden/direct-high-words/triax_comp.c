@@ -84,6 +84,24 @@ static int32_t clamp_raw(int32_t code)
     return result;
 }
 
+/* code - TRIAX_RAW_MIN modulo 2^32: a code below the range is far above it. Neither branch wraps. */
+static uint32_t above_min(int32_t code)
+{
+    return (code < TRIAX_RAW_MIN) ? (uint32_t)(((int64_t)code - TRIAX_RAW_MIN) + INT64_C(4294967296))
+                                 : (uint32_t)((int64_t)code - TRIAX_RAW_MIN);
+}
+
+static uint32_t beyond_range(uint32_t bits)
+{
+    return bits >> 24u;
+}
+
+/* The range is 2^n codes: one test sees a code outside it on any axis. */
+static uint32_t out_of_range(int32_t ux, int32_t uy, int32_t uz)
+{
+    return beyond_range((above_min(ux) | above_min(uy)) | above_min(uz));
+}
+
 static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)
 {
     return (code - segment->origin_code) * segment->gain;
@@ -135,9 +153,7 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
     int32_t uy = raw_code[1];
     int32_t uz = raw_code[2];
 
-    /* The range is 2^n codes: one test sees a code outside it on any axis. */
-    if ((((((uint32_t)ux - (uint32_t)TRIAX_RAW_MIN) | ((uint32_t)uy - (uint32_t)TRIAX_RAW_MIN)) |
-          ((uint32_t)uz - (uint32_t)TRIAX_RAW_MIN)) >> 24u) != 0u) {
+    if (out_of_range(ux, uy, uz) != 0u) {
         ux = clamp_raw(ux);
         uy = clamp_raw(uy);
         uz = clamp_raw(uz);
