@@ -32,10 +32,12 @@ def blanked_contracts(text: str) -> str:
 
 def not_covered(shape: Shape) -> str:
     """Which part of a shape has no complete contracts; "" where all have them."""
+    narrow = shape.raw_max - shape.raw_min != 2**32 - 1
     parts = {
         "the inverse form": shape.inverse is not None,
         "terms added to the sums": shape.adds_to_sums,
         "a term in dT/dt": shape.rate,
+        "saturating results of raw codes of fewer than 32 bits": shape.saturates and narrow,
         "sums of high words": shape.high_words,
     }
     return next((name for name, has in parts.items() if has), "")
