@@ -29,6 +29,7 @@ from triaxcal.base.tools import TOOLS, install_advice, missing_tools
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
 from triaxcal.codegen.render import render_routine
+from triaxcal.codegen.selftest import render_selftest
 from triaxcal.report.summary import HORNER_STEP_ON_M3
 from triaxcal.targets import bench_table, counting, matrix
 from triaxcal.targets.bench import Subject, _write_subject, cost_of
@@ -361,7 +362,7 @@ def test_example_firmware(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", [n for n, s in COVERING.items() if not s.saturates])
 def test_assembly_at_the_limits_of_every_shape(name: str) -> None:
     """Constants that spend step R's limits to the last unit, where a limb's sum could overflow."""
-    need("arm-none-eabi-gcc", "qemu-system-arm")
+    need("arm-none-eabi-gcc", "qemu-system-arm", "riscv64-unknown-elf-gcc", "qemu-system-riscv32")
     shape, rng = COVERING[name], Random(name)
     rows = [
         random_rows(rng, shape.order, full=True, limit=shape.row_limit)
@@ -372,13 +373,16 @@ def test_assembly_at_the_limits_of_every_shape(name: str) -> None:
     plan = integer_plan(shape, rows)
     if shape.quadratic:
         plan = with_quadratic(plan, random_quadratic(rng, full=True))
-    files = render_routine(plan)
-    files |= render_constants(plan, SENSOR, Provenance("S", "0" * 64, ("limits",)))
+    provenance = Provenance("S", "0" * 64, ("limits",))
+    files = render_routine(plan) | render_constants(plan, SENSOR, provenance)
+    files |= render_selftest(plan, provenance)
     case = Case(name, "", plan, files, image_bytes(plan))
     by_name = {core.name: core for core in cores.CORES}
-    ways = (("Cortex-M0", THUMB1), ("Cortex-M3", THUMB2), ("Cortex-M4F", THUMB2))
+    ways = (
+        ("Cortex-M0", THUMB1), ("Cortex-M3", THUMB2), ("Cortex-M4F", THUMB2), ("RV32IM", PORTABLE),
+    )  # fmt: skip
     builds = [Build(case, Toolset(by_name[core], "gcc", "-O2", form)) for core, form in ways]
-    assert [o.detail for o in run_builds(builds)] == ["", "", ""]
+    assert [o.detail for o in run_builds(builds)] == [""] * 4
 
 
 @pytest.mark.parametrize("optimisation", ["-O0", "-O2"])
