@@ -382,7 +382,7 @@ def test_functions_too_far_from_the_model_are_refused(ran: Ran) -> None:
     curves = replace(model.accel.curves, coefficients=coefficients)
     steep = replace(model, accel=replace(model.accel, curves=curves))
     functions = compensate_imu(steep, "matrix", device.range_degc, (10.5, 8.8), (1e-6, 1e-8))
-    errors = imudelivery._model_errors(steep, functions, device, ran.c.build.accel)
+    errors = imudelivery._model_errors(steep, functions, device, ran.c.build)
     with pytest.raises(RefusedError) as refusal:
         imudelivery._refuse_model_errors(str(unit.path), errors)
     assert str(refusal.value) == (
