@@ -185,4 +185,5 @@ def test_what_no_motion_meets_is_said(tmp_path: Path) -> None:
     said = plan_summary(ImuPlan(done, (found.left,), (found,)))
     assert "gyro_scale_sd_ppm = 0.001: Theta" in said
     assert "NOT MET" in said
-    assert "[motion] of imu_truth.toml: not its moves 2 times, " in said
+    assert "[motion] of imu_truth.toml: its moves 2 times, " in said
+    assert " min in all: not enough; " in said

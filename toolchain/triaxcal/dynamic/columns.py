@@ -103,7 +103,7 @@ class DynamicTable(WrittenFile, _Recorded):
     rate_hz
         Rate of even samples, in place of `time_column`.
     rate_columns
-        Gyros x, y, z; "-gy" turns a sign.
+        Gyros x, y, z; "-gy", or -5 of a number, turns a sign.
     rate_unit
         Unit of the gyros: of instants the first four, of increments the others. "count" are raw
         counts of the nominal size `rate_counts_per_deg_per_s`; counts about half of their range

@@ -33,7 +33,7 @@ from triaxcal.unit.passport import ENGLISH
 PANEL_WIDTH, PANEL_HEIGHT = 228.0, 112.0
 BAND = 10.0
 """Panels show so many final standard deviations on each side."""
-FAR = 50.0
+FAR = 1000.0
 """Half panels: so far out a line has the right slope where it comes in."""
 FEW = 12
 """Points of a short recording: each is marked."""

@@ -60,4 +60,4 @@ def _reached_words(reached: Reached) -> str:
         return f"  {reached.name}: {size}"
     sd = f"{left.state} has {digits(left.sd, left.sd)} {left.unit}"
     why = left.motion or f"from {', '.join(name for name, _ in left.sources)}"
-    return f"  {reached.name}: not {size}; {sd}, {left.key} = {left.limit:g} ({why})"
+    return f"  {reached.name}: {size}: not enough; {sd}, {left.key} = {left.limit:g} ({why})"
