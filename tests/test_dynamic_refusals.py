@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dynamic_cases import changed, held, mems_short, part, short_motion
-from hand_cases import hand_short, stated
+from hand_cases import Hand, hand_short, record, stated
 from hand_motion import HandNoise, hand_recording
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.noise import DataSheet
@@ -110,6 +110,14 @@ def _parts() -> ImuRecording:
     return changed(kept, time_s=samples.time_s[: inside.sum()])
 
 
+def _late(seconds: Callable[[np.ndarray], np.ndarray]) -> ImuRecording:
+    """Accelerometers with a clock that is late."""
+    recording, samples = hand_short()[1], hand_short()[1].all()
+    taken = samples.time_s - seconds(samples.time_s)
+    force = np.column_stack([np.interp(taken, samples.time_s, c) for c in samples.force.T])
+    return changed(recording, force=force)
+
+
 def _few_rests() -> ImuRecording:
     recording = hand_short()[1]
     fourth = survey(recording).rests[4]
@@ -186,6 +194,14 @@ CASES: dict[str, tuple[Callable[[], ImuRecording], tuple[str, ...]]] = {
         lambda: _with(rate=_samples().rate[:, [1, 2, 0]]),
         ("exchanged axes", "z, x, y", "rate_columns"),
     ),
+    "forces half a second late": (
+        lambda: _late(lambda time_s: np.full(len(time_s), 0.5)),
+        ("the forces are 0.5 s late against the rates", "times of one clock for both triads"),
+    ),
+    "two clocks of different rates": (
+        lambda: _late(lambda time_s: 0.01 * time_s),
+        ("the forces are late against the rates by 0.", "two clocks of different rates"),
+    ),
     "exchanged from half-way on": (
         lambda: _changed_half_way(lambda s: s.rate[:, [1, 0, 2]]),
         ("up to here", "gyros' x, y, z, and from here on as the gyros' y, x, z", "cut"),
@@ -251,6 +267,13 @@ def test_a_table_whose_angles_the_gyros_contradict_is_refused(
         survey(make())
     for word in words:
         assert word in str(refusal.value), str(refusal.value)
+
+
+def test_a_hand_that_throws_the_unit_about_is_not_refused() -> None:
+    """Up to 15 m/s^2 between the rests: the forces turn by far more than gravity does."""
+    wild = Hand(poses=24, start_s=10.0, turn_s=(0.6, 1.0), push_m_per_s2=15.0)
+    truth = draw_truth(MEMS, 1)
+    assert len(survey(record(truth, wild, 1)).rests) > 20
 
 
 def test_a_table_whose_angles_agree_is_not_refused() -> None:

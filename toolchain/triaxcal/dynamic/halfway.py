@@ -10,6 +10,7 @@ the hand, which are the rest of it, do not prefer another M.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
@@ -18,56 +19,104 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.blocks.attitude import skew
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import Windows
-from triaxcal.model.types import FloatArray
+from triaxcal.model.types import BoolArray, FloatArray
 
 LEFT = 0.85
 """Of the squares that the best single M leaves."""
+NEAR_GRAVITY = 0.1
+"""Of the usual size of the force."""
+UNEXPLAINED = 0.7
+"""Of all squares: where no rates explain how the forces turn, none are better than others."""
+FEWEST = 20
+"""Windows: with fewer, one of so many M fits by chance."""
 PART = 0.1
 """Of all squares: on each side of the moment so much has to turn."""
 LEAST_RAD = 2.0
 """Of gravity's way in the unit on each side: some axes fit a shorter one by chance."""
 
 
-def refuse_change(recording: ImuRecording, windows: Windows, bias: FloatArray) -> None:
+@dataclass(frozen=True)
+class Left:
+    """Squares that each M leaves, summed from the first window on.
+
+    Attributes
+    ----------
+    entries : tuple of (array of shape (3, 3), float)
+        M and its factor, the identity first.
+    at_s : array, shape (n,)
+    sums : array, shape (entries, n)
+    every : array, shape (n,)
+        Where nothing turns.
+    """
+
+    entries: tuple[tuple[FloatArray, float], ...]
+    at_s: FloatArray
+    sums: FloatArray
+    every: FloatArray
+
+    @property
+    def other_axes(self) -> float:
+        """What the best M leaves, as a part of what the identity leaves."""
+        whole = self.sums[:, -1]
+        return float(whole.min() / whole[0]) if whole[0] > 0 else 1.0
+
+
+def gravity_alone(windows: Windows) -> BoolArray:
+    """Windows (w - 1,) from which to the next one only gravity turns: forces of its size.
+
+    A hand that throws the unit about turns the force by more than gravity does.
+    """
+    size = np.linalg.norm(windows.force, axis=1)
+    near = np.abs(size / np.median(size) - 1) < NEAR_GRAVITY
+    follows = (np.diff(windows.first) > 0) & (np.diff(windows.section) == 0)
+    alone: BoolArray = follows & near[1:] & near[:-1]
+    return alone
+
+
+def left_by_axes(recording: ImuRecording, windows: Windows, bias: FloatArray) -> Left | None:
+    """Squares that each M leaves of the forces' turning; None where few windows have most."""
+    follows = gravity_alone(windows)
+    if follows.sum() < 2:
+        return None
+    force = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
+    rate = windows.rate - bias
+    turn = ((rate[:-1] + rate[1:]) / 2 * np.diff(windows.start_s)[:, None])[follows]
+    middle = skew((force[1:] + force[:-1]) / 2)[follows]
+    change = (force[1:] - force[:-1])[follows]
+    entries = tuple((M, factor) for factor in _factors(recording.rate_hz) for M in _axes())
+    sums = [
+        np.cumsum(((change - factor * np.einsum("nij,nj->ni", middle, turn @ M.T)) ** 2).sum(1))
+        for M, factor in entries
+    ]
+    squares = (change**2).sum(axis=1)
+    if squares.sum() ** 2 < FEWEST * (squares**2).sum():
+        return None
+    every = np.cumsum(squares)
+    return Left(entries, windows.start_s[1:][follows], np.array(sums), every)
+
+
+def refuse_change(recording: ImuRecording, left: Left) -> None:
     """Refuse a recording whose axes, signs or units of rate change at a moment.
 
     Raises
     ------
     RefusedError
     """
-    follows = (np.diff(windows.first) > 0) & (np.diff(windows.section) == 0)
-    force = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
-    rate = windows.rate - bias
-    turn = ((rate[:-1] + rate[1:]) / 2 * np.diff(windows.start_s)[:, None])[follows]
-    middle = skew((force[1:] + force[:-1]) / 2)[follows]
-    change = (force[1:] - force[:-1])[follows]
-    at_s = windows.start_s[1:][follows]
-    every = np.cumsum((change**2).sum(axis=1))
-    if len(every) < 2:
-        return
-    entries = [(M, factor) for factor in _factors(recording.rate_hz) for M in _axes()]
-    left = np.array(
-        [
-            np.cumsum(((change - factor * np.einsum("nij,nj->ni", middle, turn @ M.T)) ** 2).sum(1))
-            for M, factor in entries
-        ]
-    )
-    way = np.cumsum(np.linalg.norm(change, axis=1))
-    inside = (every > PART * every[-1]) & (every < (1 - PART) * every[-1])
-    inside &= (way > LEAST_RAD) & (way < way[-1] - LEAST_RAD)
+    inside = (left.every > PART * left.every[-1]) & (left.every < (1 - PART) * left.every[-1])
     if not inside.any():
         return
-    after = left[:, -1:] - left
-    both = left.min(axis=0) + after.min(axis=0)
+    after = left.sums[:, -1:] - left.sums
+    both = left.sums.min(axis=0) + after.min(axis=0)
     both[~inside] = np.inf
     k = int(np.argmin(both))
-    early, late = (int(np.argmin(side[:, k])) for side in (left, after))
-    if early == late or both[k] > LEFT * left[:, -1].min():
+    early, late = (int(np.argmin(side[:, k])) for side in (left.sums, after))
+    most = min(LEFT * left.sums[:, -1].min(), UNEXPLAINED * left.every[-1])
+    if early == late or both[k] > most:
         return
     raise RefusedError(
-        f"{recording.name}, {at_s[k]:.1f} s",
-        f"up to here the forces turn about x, y, z as {_words(*entries[early])}, "
-        f"and from here on as {_words(*entries[late])}",
+        f"{recording.name}, {left.at_s[k]:.1f} s",
+        f"up to here the forces turn about x, y, z as {_words(*left.entries[early])}, "
+        f"and from here on as {_words(*left.entries[late])}",
         expected="the same axes, units and kind of samples throughout",
         remedy="cut the recording there and calibrate each part with its own columns and units",
     )

@@ -16,7 +16,8 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.blocks.attitude import skew
-from triaxcal.dynamic.halfway import refuse_change
+from triaxcal.dynamic.halfway import gravity_alone, left_by_axes, refuse_change
+from triaxcal.dynamic.lagging import refuse_lag
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import WINDOW_S, Windows
 from triaxcal.model.types import FloatArray
@@ -47,7 +48,10 @@ def refuse_wrong_units(recording: ImuRecording, windows: Windows) -> None:
     start = _quietest(windows)
     _refuse_force(recording, np.median(windows.force[start], axis=0))
     bias = np.median(windows.rate[start], axis=0)
-    refuse_change(recording, windows, bias)
+    left = left_by_axes(recording, windows, bias)
+    if left is not None:
+        refuse_lag(recording, windows, bias, left.other_axes)
+        refuse_change(recording, left)
     _refuse_rate(recording, windows, bias)
 
 
@@ -96,7 +100,7 @@ def rate_matrix(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatAr
 
 def _equations(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rows (n, 9) and right sides (n,) of the equations of M, row by row; turns of the gyros."""
-    follows = (np.diff(windows.first) > 0) & (np.diff(windows.section) == 0)
+    follows = gravity_alone(windows)
     force = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
     step = np.diff(windows.start_s)[:, None]
     rate = (windows.rate - bias)[:-1] * 0.5 + (windows.rate - bias)[1:] * 0.5
@@ -105,7 +109,8 @@ def _equations(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatArr
     turn = rate * step
     rows = np.einsum("nij,nk->nijk", skew(middle), turn).reshape(-1, 3, 9)[follows]
     change = (force[1:] - force[:-1])[follows]
-    return rows.reshape(-1, 9), change.ravel(), np.abs(turn[follows]).sum(axis=0)
+    in_row = (np.diff(windows.first) > 0) & (np.diff(windows.section) == 0)
+    return rows.reshape(-1, 9), change.ravel(), np.abs(turn[in_row]).sum(axis=0)
 
 
 def _shares(windows: Windows, bias: FloatArray, tried: FloatArray) -> tuple[FloatArray, FloatArray]:
