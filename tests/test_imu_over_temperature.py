@@ -154,7 +154,7 @@ def test_a_soak_without_turns_gives_the_biases(tmp_path: Path) -> None:
     # what is unknown of the one, 1 % of g and more, is unknown of the other.
     assert (known.sd[hot][:, :3].max(axis=1) > 0.01 * 9.8 / 2).all()
     finding = made.done.findings[-1]
-    assert finding.startswith("the unit turned at 19.7 to 20.0 degC only: that scale factors and ")
+    assert finding.startswith("the unit turned at 19.7 to 20.0 degC only: it is not shown that ")
     assert "not shown" in dynamic_summary(made, ["a"], "build")
 
 
