@@ -105,7 +105,7 @@ accel_lsb = 10
 gyro_bias_instability_deg_per_h = 0
 accel_bias_instability_ug = 0
 """
-COLUMNS = ("time_s", "gx", "gy", "gz", "ax", "ay", "az", "temp_degc", "gyro_temp_degc")
+COLUMNS = ("time_s", "gx", "gy", "gz", "ax", "ay", "az", "temp_degc")
 
 
 def table_of(recording: ImuRecording) -> np.ndarray:
@@ -120,7 +120,7 @@ def write_unit(folder: Path, table: np.ndarray, toml: str = UNIT_TOML) -> Path:
     """Folder of a unit with its recording as CSV."""
     folder.mkdir(parents=True)
     (folder / "unit.toml").write_text(toml, encoding="utf-8")
-    header = ",".join(COLUMNS[: table.shape[1]])
+    header = ",".join((*COLUMNS, "gyro_temp_degc")[: table.shape[1]])
     np.savetxt(
         folder / "recording.csv", table, fmt="%.17g", delimiter=",", header=header, comments=""
     )

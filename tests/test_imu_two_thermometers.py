@@ -115,6 +115,7 @@ def test_summary_and_page_name_both_temperatures(ran: Ran) -> None:
     text = dynamic_summary(ran.made, ["a"], "build")
     assert "constants above at 20 degC, gyros at 27." in text
     assert "gyro by its own thermometer: -34.5 to 95 degC, 519 temperature codes" in text
+    assert "over temperature: [dynamic] blocks has no" not in text  # the curves follow it
     page = dynamic_files(ran.made)["dynamic.html"].decode()
     assert "−40 to 85 °C; gyros −34.5 to 95 °C" in page
     assert "those of the gyros at 27." in page

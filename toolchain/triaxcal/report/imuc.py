@@ -171,6 +171,8 @@ def _with_functions(own: float, total: float) -> str:
 
 def constant_triads(made: ImuDelivery) -> list[str]:
     """Triads whose constants are the same over the whole range."""
+    if made.done.over is not None:
+        return []
     names = {block.name for block in made.done.result.layout.blocks}
     return [what for what in ("accelerometer", "gyro") if f"{what}-thermal" not in names]
 
