@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,18 @@ import pytest
 
 import triaxcal
 from compiled_judge import DEVICE, Ran, delivered, folder_of, judged_c
-from thermal_cases import POINTS, apart_at_point, own_degc, true_at, truth_of
+from dynamic_cases import held
+from thermal_cases import POINTS, RATE_HZ, TURNS, apart_at_point, own_degc, true_at, truth_of
 from triaxcal.base.errors import RefusedError
 from triaxcal.delivery.imu import deliver_imu
 from triaxcal.dynamic.blocks.base import GYRO_BIAS, GYRO_MATRIX
+from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
+from triaxcal.simulation.imu import simulate_imu
+from triaxcal.simulation.imu_grades import MEMS, draw_truth
+from triaxcal.simulation.imu_motion import ImuMotion, Mounting
+from triaxcal.simulation.imu_temperature import TemperatureDrift, TemperatureRamp
+from triaxcal.simulation.imu_truth import ImuTruth
 
 OWN = """\
 gyro_degc_per_code = 0.25
@@ -194,3 +202,58 @@ def test_thermometers_that_do_not_rise_together_are_refused(tmp_path: Path) -> N
     (unit / "unit.toml").write_text(toml)
     with pytest.raises(RefusedError, match="expected two thermometers that rise together"):
         deliver_imu(unit)
+
+
+def apart_ramp(
+    truth: ImuTruth, ends_degc: tuple[float, float], seed: int, turns: bool = True
+) -> ImuRecording:
+    """From one temperature to another; the gyros are warmer, and change later."""
+    mountings = tuple(Mounting(TURNS, 12.0) for _ in range(3))
+    plan = ImuMotion(mountings if turns else (Mounting((), 400.0),))
+    low, high = ends_degc
+    lag = TemperatureDrift(own_degc(low), own_degc(high), plan.duration_s / 4)
+    steady = TemperatureRamp(low, high, plan.duration_s)
+    motion = replace(plan, temperature=steady, gyro_temperature=lag)
+    return held(simulate_imu(truth, motion, RATE_HZ, seed))
+
+
+def test_a_soak_has_the_temperature_of_each_triad(tmp_path: Path) -> None:
+    truth = truth_of(4)
+    turned = apart_at_point(truth, 20.0, 1)
+    unit = folder_of(tmp_path, [turned, apart_ramp(truth, (20.0, 60.0), 2, turns=False)], "# own")
+    path = unit / "unit.toml"
+    text = path.read_text().replace("# own", "")
+    column = 'temp_column = "temp_degc"\n'
+    path.write_text(text.replace(column, column + 'gyro_temp_column = "gyro_temp_degc"\n'))
+    over = deliver_imu(unit).done.over
+    assert over is not None
+    known = over.known
+    assert known.gyro_temps_degc[-1] > known.temps_degc[-1] + 6.0
+    drift = true_at(truth, known.gyro_temps_degc)[:, 9:12]
+    z = (known.value[:, 9:12] - drift) / known.sd[:, 9:12]
+    assert np.abs(z).max() < 4.5
+    # By the accelerometers' thermometer the same biases would be off.
+    wrong = true_at(truth, known.temps_degc)[:, 9:12]
+    assert np.abs((known.value[:, 9:12] - wrong) / known.sd[:, 9:12]).max() > 10
+
+
+def test_linear_coefficients_are_of_the_temperature_of_each_triad(tmp_path: Path) -> None:
+    """A single recording with the blocks of linear coefficients, to the codes of the C."""
+    truth = draw_truth(MEMS, 5, ("accel-temperature", "gyro-temperature"))
+    recording = apart_ramp(truth, (15.0, 45.0), 3)
+    own = "gyro_degc_per_code = 0.125\ngyro_range_degc = [24, 53]\n"
+    unit = folder_of(tmp_path, [recording], DEVICE.replace("[-40, 85]", "[15, 45]") + own)
+    path = unit / "unit.toml"
+    blocks = 'blocks = ["accelerometer-thermal", "gyro-thermal"]\n'
+    path.write_text(path.read_text().replace("temp_column", blocks + "temp_column", 1))
+    made = deliver_imu(unit)
+    assert made.c is not None
+    gyro = made.c.model.gyro
+    assert made.c.build.gyro.temp_max_code == 424
+    result = made.done.result
+    place = result.layout.place("gyro-thermal")
+    slope = np.radians(np.array(truth.gyro_bias_deg_per_h_per_k)) / 3600
+    z = (result.p[place][:3] - slope) / result.sd[place][:3]
+    assert np.abs(z).max() < 4.5
+    change = gyro.constants_at(50.0)[9:] - gyro.constants_at(30.0)[9:]
+    assert change == pytest.approx(20.0 * result.p[place][:3])

@@ -20,6 +20,8 @@ POINT_DEGC = 4.0
 """Temperatures that lie nearer together than this, without a gap, are one point."""
 STEPS = 5
 """Of all that ramps pass through: what a cubic and a held-out step need."""
+RISES = 0.1
+"""Of what the accelerometers' temperature rises by: gyros rise by more."""
 REST_S = 1.0
 """A section of its own may begin with a rest of this length."""
 
@@ -81,9 +83,9 @@ def gyro_nodes_of(recorded: Recorded, nodes: Nodes, reference_degc: float) -> No
         return nodes
     by_degc = np.argsort(recorded.degc, kind="stable")
     degc = np.interp(nodes.degc, recorded.degc[by_degc], recorded.gyro[by_degc])
-    steps = np.diff(degc)
-    if np.any(steps < GROUP_GAP_DEGC):
-        k = int(np.argmin(steps))
+    part = np.diff(degc) / np.diff(nodes.degc)
+    if np.any(part < RISES):
+        k = int(np.argmin(part))
         raise RefusedError(
             "gyro_temp_column in [dynamic]",
             f"{degc[k]:.1f} degC where temp_column is {nodes.degc[k]:.1f} degC, and "
