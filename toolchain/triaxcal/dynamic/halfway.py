@@ -25,6 +25,9 @@ LEFT = 0.85
 """Of the squares that the best single M leaves."""
 NEAR_GRAVITY = 0.1
 """Of the usual size of the force."""
+DESCRIBED = 0.1
+"""Of all squares: where one M leaves less, it describes the recording. On a table each stage turns
+about one axis, and several M are as good there."""
 UNEXPLAINED = 0.7
 """Of all squares: where no rates explain how the forces turn, none are better than others."""
 FEWEST = 20
@@ -110,8 +113,10 @@ def refuse_change(recording: ImuRecording, left: Left) -> None:
     both[~inside] = np.inf
     k = int(np.argmin(both))
     early, late = (int(np.argmin(side[:, k])) for side in (left.sums, after))
-    most = min(LEFT * left.sums[:, -1].min(), UNEXPLAINED * left.every[-1])
-    if early == late or both[k] > most:
+    best = float(left.sums[:, -1].min())
+    if early == late or best < DESCRIBED * left.every[-1]:
+        return
+    if both[k] > min(LEFT * best, UNEXPLAINED * left.every[-1]):
         return
     raise RefusedError(
         f"{recording.name}, {left.at_s[k]:.1f} s",

@@ -11,7 +11,7 @@ import numpy as np
 
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.blocks.attitude import skew
-from triaxcal.dynamic.halfway import UNEXPLAINED, gravity_alone
+from triaxcal.dynamic.halfway import DESCRIBED, UNEXPLAINED, gravity_alone
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import WINDOW_S, Windows
 from triaxcal.model.types import FloatArray
@@ -44,8 +44,10 @@ def refuse_lag(
     best = lags[int(np.argmin(whole))] * WINDOW_S
     each = lags[np.argmin(left, axis=0)] * WINDOW_S
     explained = float(left.min(axis=0).sum())
-    most = min(LEFT * other_axes * whole[reach], UNEXPLAINED * _left(windows, None, 0).sum())
-    if explained > most or np.abs(each).max() < SHORTEST_S:
+    every = float(_left(windows, None, 0).sum())
+    if whole[reach] < DESCRIBED * every or np.abs(each).max() < SHORTEST_S:
+        return
+    if explained > min(LEFT * other_axes * whole[reach], UNEXPLAINED * every):
         return
     found = f"the forces are {abs(best):.1f} s {'late' if best > 0 else 'early'} against the rates"
     expected, remedy = "times of one clock for both triads", "correct the times of one of them"

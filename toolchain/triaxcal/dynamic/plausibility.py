@@ -29,8 +29,10 @@ FACTOR_LIMITS = (0.6, 1.6)
 START_S = 2.0
 LEAST_TURN_RAD = 0.01
 """Below it M is noise."""
-EXPLAINED = 0.2
-"""Of the squared turns of the forces: a hand's accelerations leave the rates above a half."""
+EXPLAINED, MISSED = 0.2, 0.03
+"""Of the squared turns of the forces. A hand's accelerations leave the rates above a half; one that
+throws the unit about leaves a tenth, from which nothing is concluded. Gyros that miss the turns
+explain less than the second on any axes."""
 CLEARLY = 0.05
 """Exchanged axes explain more than those stated by more than this."""
 TURNED_COSINE = math.cos(math.radians(30.0))
@@ -169,6 +171,8 @@ def _refuse_rate(recording: ImuRecording, windows: Windows, bias: FloatArray) ->
     axes = list(product(permutations(range(3)), product((1.0, -1.0), repeat=3)))
     tried = np.array([np.diag(signs) @ np.eye(3)[list(order)] for order, signs in axes])
     share, factor = _shares(windows, bias, np.concatenate([[matrix], tried]))
+    if turned.max() >= LEAST_TURN_RAD and share[0] < EXPLAINED and share[1:].max() > MISSED:
+        return
     if turned.max() < LEAST_TURN_RAD or share[0] < EXPLAINED:
         _refuse_gyros_that_miss_the_turn(name, windows, turned, float(share[0]))
         return
