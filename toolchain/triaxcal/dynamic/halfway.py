@@ -21,7 +21,7 @@ from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import Windows
 from triaxcal.model.types import BoolArray, FloatArray
 
-LEFT = 0.85
+LEFT = 0.6
 """Of the squares that the best single M leaves."""
 NEAR_GRAVITY = 0.1
 """Of the usual size of the force."""
@@ -32,7 +32,7 @@ UNEXPLAINED = 0.7
 """Of all squares: where no rates explain how the forces turn, none are better than others."""
 FEWEST = 20
 """Windows: with fewer, one of so many M fits by chance."""
-PART = 0.1
+PART = 0.2
 """Of all squares: on each side of the moment so much has to turn."""
 LEAST_RAD = 2.0
 """Of gravity's way in the unit on each side: some axes fit a shorter one by chance."""
@@ -76,6 +76,11 @@ def gravity_alone(windows: Windows) -> BoolArray:
     return alone
 
 
+def _effective(squares: FloatArray) -> float:
+    """How many windows have most of the squares."""
+    return float(squares.sum() ** 2 / max(float((squares**2).sum()), 1e-300))
+
+
 def left_by_axes(recording: ImuRecording, windows: Windows, bias: FloatArray) -> Left | None:
     """Squares that each M leaves of the forces' turning; None where few windows have most."""
     follows = gravity_alone(windows)
@@ -92,7 +97,7 @@ def left_by_axes(recording: ImuRecording, windows: Windows, bias: FloatArray) ->
         for M, factor in entries
     ]
     squares = (change**2).sum(axis=1)
-    if squares.sum() ** 2 < FEWEST * (squares**2).sum():
+    if _effective(squares) < FEWEST:
         return None
     every = np.cumsum(squares)
     return Left(entries, windows.start_s[1:][follows], np.array(sums), every)
@@ -117,6 +122,9 @@ def refuse_change(recording: ImuRecording, left: Left) -> None:
     if early == late or best < DESCRIBED * left.every[-1]:
         return
     if both[k] > min(LEFT * best, UNEXPLAINED * left.every[-1]):
+        return
+    squares = np.diff(left.every, prepend=0.0)
+    if min(_effective(squares[: k + 1]), _effective(squares[k + 1 :])) < FEWEST:
         return
     raise RefusedError(
         f"{recording.name}, {left.at_s[k]:.1f} s",
