@@ -11,18 +11,19 @@ from triaxcal.targets.bench import DOUBLE, FLOAT, Cost, Subject, best_form, cost
 from triaxcal.targets.cores.registry import CORES
 from triaxcal.targets.counting import build_plugin
 from triaxcal.targets.matrix import PORTABLE
-from triaxcal.targets.shapes import CUBIC_LEFT, shipped_cases
+from triaxcal.targets.shapes import CUBIC_LEFT, HIGH, shipped_cases
 
 
 def measure(size: str) -> list[Figure]:
     counted = [core for core in CORES if core.counted]
     cores = counted[: pick(size, 1, 2, len(counted))]
-    case = next(c for c in shipped_cases(UNITS) if c.name == CUBIC_LEFT)
+    cases = {c.name: c for c in shipped_cases(UNITS)}
     found = []
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
         plugin = build_plugin(work)
         for core in cores:
+            case = cases[HIGH[CUBIC_LEFT] if core.high_multiply else CUBIC_LEFT]
             forms = {"ours": (best_form(core), ""), DOUBLE: (PORTABLE, DOUBLE)}
             forms[FLOAT] = PORTABLE, FLOAT
             costs = {
