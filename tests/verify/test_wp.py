@@ -9,6 +9,7 @@ import pytest
 
 from triaxcal.base.tools import MissingToolError
 from triaxcal.codegen.annotations import not_covered, with_contracts, without_annotations
+from triaxcal.codegen.names import names_of
 from triaxcal.codegen.render import annotated_routine, render_routine, specification
 from triaxcal.verify import wp
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
@@ -112,7 +113,9 @@ FAULTS = {
     "a step that subtracts": ("horner_step", "return c + high", "return c - high"),
     "a coefficient taken twice": ("evaluate", "horner_step(c[0]", "horner_step(c[1]"),
     "the row of another axis": ("evaluate_column", "coefficient[4u + j]", "coefficient[3u + j]"),
-    "one column too few": ("evaluate_rows", "j < 4u", "j < 3u"),
+    "one column too few": (
+        "evaluate_rows", "j < 4u; j++) {\n        evaluate", "j < 3u; j++) {\n        evaluate",
+    ),
     "x from the wrong side": ("x_q31_of", "(code - segment", "(-code - segment"),
     "a clamp at the other end": (
         "set_temperature", "code = calib->temp_max_code", "code = calib->temp_min_code",
@@ -133,10 +136,10 @@ def judged(
     """The outcome of one function alone, with a text of the annotated C replaced."""
     text = annotated_routine(work.plan)
     assert text.count(old) == 1, old
-    name = re.search(rf"{function}\w*", text)
-    assert name is not None
+    present = wp.functions_of(text, names_of(work.plan).linked)
+    name = [n for n in present if re.sub(r"_\d+$", "", n) == function]
     monkeypatch.setattr(wp, "annotated_routine", lambda _: text.replace(old, new))
-    monkeypatch.setattr(wp, "functions_of", lambda *_: [name[0]])
+    monkeypatch.setattr(wp, "functions_of", lambda *_: name)
     monkeypatch.setattr(wp, "GOAL_S", 5)
     monkeypatch.setattr(wp, "_LEMMAS", ())
     return wp.check(work)

@@ -94,7 +94,8 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
 /*
  * Compensates one sample: raw codes x, y, z to specific force x, y, z in 2^-TRIAX_ACCEL_Q g.
  * Returns TRIAX_STATUS_OK, _RAW_RANGE of this sample only; the temperature's status came
- * from triax_set_temperature. raw_code and accel may be the same array.
+ * from triax_set_temperature. raw_code and accel may be the same array;
+ * accel must not overlap *state.
  */
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3]);
 
