@@ -7,9 +7,11 @@ import pytest
 
 from dynamic_cases import recording_of
 from recordings import recording
+from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.calibrate import calibrate_dynamic
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import ImuSamples
+from triaxcal.dynamic.survey import survey
 
 RATE_HZ = 100.0
 GYRO_SCALE_PERCENT = (
@@ -108,3 +110,14 @@ def test_hand_turns_of_imucal_agree_with_its_own_evaluation() -> None:
         ends = [force[slice(*IMUCAL_REST[axis, sign])].mean(axis=0)[axis] for sign in (1, -1)]
         # The half-sum takes the unit as level in both: cosines of 2 deg are 6 mm/s^2.
         assert abs(sum(ends) / 2 - found[axis]) < 9.81 * (1 - np.cos(np.radians(HAND_DEG)))
+
+
+def test_labelled_parts_in_one_file_are_no_other_axes_and_no_other_clock() -> None:
+    """Between its parts imucal's annotated file has no rows."""
+    lines = (recording("imucal") / "annotated_session.csv").read_text().splitlines()[1:]
+    table = np.array([line.split(",")[2:] for line in lines], dtype=float)
+    force, rate = table[:, :3] / 2048 * 9.80665, np.radians(table[:, 3:] / 16.4)
+    samples = ImuSamples(np.arange(len(table)) / 204.8, rate, force)
+    about = {"rate_hz": 204.8, "latitude_deg": 49.6, "gravity_m_per_s2": 9.8087}
+    with pytest.raises(RefusedError, match=r"the gyros explain \d+ % of how it turns"):
+        survey(recording_of(samples, "annotated", **about))

@@ -47,7 +47,11 @@ def refuse_lag(
     every = float(_left(windows, None, 0).sum())
     if whole[reach] < DESCRIBED * every or np.abs(each).max() < SHORTEST_S:
         return
-    if explained > min(LEFT * other_axes * whole[reach], UNEXPLAINED * every):
+    # Of the squares at these lags: a jump of the forces, which no rate explains, is beyond some.
+    later = [
+        float(_left(windows, None, int(lags[k]))[i]) for i, k in enumerate(left.argmin(axis=0))
+    ]
+    if explained > min(LEFT * other_axes * whole[reach], UNEXPLAINED * min(every, sum(later))):
         return
     found = f"the forces are {abs(best):.1f} s {'late' if best > 0 else 'early'} against the rates"
     expected, remedy = "times of one clock for both triads", "correct the times of one of them"
