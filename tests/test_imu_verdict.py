@@ -24,6 +24,7 @@ from dynamic_cases import (
     write_unit,
 )
 from hand_cases import hand_short, stated
+from hand_motion import HandNoise, hand_recording
 from triaxcal.cli.main import main
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.limits import ImuLimits
@@ -34,6 +35,7 @@ from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.evidence.case import Case
 from triaxcal.evidence.chance import chi_square, lengths, stacked
 from triaxcal.evidence.check import ALARM, Evidence
+from triaxcal.evidence.counts import coarse_counts
 from triaxcal.evidence.examine import examine_case
 from triaxcal.evidence.heldout import held_out
 from triaxcal.evidence.stretches import stretches_of, without
@@ -279,6 +281,21 @@ def test_noise_that_is_stated_too_large_is_a_doubt() -> None:
     found = examined(recording, more)[1]
     assert not found.failed
     assert "[noise] states too much" in found.doubts[0]
+
+
+@pytest.mark.parametrize(("gyro", "accel"), [(5.0, 1.0), (1.0, 5.0), (2.0, 2.0)])
+def test_counts_coarser_than_the_noise_are_a_doubt(gyro: float, accel: float) -> None:
+    """By hand; counts in deviations of a sample. Those of 5 leave 0.14 of a count in each rest."""
+    noise = HandNoise(gyro_b=0.0, accel_b=0.0)
+    per_sample = noise.gyro_n / 60 * 10, noise.accel_n * 10  # deg/s and micro-g, at 100 Hz
+    coarse = replace(
+        noise, gyro_lsb_deg_per_s=gyro * per_sample[0], accel_lsb=accel * per_sample[1]
+    )
+    _, recording = hand_recording(8, coarse, minutes=1.5)
+    result = calibrate_dynamic(recording, DataSheet())
+    found = coarse_counts(Case(recording, result.noise, result))
+    named = [f"the {n}" for n, size in (("gyros", gyro), ("accelerometers", accel)) if size > 3]
+    assert [words.split(" read ")[0] for words in found] == [f"at rest {n}" for n in named]
 
 
 def test_demands_hold_what_they_say() -> None:

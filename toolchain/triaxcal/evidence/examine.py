@@ -26,6 +26,7 @@ from triaxcal.evidence.chance import (
     rests_alone,
 )
 from triaxcal.evidence.check import Check, Evidence
+from triaxcal.evidence.counts import coarse_counts
 from triaxcal.evidence.heldout import HeldOut, held_out
 from triaxcal.model.types import FloatArray
 
@@ -73,7 +74,7 @@ def examine_case(
     found = Evidence(
         tuple(checks),
         tuple(_not_tested(held, limits, result, seen)),
-        less_noise(result),
+        (*less_noise(result), *coarse_counts(case)),
         _notes(held),
     )
     if not found.failed:
