@@ -29,9 +29,9 @@ FACTOR_LIMITS = (0.6, 1.6)
 START_S = 2.0
 LEAST_TURN_RAD = 0.01
 """Below it M is noise."""
-EXPLAINED, MISSED = 0.2, 0.03
+EXPLAINED, MISSED = 0.2, 0.01
 """Of the squared turns of the forces. A hand's accelerations leave the rates above a half; one that
-throws the unit about leaves a tenth, from which nothing is concluded. Gyros that miss the turns
+throws the unit about leaves 2 %, from which nothing is concluded. Gyros that miss the turns
 explain less than the second on any axes."""
 CLEARLY = 0.05
 """Exchanged axes explain more than those stated by more than this."""
