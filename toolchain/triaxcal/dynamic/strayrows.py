@@ -10,7 +10,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.parts import NAMES, Log
 from triaxcal.model.types import BoolArray, FloatArray
 from triaxcal.readings.evenclock import EvenClock
-from triaxcal.readings.strays import STRAYS_MAX, strays
+from triaxcal.readings.strays import STRAYS_MAX, part_of, strays
 
 _NOTHING = 1e-3
 _LIKE = 3.0
@@ -41,8 +41,7 @@ def _mixed(
     log: Log, name: str, values: FloatArray, found: BoolArray, clock: EvenClock
 ) -> RefusedError:
     at, step_s = np.flatnonzero(found), clock.step_s
-    expected = (values[at - 1] + values[at + 1]) / 2
-    part = float(np.median((values[at] * expected).sum(axis=1) / (expected**2).sum(axis=1)))
+    part = part_of(values, found)
     hint = f"{part:.3g} of it"
     if abs(part) < _NOTHING * min(step_s, 1.0):
         hint = "nothing: samples that did not arrive?"
