@@ -54,15 +54,20 @@ def read_all(count):
     """Frames of the two buses, on which a sensor and its thermometer send."""
     source = kind_of(BUS).open(Wanted(BUS, False, lambda: None))
     senders = [can.Bus(interface="virtual", channel=f"several-{name}") for name in "ab"]
-    parts = []
+    parts, sent = [], 0
     try:
         for k in range(count):
+            # The reader of a bus may be late by any time: what was sent arrives before more is sent.
+            while k % 10 == 0 and sum(map(len, parts)) < sent:
+                parts.append(source.read())
             imu = struct.pack("<hhhBx", k, -k, 1000, k % 256)
             senders[0].send(can.Message(arbitration_id=256, is_extended_id=False, data=imu))
+            sent += 1
             if k % 10 == 0:
                 data = struct.pack(">h6x", 2000 + k)
                 senders[1].send(can.Message(arbitration_id=256, is_extended_id=False, data=data))
-        while sum(map(len, parts)) < count + (count + 9) // 10:
+                sent += 1
+        while sum(map(len, parts)) < sent:
             parts.append(source.read())
     finally:
         source.close()
