@@ -57,7 +57,7 @@ def read_all(count):
     parts, sent = [], 0
     try:
         for k in range(count):
-            # The reader of a bus may be late by any time: what was sent arrives before more is sent.
+            # A reader may be late by any time: what was sent arrives before more is sent.
             while k % 10 == 0 and sum(map(len, parts)) < sent:
                 parts.append(source.read())
             imu = struct.pack("<hhhBx", k, -k, 1000, k % 256)
