@@ -145,8 +145,9 @@ def test_a_planted_mistake_is_not_proven(
     monkeypatch.setattr(wp, text, changed)
     monkeypatch.setattr(wp, "functions_of", lambda *_: [function])
     monkeypatch.setattr(wp, "GOAL_S", 5)
-    # A mistake in a lemma is a lemma that is not proven.
-    lemmas = [part for part in wp._LEMMAS if "<==>" in old]
+    # What out_of_range takes from a lemma is right or wrong where the lemma is proven.
+    in_lemma = text == SPECIFICATION and function == "out_of_range"
+    lemmas = wp._LEMMAS if in_lemma else ()
     monkeypatch.setattr(wp, "_LEMMAS", lemmas)
     outcome = wp.check(work)
     assert outcome.result == FAILED
