@@ -12,7 +12,7 @@ from thermal_cases import POINTS, at_point, solved, truth_of
 from triaxcal.base.errors import RefusedError
 from triaxcal.dynamic.agreement import Difference, recordings_differ, refuse_others
 from triaxcal.dynamic.calibrate import calibrate_dynamic
-from triaxcal.dynamic.otherunits import refuse_other_angles
+from triaxcal.dynamic.otherunits import refuse_other_misalignments
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.several import joined_recordings
 from triaxcal.dynamic.temperatures import recorded_temperatures
@@ -97,10 +97,10 @@ def test_two_units_at_two_temperatures_are_refused_by_their_angles(number: int) 
     assert degc is not None
     known = solved(truth, whole).over.known
     if number == 6:
-        refuse_other_angles(whole, degc, known)
+        refuse_other_misalignments(whole, degc, known)
         return
     with pytest.raises(RefusedError, match=r"1.csv: the gyros' misalignments differ by 0.\d+ deg"):
-        refuse_other_angles(whole, degc, known)
+        refuse_other_misalignments(whole, degc, known)
 
 
 def test_a_thermometer_that_reads_another_temperature_is_refused() -> None:

@@ -11,20 +11,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import permutations, product
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.blocks.attitude import skew
+from triaxcal.dynamic.gravityturns import GravityTurns, signed_axes_matrices
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import Windows
-from triaxcal.model.types import BoolArray, FloatArray
+from triaxcal.model.types import FloatArray
 
 LEFT = 0.6
 """Of the squares that the best single M leaves."""
-NEAR_GRAVITY = 0.1
-"""Of the usual size of the force."""
 DESCRIBED = 0.1
 """Of all squares: where one M leaves less, it describes the recording. On a table each stage turns
 about one axis, and several M are as good there."""
@@ -64,43 +61,27 @@ class Left:
         return float(whole.min() / whole[0]) if whole[0] > 0 else 1.0
 
 
-def gravity_alone(windows: Windows) -> BoolArray:
-    """Windows (w - 1,) from which to the next one only gravity turns: forces of its size.
-
-    A hand that throws the unit about turns the force by more than gravity does.
-    """
-    size = np.linalg.norm(windows.force, axis=1)
-    near = np.abs(size / np.median(size) - 1) < NEAR_GRAVITY
-    follows = (np.diff(windows.first) > 0) & (np.diff(windows.section) == 0)
-    alone: BoolArray = follows & near[1:] & near[:-1]
-    return alone
-
-
 def _effective(squares: FloatArray) -> float:
     """How many windows have most of the squares."""
     return float(squares.sum() ** 2 / max(float((squares**2).sum()), 1e-300))
 
 
-def left_by_axes(recording: ImuRecording, windows: Windows, bias: FloatArray) -> Left | None:
+def left_by_axes(recording: ImuRecording, windows: Windows, turns: GravityTurns) -> Left | None:
     """Squares that each M leaves of the forces' turning; None where few windows have most."""
-    follows = gravity_alone(windows)
-    if follows.sum() < 2:
+    alone = turns.alone
+    if alone.sum() < 2:
         return None
-    force = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
-    rate = windows.rate - bias
-    turn = ((rate[:-1] + rate[1:]) / 2 * np.diff(windows.start_s)[:, None])[follows]
-    middle = skew((force[1:] + force[:-1]) / 2)[follows]
-    change = (force[1:] - force[:-1])[follows]
-    entries = tuple((M, factor) for factor in _factors(recording.rate_hz) for M in _axes())
+    middle, turn, change = turns.middle[alone], turns.turn[alone], turns.change[alone]
+    squares = (change**2).sum(axis=1)
+    if _effective(squares) < FEWEST:
+        return None
+    axes = signed_axes_matrices()
+    entries = tuple((M, factor) for factor in _factors(recording.rate_hz) for M in axes)
     sums = [
         np.cumsum(((change - factor * np.einsum("nij,nj->ni", middle, turn @ M.T)) ** 2).sum(1))
         for M, factor in entries
     ]
-    squares = (change**2).sum(axis=1)
-    if _effective(squares) < FEWEST:
-        return None
-    every = np.cumsum(squares)
-    return Left(entries, windows.start_s[1:][follows], np.array(sums), every)
+    return Left(entries, windows.start_s[1:][alone], np.array(sums), np.cumsum(squares))
 
 
 def refuse_change(recording: ImuRecording, left: Left) -> None:
@@ -133,15 +114,6 @@ def refuse_change(recording: ImuRecording, left: Left) -> None:
         expected="the same axes, units and kind of samples throughout",
         remedy="cut the recording there and calibrate each part with its own columns and units",
     )
-
-
-def _axes() -> list[FloatArray]:
-    """Every signed permutation, the identity first."""
-    return [
-        np.diag(signs)[:, list(order)]
-        for order in permutations(range(3))
-        for signs in product((1.0, -1.0), repeat=3)
-    ]
 
 
 def _factors(rate_hz: float) -> tuple[float, ...]:

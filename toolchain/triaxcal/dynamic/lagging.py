@@ -7,11 +7,13 @@ matter for rests, and the block "delay" is for them on a table.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.blocks.attitude import skew
-from triaxcal.dynamic.halfway import DESCRIBED, UNEXPLAINED, gravity_alone
+from triaxcal.dynamic.gravityturns import GravityTurns
+from triaxcal.dynamic.halfway import DESCRIBED, UNEXPLAINED
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import WINDOW_S, Windows
 from triaxcal.model.types import FloatArray
@@ -24,7 +26,7 @@ PARTS = 3
 
 
 def refuse_lag(
-    recording: ImuRecording, windows: Windows, bias: FloatArray, other_axes: float
+    recording: ImuRecording, windows: Windows, turns: GravityTurns, other_axes: float
 ) -> None:
     """Refuse forces that belong to other times than the rates.
 
@@ -39,17 +41,18 @@ def refuse_lag(
     if reach < 1:
         return
     lags = np.arange(-reach, reach + 1)
-    left = np.array([_left(windows, bias, int(lag)) for lag in lags])
+    still = replace(turns, turn=np.zeros_like(turns.turn))  # leaves all squares
+    left = np.array([_left(windows, turns, int(lag)) for lag in lags])
     whole = left.sum(axis=1)
     best = lags[int(np.argmin(whole))] * WINDOW_S
     each = lags[np.argmin(left, axis=0)] * WINDOW_S
     explained = float(left.min(axis=0).sum())
-    every = float(_left(windows, None, 0).sum())
+    every = float(_left(windows, still, 0).sum())
     if whole[reach] < DESCRIBED * every or np.abs(each).max() < SHORTEST_S:
         return
     # Of the squares at these lags: a jump of the forces, which no rate explains, is beyond some.
     later = [
-        float(_left(windows, None, int(lags[k]))[i]) for i, k in enumerate(left.argmin(axis=0))
+        float(_left(windows, still, int(lags[k]))[i]) for i, k in enumerate(left.argmin(axis=0))
     ]
     if explained > min(LEFT * other_axes * whole[reach], UNEXPLAINED * min(every, sum(later))):
         return
@@ -65,21 +68,14 @@ def refuse_lag(
     raise RefusedError(recording.name, found, expected=expected, remedy=remedy)
 
 
-def _left(windows: Windows, bias: FloatArray | None, lag: int) -> FloatArray:
-    """Squares (PARTS,) that are left where forces are `lag` windows later than rates.
-
-    All squares without a `bias`: nothing turns then.
-    """
+def _left(windows: Windows, turns: GravityTurns, lag: int) -> FloatArray:
+    """Squares (PARTS,) that are left where forces are `lag` windows later than rates."""
     count = len(windows.first)
     edge = round(LONGEST_S / WINDOW_S)
     at = np.arange(edge, count - 1 - edge) if count > 4 * edge else np.arange(abs(lag), count - 1)
     at = at[(at + lag >= 0) & (at + lag + 1 < count)]
     later = at + lag
-    whole = (windows.section[at] == windows.section[at + 1]) & gravity_alone(windows)[later]
-    force = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
-    rate = 0.0 * windows.rate if bias is None else windows.rate - bias
-    turn = (rate[at] + rate[at + 1]) / 2 * (windows.start_s[at + 1] - windows.start_s[at])[:, None]
-    miss = force[later + 1] - force[later]
-    miss -= np.einsum("nij,nj->ni", skew((force[later + 1] + force[later]) / 2), turn)
+    whole = turns.follows[at] & turns.alone[later]
+    miss = turns.change[later] - np.einsum("nij,nj->ni", turns.middle[later], turns.turn[at])
     square = np.where(whole, (miss**2).sum(axis=1), 0.0)
     return np.array([part.sum() for part in np.array_split(square, PARTS)])

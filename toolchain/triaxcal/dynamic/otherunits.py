@@ -24,7 +24,7 @@ PART = 0.5
 TIMES_SD = 10.0
 
 
-def refuse_other_angles(recording: ImuRecording, recorded: Recorded, known: Known) -> None:
+def refuse_other_misalignments(recording: ImuRecording, recorded: Recorded, known: Known) -> None:
     """Refuse recordings between which the misalignments change as those of no unit do.
 
     Raises

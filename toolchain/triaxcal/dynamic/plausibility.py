@@ -10,13 +10,17 @@ explain how the forces turn.
 from __future__ import annotations
 
 import math
-from itertools import permutations, product
 
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.blocks.attitude import skew
-from triaxcal.dynamic.halfway import gravity_alone, left_by_axes, refuse_change
+from triaxcal.dynamic.gravityturns import (
+    SIGNED_AXES,
+    GravityTurns,
+    gravity_turns,
+    signed_axes_matrices,
+)
+from triaxcal.dynamic.halfway import left_by_axes, refuse_change
 from triaxcal.dynamic.lagging import refuse_lag
 from triaxcal.dynamic.recording import ImuRecording
 from triaxcal.dynamic.windows import WINDOW_S, Windows
@@ -49,12 +53,12 @@ def refuse_wrong_units(recording: ImuRecording, windows: Windows) -> None:
     """
     start = _quietest(windows)
     _refuse_force(recording, np.median(windows.force[start], axis=0))
-    bias = np.median(windows.rate[start], axis=0)
-    left = left_by_axes(recording, windows, bias)
+    turns = gravity_turns(windows, np.median(windows.rate[start], axis=0))
+    left = left_by_axes(recording, windows, turns)
     if left is not None:
-        refuse_lag(recording, windows, bias, left.other_axes)
+        refuse_lag(recording, windows, turns, left.other_axes)
         refuse_change(recording, left)
-    _refuse_rate(recording, windows, bias)
+    _refuse_rate(recording, windows, turns)
 
 
 def _quietest(windows: Windows) -> slice:
@@ -85,42 +89,33 @@ def _refuse_force(recording: ImuRecording, force: FloatArray) -> None:
         )
 
 
-def rate_matrix(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """M (3, 3), true rate = M measured rate, and the turn of each gyro, shape (3,), rad.
+def _rate_matrix(rows: FloatArray, change: FloatArray, turned: FloatArray) -> FloatArray:
+    """M (3, 3), true rate = M measured rate.
 
     Columns of axes that hardly turned are those of the identity.
     """
-    rows, change, turned = _equations(windows, bias)
     seen = turned > 0.05 * turned.max() if turned.max() > 0 else np.zeros(3, dtype=bool)
     columns = np.tile(seen, 3)
     matrix = np.eye(3)
     if seen.any():
         solved = np.linalg.lstsq(rows[:, columns], change, rcond=None)[0]
         matrix[:, seen] = solved.reshape(3, -1)
-    return matrix, turned
+    return matrix
 
 
-def _equations(windows: Windows, bias: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rows (n, 9) and right sides (n,) of the equations of M, row by row; turns of the gyros."""
-    follows = gravity_alone(windows)
-    force = windows.force / np.linalg.norm(windows.force, axis=1)[:, None]
-    step = np.diff(windows.start_s)[:, None]
-    rate = (windows.rate - bias)[:-1] * 0.5 + (windows.rate - bias)[1:] * 0.5
-    middle = (force[1:] + force[:-1]) / 2
-    # f1 - f0 = -(M w) x f dt = [f] M w dt, a linear equation in the nine elements of M.
-    turn = rate * step
-    rows = np.einsum("nij,nk->nijk", skew(middle), turn).reshape(-1, 3, 9)[follows]
-    change = (force[1:] - force[:-1])[follows]
-    in_row = (np.diff(windows.first) > 0) & (np.diff(windows.section) == 0)
-    return rows.reshape(-1, 9), change.ravel(), np.abs(turn[in_row]).sum(axis=0)
+def _equations(turns: GravityTurns) -> tuple[FloatArray, FloatArray]:
+    """Rows (n, 9) and right sides (n,) of the equations of M, row by row."""
+    rows = np.einsum("nij,nk->nijk", turns.middle, turns.turn).reshape(-1, 3, 9)[turns.alone]
+    return rows.reshape(-1, 9), turns.change[turns.alone].ravel()
 
 
-def _shares(windows: Windows, bias: FloatArray, tried: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _shares(
+    rows: FloatArray, change: FloatArray, tried: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Of the squared turns of the forces: what each M (m, 3, 3) explains, and with which factor.
 
     The factor that explains most is not negative.
     """
-    rows, change, _ = _equations(windows, bias)
     M = tried.reshape(-1, 9)
     along = np.maximum(M @ (rows.T @ change), 0.0)
     size = np.maximum(np.einsum("mi,ij,mj->m", M, rows.T @ rows, M), 1e-300)
@@ -165,12 +160,12 @@ def _other_samples(rate_hz: float) -> dict[float, str]:
     }
 
 
-def _refuse_rate(recording: ImuRecording, windows: Windows, bias: FloatArray) -> None:
+def _refuse_rate(recording: ImuRecording, windows: Windows, turns: GravityTurns) -> None:
     name = recording.name
-    matrix, turned = rate_matrix(windows, bias)
-    axes = list(product(permutations(range(3)), product((1.0, -1.0), repeat=3)))
-    tried = np.array([np.diag(signs) @ np.eye(3)[list(order)] for order, signs in axes])
-    share, factor = _shares(windows, bias, np.concatenate([[matrix], tried]))
+    turned = np.abs(turns.turn[turns.follows]).sum(axis=0)  # by each gyro
+    rows, change = _equations(turns)
+    matrix = _rate_matrix(rows, change, turned)
+    share, factor = _shares(rows, change, np.concatenate([[matrix], signed_axes_matrices()]))
     if turned.max() >= LEAST_TURN_RAD and share[0] < EXPLAINED and share[1:].max() > MISSED:
         return
     if turned.max() < LEAST_TURN_RAD or share[0] < EXPLAINED:
@@ -179,7 +174,7 @@ def _refuse_rate(recording: ImuRecording, windows: Windows, bias: FloatArray) ->
     best = int(np.argmax(share[1:]))
     if share[1 + best] <= share[1] + CLEARLY:
         best = 0
-    order, signs = axes[best]
+    order, signs = SIGNED_AXES[best]
     # Axes that hardly turn spoil the first, a wrong bias the second; another unit is in both.
     sizes = float(np.median([abs(matrix[i, order[i]]) for i in range(3)])), float(factor[1 + best])
     size = min(sizes, key=lambda k: abs(math.log(max(k, 1e-300))))

@@ -12,7 +12,7 @@ from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
 from triaxcal.dynamic.missing import Effect, missing_effects
 from triaxcal.dynamic.observability import Observability, observability
-from triaxcal.dynamic.otherunits import refuse_other_angles
+from triaxcal.dynamic.otherunits import refuse_other_misalignments
 from triaxcal.dynamic.overtemperature import (
     OverTemperature,
     Solved,
@@ -104,7 +104,7 @@ def calibrate_described(unit: DynamicDescription, progress: Progress | None = No
     moved = temperatures if recording is whole else recorded_temperatures(recording)
     if over is not None and temperatures is not None and recording.starts_s:
         assert moved is not None
-        refuse_other_angles(recording, moved, over.over.known)
+        refuse_other_misalignments(recording, moved, over.over.known)
     differ = refuse_others(recordings_differ(recording, full, moved, functions))
     result = full if over is None else over.shown
     off = missing_effects(recording, full, lambda part: report("effects off", part))

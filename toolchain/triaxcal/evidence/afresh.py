@@ -10,8 +10,6 @@ from dataclasses import replace
 from typing import Any
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.blocks import north
-from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.calibrate import calibrate_dynamic
@@ -28,7 +26,7 @@ LEVER_ARM = "lever-arm"
 def solved_beside_the_axis(case: Case) -> Suspect | None:
     """The recording with a unit beside the table's axis; None without a table, or if it is on."""
     result = case.result
-    blocks = tuple(b for b in result.layout.blocks if b not in (*BASE, north.BLOCK))
+    blocks = case.chosen_blocks
     if not result.survey.stages or any(b.name == LEVER_ARM for b in blocks):
         return None
     unknown: dict[str, Any] = dict.fromkeys(result.estimated)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from triaxcal.dynamic.blocks import north
+from triaxcal.dynamic.blocks.base import BASE
+from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.calibrate import DynamicResult
 from triaxcal.dynamic.noise import DataSheet
 from triaxcal.dynamic.recording import ImuRecording
@@ -27,3 +30,8 @@ class Case:
     noise: DataSheet
     result: DynamicResult
     worst_sd: FloatArray | None = None
+
+    @property
+    def chosen_blocks(self) -> tuple[StateBlock, ...]:
+        """Blocks of the solution that [dynamic] blocks names: those that are always on are not."""
+        return tuple(b for b in self.result.layout.blocks if b not in (*BASE, north.BLOCK))

@@ -9,8 +9,6 @@ import numpy as np
 from scipy.stats import chi2
 
 from triaxcal.base.errors import RefusedError
-from triaxcal.dynamic.blocks import north
-from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.block import StateBlock
 from triaxcal.dynamic.calibrate import DynamicResult, calibrate_dynamic
 from triaxcal.dynamic.noise import DataSheet
@@ -93,7 +91,7 @@ class Change:
             gain = case.result.passes[-1].chi_square - biases[0]
             return only_biases if gain > chi2.isf(CHANCE, BIASES) else None
         result = case.result
-        blocks = tuple(b for b in result.layout.blocks if b not in (*BASE, north.BLOCK))
+        blocks = case.chosen_blocks
         degc = result.frame.reference_degc
         try:
             parts = halves(case.recording, case.noise, blocks, jump.at_s, degc)
@@ -143,7 +141,7 @@ def largest_jump(found: Survey, noise: DataSheet) -> Jump | None:
     """Where the gyros' means at rest change most, over the windows at rest; None for a small one.
 
     The two means before and after each window differ by noise of N^2 (1/T1 + 1/T2) an axis. A slow
-    drift makes them differ as well. It is told from a jump by what both explain of the squares.
+    drift makes them differ as well. What each explains of the squares decides which of the two it is.
     """
     windows = found.windows
     still = np.flatnonzero(at_rest(found))

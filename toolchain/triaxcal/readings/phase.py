@@ -2,7 +2,7 @@
 
 A stamp is a whole number of steps and a jitter. So exp(2 pi i t / step) has the same phase for all
 rows, however many were lost between them; its mean over some hundred rows is the phase of the
-clock, and its size tells the jitter. What is left of each stamp about this phase is a whole number
+clock, and its size shows the jitter. What is left of each stamp about this phase is a whole number
 and jitter, and the most likely rising numbers are found for all rows at once (Viterbi, IEEE
 Transactions on Information Theory 13, 1967).
 """
