@@ -141,7 +141,7 @@ def largest_jump(found: Survey, noise: DataSheet) -> Jump | None:
     """Where the gyros' means at rest change most, over the windows at rest; None for a small one.
 
     The two means before and after each window differ by noise of N^2 (1/T1 + 1/T2) an axis. A slow
-    drift makes them differ as well. What each explains of the squares decides which of the two it is.
+    drift makes them differ as well. What each of the two explains of the squares decides.
     """
     windows = found.windows
     still = np.flatnonzero(at_rest(found))
