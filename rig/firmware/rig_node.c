@@ -2,7 +2,8 @@
  * rig_node.c - the generated compensation as a node on the rig's bus.
  *
  * Takes RIG_TEMP, RIG_XY and RIG_Z, or RIG_FD, and answers each sample with COMP_X, COMP_Y, COMP_Z
- * of its sequence number's low byte. Frames are packed and unpacked by the code that cantools makes
+ * of its sequence number's low byte; built with RIG_NODE_ANGLES, for a unit whose delivery has
+ * triax_angles, with COMP_ANGLE_0 and COMP_ANGLE_1 behind them. Frames are packed and unpacked by the code that cantools makes
  * of tilter.dbc; frames with a wrong CRC or length are passed over.
  *
  *     rig_node socket 7    on an inherited socket that carries struct can_frame and canfd_frame
@@ -33,6 +34,9 @@
 #include "tilter.h"
 #include "triax_calib.h"
 #include "triax_comp.h"
+#ifdef RIG_NODE_ANGLES
+#include "triax_angles.h"
+#endif
 
 typedef struct {
     int socket;
@@ -65,11 +69,11 @@ static int send_frame(const node_t *node, uint32_t id, uint8_t payload[8])
     }
 }
 
-static int answer(const node_t *node, uint8_t sequence, const int32_t accel[3], uint32_t status)
+static int answer_accel(const node_t *node, uint8_t sequence, const int32_t accel[3], uint16_t status)
 {
-    struct tilter_comp_x_t x = {0U, sequence, accel[0], (uint16_t)status};
-    struct tilter_comp_y_t y = {0U, sequence, accel[1], (uint16_t)status};
-    struct tilter_comp_z_t z = {0U, sequence, accel[2], (uint16_t)status};
+    struct tilter_comp_x_t x = {0U, sequence, accel[0], status};
+    struct tilter_comp_y_t y = {0U, sequence, accel[1], status};
+    struct tilter_comp_z_t z = {0U, sequence, accel[2], status};
     uint8_t payload[8];
 
     (void)tilter_comp_x_pack(payload, &x, sizeof payload);
@@ -82,6 +86,38 @@ static int answer(const node_t *node, uint8_t sequence, const int32_t accel[3], 
     }
     (void)tilter_comp_z_pack(payload, &z, sizeof payload);
     return send_frame(node, TILTER_COMP_Z_FRAME_ID, payload);
+}
+
+#ifdef RIG_NODE_ANGLES
+static int answer_angles(const node_t *node, uint8_t sequence, const triax_angle_t angle[2], uint16_t status)
+{
+    struct tilter_comp_angle_0_t first = {0U, sequence, (uint32_t)angle[0], status};
+    struct tilter_comp_angle_1_t second = {0U, sequence, (uint32_t)angle[1], status};
+    uint8_t payload[8];
+
+    (void)tilter_comp_angle_0_pack(payload, &first, sizeof payload);
+    if (send_frame(node, TILTER_COMP_ANGLE_0_FRAME_ID, payload) != 0) {
+        return -1;
+    }
+    (void)tilter_comp_angle_1_pack(payload, &second, sizeof payload);
+    return send_frame(node, TILTER_COMP_ANGLE_1_FRAME_ID, payload);
+}
+#endif
+
+/* All frames of a sample carry one status. */
+static int answer(const node_t *node, uint8_t sequence, const int32_t accel[3], uint32_t status)
+{
+#ifdef RIG_NODE_ANGLES
+    triax_angle_t angle[2];
+
+    status |= triax_angles(accel, angle);
+    if (answer_accel(node, sequence, accel, (uint16_t)status) != 0) {
+        return -1;
+    }
+    return answer_angles(node, sequence, angle, (uint16_t)status);
+#else
+    return answer_accel(node, sequence, accel, (uint16_t)status);
+#endif
 }
 
 static int take(node_t *node, const struct can_frame *frame)

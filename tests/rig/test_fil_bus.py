@@ -248,7 +248,7 @@ def test_one_bit_is_noticed(delivery: Delivery) -> None:
     text = refused(*before, *results(2, (x, y, z), int(status[0]) ^ 4), after, routine=routine)
     assert "status 4; expected" in text
     text = refused(*before, *results(2, (x, y, z), 0, 0, 1), after, routine=routine)
-    assert text.startswith("sample 0: the axes of a sample differ in status")
+    assert text.startswith("sample 0: the results of a sample differ in status")
 
 
 def test_another_unit_is_refused() -> None:

@@ -9,18 +9,25 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.shipped import shipped
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.compilers import find_compiler
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.codegen.shim import write_shim
+from triaxcal.delivery.firmware import Firmware
 from triaxcal.delivery.unit import deliver
+from triaxcal.fixedpoint.angles import TURN, angles
 from triaxcal.rig.description.dbc import read_dbc
 from triaxcal.rig.node.fil import (
     CODE_BITS,
     NODE_SOURCES,
     Agreement,
+    Int32Array,
+    Results,
+    Routine,
     exchange,
     layout_of,
     packing_source,
@@ -55,7 +62,8 @@ def firmware_in_the_loop(
         )
     delivery = deliver(setup.folder)
     plan = delivery.plan
-    routine, dbc = python_routine(plan), read_dbc(setup.rig.bus_file)
+    routine, angles_plan = routine_of(delivery.firmware), delivery.firmware.angles
+    dbc = read_dbc(setup.rig.bus_file, angles=angles_plan is not None)
     with contextlib.ExitStack() as stack:
         if bus is None:
             folder = stack.enter_context(tempfile.TemporaryDirectory())
@@ -69,6 +77,21 @@ def firmware_in_the_loop(
             return listen(port, dbc, samples, routine, setup.unit.serial)
         temps, raw = vectors(samples, (plan.temp_min_code, plan.temp_max_code), seed, bits)
         return exchange(port, dbc, temps, raw, routine, layout)
+
+
+def routine_of(firmware: Firmware) -> Routine:
+    """What Python expects of a node with this firmware, angles and their status included."""
+    routine, plan = python_routine(firmware.plan), firmware.angles
+    if plan is None:
+        return routine
+
+    def run(temp: Int32Array, raw: Int32Array) -> Results:
+        accel, status = routine(temp, raw)
+        angle, flags = angles(plan, accel.astype(np.int64))
+        values = np.concatenate([accel.astype(np.int64), angle % TURN], axis=1)
+        return values, np.bitwise_or(status, flags.astype(np.uint32))
+
+    return run
 
 
 def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
@@ -92,7 +115,16 @@ def build_node(folder: Path, files: dict[str, bytes], setup: Setup) -> Path:
     ]
     include = [folder, *write_shim(folder / "names", setup.unit.prefix), ours]
     compiler = find_compiler()
-    command = [*compiler.command, *FLAGS, *(f"-I{path}" for path in include), "-o", str(program)]
+    has_angles = any(name.endswith("_angles.c") for name in files)
+    defined = ["-DRIG_NODE_ANGLES"] if has_angles else []
+    command = [
+        *compiler.command,
+        *FLAGS,
+        *defined,
+        *(f"-I{path}" for path in include),
+        "-o",
+        str(program),
+    ]
     done = subprocess.run(
         [*command, *map(str, sources)], capture_output=True, text=True, check=False
     )

@@ -35,6 +35,10 @@ REQUIRED = MappingProxyType(
     }
 )  # fmt: skip
 """Messages that the node needs, and their signals."""
+OF_ANGLES = MappingProxyType(
+    dict.fromkeys(("COMP_ANGLE_0", "COMP_ANGLE_1"), ("Crc", "Sequence", "Angle", "Status"))
+)
+"""Those of a node that gives angles too."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +93,8 @@ def default_dbc() -> Path:
     return shipped("rig") / "tilter.dbc"
 
 
-def read_dbc(path: Path) -> RigDbc:
-    """Read and check the DBC of a node.
+def read_dbc(path: Path, *, angles: bool = False) -> RigDbc:
+    """Read and check the DBC of a node, of one that gives `angles` or does not.
 
     Raises
     ------
@@ -100,10 +104,11 @@ def read_dbc(path: Path) -> RigDbc:
     """
     file = read_bus_file(path)
     found = {layout.name: layout for layout in file.layouts()}
-    missing = [f"message {name}" for name in REQUIRED if name not in found]
+    required = {**REQUIRED, **(OF_ANGLES if angles else {})}
+    missing = [f"message {name}" for name in required if name not in found]
     missing += [
         f"signal {name}.{s}"
-        for name, signals in REQUIRED.items()
+        for name, signals in required.items()
         if name in found
         for s in signals
         if s not in found[name].signals
@@ -115,7 +120,7 @@ def read_dbc(path: Path) -> RigDbc:
             expected="the messages of rig/tilter.dbc",
             remedy="use the DBC of this node",
         )
-    frames = {name: NodeFrame(**vars(found[name])) for name in REQUIRED}
+    frames = {name: NodeFrame(**vars(found[name])) for name in required}
     for frame in frames.values():
         _refuse_unprotected(path, frame)
     return RigDbc(path, file.sha256, MappingProxyType(frames))

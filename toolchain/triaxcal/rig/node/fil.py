@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,13 +15,15 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.model.types import IntArray
 from triaxcal.rig.bus.frames import Frames, UintArray, concatenate
 from triaxcal.rig.description.busfile import read_bus_file
-from triaxcal.rig.description.dbc import NodeFrame, RigDbc
+from triaxcal.rig.description.dbc import OF_ANGLES, NodeFrame, RigDbc
 from triaxcal.rig.description.description import RigDescription
 from triaxcal.rig.sources.port import Port
 
 Int32Array = npt.NDArray[np.int32]
-Routine = Callable[[Int32Array, Int32Array], tuple[Int32Array, UintArray]]
-"""Temperature codes (n,) and raw codes (n, 3) to accelerations (n, 3) and status (n,)."""
+Results = tuple[IntArray | Int32Array, UintArray]
+"""Accelerations (n, 3), or these and both angles modulo a turn (n, 5), and status (n,)."""
+Routine = Callable[[Int32Array, Int32Array], Results]
+"""Temperature codes (n,) and raw codes (n, 3) to results."""
 
 NODE_SOURCES = ("rig_node.c", "rig_e2e.c")
 BATCH = 64
@@ -62,6 +64,12 @@ def packing_source(dbc: RigDbc) -> dict[str, str]:
     )
     named = rf" * @brief Made by cantools of {dbc.path.name}, SHA-256 {dbc.sha256[:16]}."
     return {"tilter.h": _DATED.sub(named, header), "tilter.c": _DATED.sub(named, source)}
+
+
+def result_signals(dbc: RigDbc) -> dict[str, str]:
+    """Messages with a result of a sample, in the order of results, and the signal that has it."""
+    accel = dict.fromkeys(("COMP_X", "COMP_Y", "COMP_Z"), "Accel")
+    return accel | {name: "Angle" for name in OF_ANGLES if name in dbc.messages}
 
 
 @dataclass(frozen=True)
@@ -159,26 +167,21 @@ def _as_frames(layout: NodeFrame, values: dict[str, IntArray]) -> Frames:
     return layout.frames(values, np.zeros(len(values["Sequence"]), np.int64))
 
 
-def _answers(port: Port, dbc: RigDbc, count: int, first: int) -> tuple[Int32Array, UintArray]:
-    """Accelerations (count, 3) and status (count,) that the node answers."""
-    names = ("COMP_X", "COMP_Y", "COMP_Z")
+def _answers(port: Port, dbc: RigDbc, count: int, first: int) -> Results:
+    """What the node answers."""
+    names = result_signals(dbc)
     ids = [dbc.messages[name].frame_id for name in names]
     parts: list[Frames] = []
     end = time.monotonic() + ANSWER_S
-    while (there := sum(map(len, parts))) < 3 * count:
+    while (there := sum(map(len, parts))) < len(names) * count:
         came = port.receive(max(0.0, end - time.monotonic()))
         if not len(came):
-            raise RefusedError(
-                f"sample {first + there // 3}",
-                "the node has not answered",
-                expected=f"3 frames within {ANSWER_S:g} s",
-                remedy="look at the node, or at the output of rig_node",
-            )
+            raise _unanswered(dbc, names, parts, first + there // len(names))
         parts.append(came.take(np.isin(came.can_id, ids)))
     frames = concatenate(parts)
-    accel = np.zeros((count, 3), np.int32)
-    status = np.zeros((count, 3), np.uint32)
-    for axis, name in enumerate(names):
+    values = np.zeros((count, len(names)), np.int64)
+    status = np.zeros((count, len(names)), np.uint32)
+    for column, (name, signal) in enumerate(names.items()):
         layout = dbc.messages[name]
         mine = frames.take(frames.can_id == layout.frame_id)
         sequence = layout.raw("Sequence", mine.data)
@@ -189,19 +192,35 @@ def _answers(port: Port, dbc: RigDbc, count: int, first: int) -> tuple[Int32Arra
                 f"{len(mine)} frames {name}, not all of them valid and in order",
                 expected=f"{count}",
             )
-        accel[:, axis] = layout.raw("Accel", mine.data)
-        status[:, axis] = layout.raw("Status", mine.data)
+        values[:, column] = layout.raw(signal, mine.data)
+        status[:, column] = layout.raw("Status", mine.data)
     if (status != status[:, :1]).any():
-        raise RefusedError(f"samples from {first}", "the axes of a sample differ in status")
-    return accel, status[:, 0]
+        raise RefusedError(f"samples from {first}", "the results of a sample differ in status")
+    return values, status[:, 0]
+
+
+def _unanswered(
+    dbc: RigDbc, names: Iterable[str], parts: list[Frames], sample: int
+) -> RefusedError:
+    came = {int(i) for part in parts for i in part.can_id}
+    absent = [name for name in names if dbc.messages[name].frame_id not in came]
+    partly = bool(came and absent)
+    return RefusedError(
+        f"sample {sample}",
+        f"no {', '.join(absent)} has come" if partly else "the node has not answered",
+        expected=f"{len(list(names))} frames within {ANSWER_S:g} s",
+        remedy="send the angles too: rig_node.c with RIG_NODE_ANGLES does"
+        if partly and set(absent) <= set(OF_ANGLES)
+        else "look at the node, or at the output of rig_node",
+    )
 
 
 def refuse_difference(
     first: int,
     temp: Int32Array,
     codes: Int32Array,
-    found: tuple[Int32Array, UintArray],
-    expected: tuple[Int32Array, UintArray],
+    found: Results,
+    expected: Results,
 ) -> None:
     """Refuse results and status `found` that are not those expected, at the first that differs.
 

@@ -1,9 +1,9 @@
 """A node with a sensor of its own: its raw codes and its results, bit for bit.
 
 The node sends RIG_TEMP, RIG_XY and RIG_Z, or RIG_FD, as every unit on the bench does, and COMP_X,
-COMP_Y and COMP_Z with the same Sequence behind them. The temperature is that of the last RIG_TEMP
-before RIG_Z. When one of them is lost, which only its successor's Sequence shows, the samples
-between are not compared.
+COMP_Y and COMP_Z with the same Sequence behind them, and COMP_ANGLE_0 and COMP_ANGLE_1 if the unit
+has angles. The temperature is that of the last RIG_TEMP before RIG_Z. When one of them is lost,
+which only its successor's Sequence shows, the samples between are not compared.
 """
 
 from __future__ import annotations
@@ -17,17 +17,21 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.rig.bus.frames import Frames
 from triaxcal.rig.description.dbc import RigDbc
 from triaxcal.rig.description.identity import serial_crc
-from triaxcal.rig.node.fil import ANSWER_S, Agreement, Routine, refuse_difference
+from triaxcal.rig.node.fil import (
+    ANSWER_S,
+    Agreement,
+    Routine,
+    refuse_difference,
+    result_signals,
+)
 from triaxcal.rig.sources.port import Port
 
-_RESULTS = ("COMP_X", "COMP_Y", "COMP_Z")
 _SIGNALS = {
     "RIG_XY": ("Sequence", "AccelX", "AccelY"),
     "RIG_Z": ("Sequence", "AccelZ"),
     "RIG_TEMP": ("Sequence", "TempCode"),
     "RIG_FD": ("Sequence", "AccelX", "AccelY", "AccelZ", "TempCode"),
     "RIG_IDENT": ("Sequence", "SerialCrc"),
-    **dict.fromkeys(_RESULTS, ("Sequence", "Accel", "Status")),
 }
 _TURN = 256
 """Sequence of the results is one byte."""
@@ -69,12 +73,17 @@ class Pairing:
         Samples of which a frame did not come.
     spoiled : int
         Frames with a wrong length or CRC.
+    results : tuple of str
+        Messages with the results of a sample.
     """
 
     def __init__(self, dbc: RigDbc, serial: str) -> None:
         self.whole: list[Whole] = []
         self.seen = self.lost = self.spoiled = 0
-        self._layouts = {dbc.messages[name].frame_id: dbc.messages[name] for name in _SIGNALS}
+        self.results = tuple(result_signals(dbc))
+        results = {n: ("Sequence", s, "Status") for n, s in result_signals(dbc).items()}
+        self._signals = {**_SIGNALS, **results}
+        self._layouts = {dbc.messages[n].frame_id: dbc.messages[n] for n in self._signals}
         self._serial = serial
         self._temp: _Temperature | None = None
         self._xy: tuple[int, int, int] | None = None
@@ -97,7 +106,7 @@ class Pairing:
             if not good.any():
                 continue
             data = mine.data[good]
-            table = [layout.raw(signal, data) for signal in _SIGNALS[layout.name]]
+            table = [layout.raw(signal, data) for signal in self._signals[layout.name]]
             columns = np.column_stack(table).tolist()
             rows += zip(places[good].tolist(), [layout.name] * len(columns), columns, strict=True)
         for _, name, values in sorted(rows):
@@ -146,13 +155,13 @@ class Pairing:
             del self._open[late]
         self._open[sequence] = _Sample(temp, raw)
 
-    def _result(self, name: str, sequence: int, accel: int, status: int) -> None:
+    def _result(self, name: str, sequence: int, value: int, status: int) -> None:
         sample = self._open.get(sequence)
         if sample is None:
             return
-        sample.results[name] = accel, status
-        if len(sample.results) == len(_RESULTS):
-            found = [sample.results[axis] for axis in _RESULTS]
+        sample.results[name] = value, status
+        if len(sample.results) == len(self.results):
+            found = [sample.results[each] for each in self.results]
             answer = [a for a, _ in found], [s for _, s in found]
             self._keep(sample.temp, (sample.temp.code, sample.raw, *answer))
             del self._open[sequence]
@@ -188,12 +197,12 @@ def listen(port: Port, dbc: RigDbc, samples: int, routine: Routine, serial: str)
     whole = pairing.whole[:samples]
     temp = np.array([w[0] for w in whole], np.int32)
     raw = np.array([w[1] for w in whole], np.int32)
-    accel = np.array([w[2] for w in whole], np.int32)
+    values = np.array([w[2] for w in whole], np.int64)
     status = np.array([w[3] for w in whole], np.uint32)
     apart = np.flatnonzero((status != status[:, :1]).any(axis=1))
     if len(apart):
-        raise RefusedError(f"sample {apart[0]}", "the axes of a sample differ in status")
-    refuse_difference(0, temp, raw, (accel, status[:, 0]), routine(temp, raw))
+        raise RefusedError(f"sample {apart[0]}", "the results of a sample differ in status")
+    refuse_difference(0, temp, raw, (values, status[:, 0]), routine(temp, raw))
     return Agreement(len(whole), time.monotonic() - start, pairing.lost)
 
 
@@ -204,6 +213,6 @@ def _silent(pairing: Pairing) -> RefusedError:
     return RefusedError(
         "the node",
         f"{found}, and no more for {ANSWER_S:g} s",
-        expected="RIG_TEMP, RIG_XY and RIG_Z (or RIG_FD), then COMP_X, COMP_Y and COMP_Z",
+        expected=f"RIG_TEMP, RIG_XY and RIG_Z (or RIG_FD), then {', '.join(pairing.results)}",
         remedy="a node without a sensor of its own is asked: leave --listen out",
     )
