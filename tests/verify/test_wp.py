@@ -114,7 +114,8 @@ FAULTS = {
     "a coefficient taken twice": ("evaluate", "horner_step(c[0]", "horner_step(c[1]"),
     "the row of another axis": ("evaluate_column", "coefficient[4u + j]", "coefficient[3u + j]"),
     "one column too few": (
-        "evaluate_rows", "j < 4u; j++) {\n        evaluate", "j < 3u; j++) {\n        evaluate",
+        "evaluate_rows", "j < 4u; j++) {\n        /*@ assert same",
+        "j < 3u; j++) {\n        /*@ assert same",
     ),
     "x from the wrong side": ("x_q31_of", "(code - segment", "(-code - segment"),
     "a clamp at the other end": (

@@ -26,8 +26,10 @@ SHAPES = {
         order=2, segments=3, raw=(0, 2**12 - 1)
     ),
     "constants": integer_shape(order=0),
+    "order 4": integer_shape(order=4),
+    "order 5, 32 bits, two segments": integer_shape(order=5, segments=2, raw=(-(2**31), 2**31 - 1)),
 }
-CUBIC, ODD, CONSTANT = (list(SHAPES)[i] for i in (0, 1, 3))
+CUBIC, ODD, CONSTANT, FIFTH = (list(SHAPES)[i] for i in (0, 1, 3, 5))
 
 
 def workspace(shape: Shape, folder: Path) -> Workspace:
@@ -95,6 +97,29 @@ FAULTS = {
     "y tested twice": (ODD, C, "apply", "above_min(uz) > 1", "above_min(uy) > 1"),
     "a column left out": (CONSTANT, C, "copy_rows", "j < 4u; j", "j < 3u; j"),
     "a row of another axis": (CONSTANT, C, "copy_rows", "(4u * i) + j", "(3u * i) + j"),
+    "a coefficient left out": (FIFTH, C, "evaluate", "p = c[5]", "p = c[4]"),
+    "a coefficient of another order": (FIFTH, C, "evaluate", "c[4], x_q31, p", "c[3], x_q31, p"),
+    "a column of another axis": (
+        FIFTH,
+        C,
+        "evaluate_column",
+        "evaluate(segment->coefficient[8u + j]",
+        "evaluate(segment->coefficient[4u + j]",
+    ),
+    "specification: a step left out": (
+        FIFTH,
+        SPECIFICATION,
+        "evaluate",
+        "step(c4, x, value_5(c5, x))",
+        "value_5(c5, x)",
+    ),
+    "specification: a step without its limit": (
+        FIFTH,
+        SPECIFICATION,
+        "evaluate",
+        "bound_4(c4, c5) <= 2147483647 && ",
+        "",
+    ),
     "specification: the maximum flagged": (
         CUBIC,
         SPECIFICATION,

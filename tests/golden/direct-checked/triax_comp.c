@@ -64,7 +64,7 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
 }
 
 /*@ requires \valid(row + (0 .. 2)) && \valid_read(segment) && \separated(row + (0 .. 2), segment);
-    requires functions_fit(segment) && 0 <= j < 4;
+    requires 0 <= j < 4 && horner_fits(&segment->coefficient[j][0]) && horner_fits(&segment->coefficient[4 + j][0]) && horner_fits(&segment->coefficient[8 + j][0]);
     assigns (&row[0][0])[0 .. 11];
     ensures row[0][j] == \old(polynomial(&segment->coefficient[j][0], x_q31));
     ensures \forall integer k; 0 <= k < j ==> row[0][k] == \old(row[0][k]);

@@ -37,7 +37,7 @@ def not_covered(shape: Shape) -> str:
         "the inverse form": shape.inverse is not None,
         "terms added to the sums": shape.adds_to_sums,
         "a term in dT/dt": shape.rate,
-        "functions of order 4 and above": shape.order > 3,
+        "functions of order 6 and above": shape.order > 5,
         "saturating results of raw codes of fewer than 32 bits": shape.saturates and narrow,
         "sums of high words": shape.high_words,
     }
