@@ -35,7 +35,7 @@ def not_covered(shape: Shape) -> str:
     narrow = shape.raw_max - shape.raw_min != 2**32 - 1
     parts = {
         "the inverse form": shape.inverse is not None,
-        "terms added to the sums": shape.adds_to_sums,
+        "quadratic terms": shape.quadratic,
         "a term in dT/dt": shape.rate,
         "functions of order 6 and above": shape.order > 5,
         "saturating results of raw codes of fewer than 32 bits": shape.saturates and narrow,

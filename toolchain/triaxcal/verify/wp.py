@@ -71,9 +71,11 @@ class Place:
     config: Mapping[str, str]
 
 
+_FOLLOWING = ("row_bounded_of", "words_fit_of", "column_still", "terms_still")
+"""Lemmas that follow from other lemmas."""
 _LEMMAS = (
     Part((), "specification.h", ("-wp-prop=@lemma",)),
-    Part((), "opaque.h", ("-wp-prop=row_bounded_of,words_fit_of",)),
+    Part((), "opaque.h", ("-wp-prop=" + ",".join(_FOLLOWING),)),
 )
 
 
