@@ -119,7 +119,7 @@ class Positioner:
     Attributes
     ----------
     angles
-        Angles of the positions. Without them it is told the position's number: TP1 to TP6 are 1 to
+        Angles of the positions. Without them it gets the position's number: TP1 to TP6 are 1 to
         6, CP1 to CP6 7 to 12.
     tolerance_deg
         It has arrived when each angle that it answers is this near, whole turns apart.
