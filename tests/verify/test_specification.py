@@ -11,15 +11,25 @@ import random
 import re
 import struct
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from plans import COVERING, ROW_LIMIT, integer_shape, random_plan, vectors
+from plans import (
+    COVERING,
+    ROW_LIMIT,
+    ROW_LIMIT_QUADRATIC,
+    integer_plan,
+    integer_shape,
+    random_plan,
+    random_rows,
+    vectors,
+)
 from triaxcal.codegen.image import constant_words, image_bytes
-from triaxcal.codegen.image_cases import layout_of
+from triaxcal.codegen.image_cases import SENSITIVITY_LIMIT, layout_of
 from triaxcal.codegen.image_edges import image_edges
 from triaxcal.codegen.render import render_routine, specification
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
@@ -37,8 +47,28 @@ WRITTEN = {
 
 SEGMENTED = "two segments, 24-bit codes"
 WRITTEN[SEGMENTED] = integer_shape(segments=2, order=2)
+WRITTEN |= {
+    "gyro": replace(integer_shape(order=2), gyro=True),
+    "gyro, two segments, 32-bit codes": replace(
+        integer_shape(segments=2, order=1, raw=(INT32_MIN, INT32_MAX)), gyro=True
+    ),
+    "gyro, saturating, order 0": replace(integer_shape(order=0, output_shift=31), gyro=True),
+}
 
 Definitions = dict[str, Callable[..., Any]]
+
+
+def plan_of(name: str) -> Plan:
+    """Random constants of a shape within step R; a gyro's rows leave room for the force."""
+    rng = random.Random(name)
+    shape = WRITTEN[name]
+    if not shape.gyro:
+        return random_plan(rng, shape)
+    rows = [random_rows(rng, shape.order, full=True, limit=ROW_LIMIT_QUADRATIC)] * shape.segments
+    words = np.array([[rng.choice((-1, 1)) * (SENSITIVITY_LIMIT // 3)] * 3 for _ in range(3)])
+    return replace(
+        integer_plan(shape, rows), sensitivity=words, real_sensitivity=words * 1.0, force_q=24
+    )
 
 
 def defined(plan: Plan) -> Definitions:
@@ -46,7 +76,8 @@ def defined(plan: Plan) -> Definitions:
     header = next(text for name, text in render_routine(plan).items() if name.endswith("comp.h"))
     lines = re.findall(r"^#define (TRIAX_\w+) (\([-\d ]+\)|\d+)u?(?: .*)?$", header, re.MULTILINE)
     macros = {name: _sum_of(value) for name, value in lines}
-    assert {"TRIAX_RAW_MIN", "TRIAX_RAW_MAX", "TRIAX_SEGMENTS"} <= set(macros)
+    triad = "TRIAX_GYRO" if plan.shape.gyro else "TRIAX"
+    assert {f"{triad}_RAW_MIN", f"{triad}_RAW_MAX", f"{triad}_SEGMENTS"} <= set(macros)
     return definitions(specification(plan, opaque=False), macros)
 
 
@@ -66,38 +97,46 @@ def constants_of(words: Sequence[int], shape: Shape) -> Pointer:
             SimpleNamespace(first_code=first, origin_code=origin, gain=gain, coefficient=rows)
         )
     low, high = words[:2]
-    return Pointer([SimpleNamespace(temp_min_code=low, temp_max_code=high, segment=segments)])
+    calib = SimpleNamespace(temp_min_code=low, temp_max_code=high, segment=segments)
+    if shape.gyro:
+        terms = words[2 + shape.segments * step :]
+        calib.sensitivity = [list(terms[3 * i : 3 * i + 3]) for i in range(3)]
+    return Pointer([calib])
 
 
 def states_of(plan: Plan, codes: Sequence[int]) -> Iterator[tuple[Pointer, int]]:
     """The model's state and status at each temperature code."""
     state, status = set_temperature(plan, np.array(codes, dtype=np.int64))
     rows = np.concatenate([state.gain, state.offset[:, :, None]], axis=2).tolist()
+    sensitivity = [] if plan.sensitivity is None else plan.sensitivity.tolist()
     for row, bits in zip(rows, status.tolist(), strict=True):
-        yield Pointer([SimpleNamespace(row=row)]), bits
+        yield Pointer([SimpleNamespace(row=row, sensitivity=sensitivity)]), bits
 
 
 def compare_results(name: str) -> None:
     """States, status and results of one shape, at limits and at random."""
-    shape = WRITTEN[name]
+    shape, plan = WRITTEN[name], plan_of(name)
     rng = random.Random(name)
-    plan = random_plan(rng, shape)
     spec = defined(plan)
+    quarter = (ROW_LIMIT_QUADRATIC if shape.adds_to_sums else ROW_LIMIT) // 4
     temps, raws = vectors(plan, rng, 200)
     calib = constants_of(constant_words(plan), shape)
     assert spec["calib_fits"](calib)
     state, _ = set_temperature(plan, np.array(temps, dtype=np.int64))
-    results, flags = apply(plan, state, np.array(raws, dtype=np.int64))
-    pairs = zip(temps, raws, states_of(plan, temps), results.tolist(), flags.tolist(), strict=True)
-    for temp, raw, (state_at, status), result, flag in pairs:
+    ends = [INT32_MIN, -1, 0, 1, INT32_MAX]
+    forces = [[rng.choice([*ends, rng.randint(-(2**25), 2**25)]) for _ in range(3)] for _ in temps]
+    codes, force = (np.array(rows, dtype=np.int64) for rows in (raws, forces))
+    results, flags = (part.tolist() for part in apply(plan, state, codes, force))
+    samples = zip(temps, raws, forces, states_of(plan, temps), results, flags, strict=True)
+    for temp, raw, force_at, (state_at, status), result, flag in samples:
         clamped = min(max(temp, plan.temp_min_code), plan.temp_max_code)
         assert spec["temperature_status"](calib, temp) == status
         assert spec["state_is"](state_at, calib, clamped)
         rows = state_at[0].row
         assert spec["state_fits"](Pointer(rows))
         for i, row in enumerate(rows):
-            n, m = ROW_LIMIT // 4, (-1) ** i * ((ROW_LIMIT // 4 - 1) // 2)
-            kept, row[:] = row[:], [n, -n, n, m]
+            offset = (-1) ** i * ((quarter - 1) // 2)
+            kept, row[:] = row[:], [quarter, -quarter, quarter, offset]
             assert spec["state_fits"](Pointer(rows))
             row[1] -= 2
             assert not spec["state_fits"](Pointer(rows))
@@ -107,8 +146,14 @@ def compare_results(name: str) -> None:
         assert not spec["state_is"](state_at, calib, clamped)
         rows[i][j] -= 1
         u = [spec["code_of"](code) for code in raw]
-        assert [spec["result"](Pointer(row), *u) for row in rows] == result
-        exact = [spec["exact"](Pointer(row), *u) for row in rows]
+        more: list[tuple[int, ...]] = [()] * 3
+        if shape.gyro:
+            assert spec["terms_are"](state_at, calib)
+            assert spec["terms_fit"](Pointer(state_at[0].sensitivity))
+            more = [(spec["added"](Pointer(k), *force_at),) for k in state_at[0].sensitivity]
+        pairs = list(zip(rows, more, strict=True))
+        assert [spec["result"](Pointer(row), *u, *also) for row, also in pairs] == result
+        exact = [spec["exact"](Pointer(row), *u, *also) for row, also in pairs]
         expected = spec["raw_status"](*raw)
         expected += spec["saturated_status"](*exact) if shape.saturates else 0
         assert expected == flag
@@ -131,8 +176,7 @@ def test_every_code_of_a_range(name: str) -> None:
 
 def compare_constants(name: str) -> None:
     """What is accepted, at every limit of the image, and one beyond."""
-    shape = WRITTEN[name]
-    plan = random_plan(random.Random(name), shape)
+    shape, plan = WRITTEN[name], plan_of(name)
     fits = defined(plan)["calib_fits"]
     layout = layout_of(plan)
     image = image_bytes(plan)
