@@ -38,11 +38,7 @@ from triaxcal.fixedpoint.shape import Shape
 from verify.acsl import Pointer, definitions, quotient
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
-WRITTEN = {
-    name: shape
-    for name, shape in COVERING.items()
-    if not (shape.quadratic or shape.high_words or shape.rate)
-}
+WRITTEN = {name: shape for name, shape in COVERING.items() if not (shape.quadratic or shape.rate)}
 """Shapes whose specification is written."""
 
 SEGMENTED = "two segments, 24-bit codes"

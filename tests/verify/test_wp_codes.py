@@ -28,8 +28,9 @@ SHAPES = {
     "constants": integer_shape(order=0),
     "order 4": integer_shape(order=4),
     "order 5, 32 bits, two segments": integer_shape(order=5, segments=2, raw=(-(2**31), 2**31 - 1)),
+    "sums of high words": integer_shape(order=0, high_words=True, raw=(-8_000_000, 8_200_000)),
 }
-CUBIC, ODD, CONSTANT, FIFTH = (list(SHAPES)[i] for i in (0, 1, 3, 5))
+CUBIC, ODD, CONSTANT, FIFTH, HIGH = (list(SHAPES)[i] for i in (0, 1, 3, 5, 6))
 
 
 def workspace(shape: Shape, folder: Path) -> Workspace:
@@ -105,6 +106,35 @@ FAULTS = {
         "evaluate_column",
         "evaluate(segment->coefficient[8u + j]",
         "evaluate(segment->coefficient[4u + j]",
+    ),
+    "a high word of another product": (
+        HIGH,
+        C,
+        "apply_row",
+        "times(row[1], uy)",
+        "times(row[1], ux)",
+    ),
+    "an offset subtracted from high words": (HIGH, C, "apply_row", "z + row[3]", "z - row[3]"),
+    "the whole product for its high word": (
+        HIGH,
+        C,
+        "apply_row",
+        "z = high_word(times(row[2], uz))",
+        "z = (int32_t)times(row[2], uz)",
+    ),
+    "specification: a floor of another product": (
+        HIGH,
+        SPECIFICATION,
+        "apply_row",
+        "floor_32(prod(r[1], y))",
+        "floor_32(prod(r[1], x))",
+    ),
+    "specification: high words without the offset": (
+        HIGH,
+        SPECIFICATION,
+        "apply_row",
+        " + r[3]);",
+        ");",
     ),
     "specification: a step left out": (
         FIFTH,
