@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from triaxcal.codegen.annotations import not_covered
 from triaxcal.codegen.render import annotated_routine, render_routine
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import prove
+from triaxcal.fixedpoint.rate import RatePlan
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.verify import wp
 from triaxcal.verify.outcome import PASSED
@@ -29,8 +31,10 @@ SHAPES = {
     "gyro, constants": replace(integer_shape(order=0), gyro=True),
     "gyro, two segments, 32 bits": replace(integer_shape(order=2, segments=2, raw=ANY), gyro=True),
     "gyro, saturating": replace(integer_shape(output_shift=30, raw=ANY), gyro=True),
+    "dT/dt, cubic, 24 bits": replace(integer_shape(order=3), rate=True),
+    "dT/dt, two segments, 32 bits": replace(integer_shape(order=2, segments=2, raw=ANY), rate=True),
 }
-GYRO, SATURATING = (list(SHAPES)[i] for i in (0, 3))
+GYRO, SATURATING, RATE = (list(SHAPES)[i] for i in (0, 3, 4))
 
 
 def plan_of(shape: Shape) -> Plan:
@@ -40,6 +44,9 @@ def plan_of(shape: Shape) -> Plan:
     if shape.gyro:
         words = np.zeros((3, 3), dtype=np.int64)
         plan = replace(plan, sensitivity=words, real_sensitivity=words * 1.0, force_q=24)
+    if shape.rate:
+        words = np.zeros(3, dtype=np.int64)
+        plan = replace(plan, rate=RatePlan(-1000, 1000, 2**21, words, words * 1.0))
     return plan
 
 
@@ -58,6 +65,17 @@ def test_every_goal_is_proven(tmp_path: Path, name: str) -> None:
     outcome = wp.check(workspace(SHAPES[name], tmp_path / "work"))
     assert outcome.result == PASSED, outcome
     assert {"set_temperature", "apply", "lemmas"} <= set(outcome.figures["goals"])
+
+
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_no_lemma_is_taken_without_a_proof(name: str) -> None:
+    plan = plan_of(SHAPES[name])
+    known, opaque = (
+        set(re.findall(r"lemma (\w+)", wp.specification(plan, opaque=flag)))
+        for flag in (False, True)
+    )
+    assert opaque - known <= set(wp.FOLLOWING)
+    assert len(opaque - known) >= 3
 
 
 C, SPECIFICATION = "annotated_routine", "specification"
@@ -89,6 +107,34 @@ FAULTS = {
     "raw codes for the force": (GYRO, C, "apply", "uz, force, rate)", "uz, raw_code, rate)"),
     "a saturating sum without its term": (
         SATURATING, C, "apply", "sum_y += sensitivity_sum(state->sensitivity[1], force);", ""
+    ),
+    "a rate beyond its end": (
+        RATE, C, "add_rate", "rate = calib->rate_max_code", "rate = calib->rate_min_code"
+    ),
+    "a rate that is not flagged": (
+        RATE, C, "add_rate",
+        "calib->rate_min_code;\n        status = TRIAX_STATUS_RATE_RANGE",
+        "calib->rate_min_code;\n        status = TRIAX_STATUS_OK",
+    ),
+    "the offset of a rate subtracted": (RATE, C, "add_rate", "[3] += offset", "[3] -= offset"),
+    "a rate added to a gain": (RATE, C, "add_rate", "[i][3] += offset", "[i][2] += offset"),
+    "a rate for two axes": (
+        RATE, C, "add_rate", "i < 3u; i++) {\n        const", "i < 2u; i++) {\n        const"
+    ),
+    "half a unit less": (RATE, C, "rate_offset_of", "(2147483648)", "(2147483647)"),
+    "a rate of 1 for none": (RATE, C, "set_temperature", "temp_code, 0);", "temp_code, 1);"),
+    "no rate": (
+        RATE, C, "set_temperature_rate",
+        "    status |= add_rate(state->row, calib, rate_code);\n", "",
+    ),
+    "the status of the rate alone": (
+        RATE, C, "set_temperature_rate", "status |= add_rate", "status = add_rate"
+    ),
+    "specification: no half added": (
+        RATE, SPECIFICATION, "rate_offset_of", "prod(r, w) + 2147483648", "prod(r, w)"
+    ),
+    "specification: every rate in range": (
+        RATE, SPECIFICATION, "add_rate", "? 0 : TRIAX_STATUS_RATE_RANGE", "? 0 : 0"
     ),
     "specification: a force not counted": (
         GYRO, SPECIFICATION, "sensitivity_sum", "sum(k[0], k[1], k[2]", "sum(k[0], k[1], 0"

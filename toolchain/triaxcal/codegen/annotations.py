@@ -36,7 +36,8 @@ def not_covered(shape: Shape) -> str:
     parts = {
         "the inverse form": shape.inverse is not None,
         "quadratic terms": shape.quadratic,
-        "a term in dT/dt": shape.rate,
+        "a term in dT/dt with constant functions": shape.rate and not shape.order,
+        "a term in dT/dt with sums of high words": shape.rate and shape.high_words,
         "functions of order 6 and above": shape.order > 5,
         "saturating results of raw codes of fewer than 32 bits": shape.saturates and narrow,
     }

@@ -36,12 +36,14 @@ OPTIONS = (
 )  # fmt: skip
 OF_VALUES = (
     "s32", "high_word", "asr32", "asr64", "saturate32", "magnitude", "times", "evaluate",
-    "x_q31_of", "reciprocal", "above_min", "beyond_range", "out_of_range", "copy_rows",
+    "x_q31_of", "rate_q31_of", "reciprocal", "above_min", "beyond_range", "out_of_range",
+    "copy_rows",
 )  # fmt: skip
 """Functions proven with every definition."""
 OF_MEMORY = (
     "horner_step", "evaluate_column", "evaluate_rows", "rounded", "clamp_raw", "apply_row",
     "apply_rows", "set_temperature", "apply", "sensitivity_sum", "copy_terms",
+    "rate_offset_of", "add_rate", "set_temperature_rate",
     "minor_of", "invert", "clear_rows",
 )  # fmt: skip
 SMOKE = "_wp_smoke_"
@@ -71,11 +73,14 @@ class Place:
     config: Mapping[str, str]
 
 
-_FOLLOWING = ("row_bounded_of", "words_fit_of", "column_still", "terms_still")
+FOLLOWING = (
+    "row_bounded_of", "words_fit_of", "column_still", "terms_still",
+    "rate_bounded", "fourth", "moved_bounded_of", "room_of", "at_rest", "not_moved",
+)  # fmt: skip
 """Lemmas that follow from other lemmas."""
 _LEMMAS = (
     Part((), "specification.h", ("-wp-prop=@lemma",)),
-    Part((), "opaque.h", ("-wp-prop=" + ",".join(_FOLLOWING),)),
+    Part((), "opaque.h", ("-wp-prop=" + ",".join(FOLLOWING),)),
 )
 
 
@@ -208,7 +213,7 @@ def parts_of(present: Sequence[str]) -> list[Part]:
 def _command(place: Place, part: Part, limit_s: int) -> tuple[list[str], list[str]]:
     """What runs a part, and the link names of its functions."""
     linked = place.linked
-    exported = ("set_temperature", "apply")
+    exported = ("set_temperature", "set_temperature_rate", "apply")
     names = [f"{linked}_{name}" if name in exported else name for name in part.functions]
     chosen = ("-wp-fct", ",".join(names)) if names else ()
     command = [
