@@ -102,10 +102,42 @@ static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t
     }
 }
 
-/* a d - b c; |a|, |b|, |c|, |d| < 2^31, so the result stays below 2^63. */
-static int64_t minor_of(int32_t a, int32_t b, int32_t c, int32_t d)
+/* |a|, |b|, |c|, |d| < 2^31, so the difference stays below 2^63. */
+static int32_t cofactor(int32_t a, int32_t b, int32_t c, int32_t d)
 {
-    return times(a, d) - times(b, c);
+    return saturate32(asr64_31(times(a, d) - times(b, c)));
+}
+
+/* Element i, j of the adjugate: the cofactor of element j, i of K. */
+static int32_t cofactor_at(int32_t row[3][TRIAX_ROW_WORDS], uint32_t i, uint32_t j)
+{
+    const uint32_t i2 = (i + 2u) % 3u;
+    const uint32_t i1 = 3u - i - i2;
+    const uint32_t j2 = (j + 2u) % 3u;
+    const uint32_t j1 = 3u - j - j2;
+    return cofactor(row[j1][i1], row[j1][i2], row[j2][i1], row[j2][i2]);
+}
+
+static void adjugate_of(int32_t row[3][TRIAX_ROW_WORDS], int32_t adjugate[3][3])
+{
+    uint32_t i;
+    uint32_t j;
+    for (j = 0u; j < 3u; j++) {
+        for (i = 0u; i < 3u; i++) {
+            adjugate[i][j] = cofactor_at(row, i, j);
+        }
+    }
+}
+
+/* Expanded along the first row; a quarter of each product, so that the sum fits. */
+static int32_t determinant_of(const int32_t row[3], int32_t adjugate[3][3])
+{
+    int64_t determinant = 0;
+    uint32_t j;
+    for (j = 0u; j < 3u; j++) {
+        determinant += asr64_2(times(row[j], adjugate[j][0]));
+    }
+    return saturate32(asr64_29(determinant));
 }
 
 /* 2^61 / determinant towards zero, the determinant kept away from zero. */
@@ -120,44 +152,47 @@ static int32_t reciprocal(int32_t determinant)
     return (determinant < 0) ? -quotient : quotient;
 }
 
+/* An element of K^-1: half up. */
+static int32_t gain(int32_t adjugate, int32_t inverse)
+{
+    return saturate32(asr64_31(times(adjugate, inverse) + INT64_C(1073741824)));
+}
+
+/* An element of -K^-1 U0: half up, and half an output LSB for the rounding of triax_apply. */
+static int32_t offset_of(int64_t product)
+{
+    return saturate32(-asr64_30(product + INT64_C(536870912)));
+}
+
+/* A row of K^-1 and -K^-1 U0; returns what must stay below ROW_LIMIT. */
+static int64_t invert_row(int32_t row[TRIAX_ROW_WORDS], const int32_t adjugate[3], int32_t inverse,
+                          const int32_t u0[3])
+{
+    int64_t product = 0;
+    int64_t row_sum = 0;
+    uint32_t j;
+    for (j = 0u; j < 3u; j++) {
+        row[j] = gain(adjugate[j], inverse);
+        product += asr64_2(times(row[j], u0[j]));
+        row_sum += magnitude(row[j]);
+    }
+    row[3] = offset_of(product);
+    return row_sum + (2 * magnitude(row[3]));
+}
+
 /* Turns rows of K and U0 into rows of K^-1 and -K^-1 U0. Returns 0 when a row does not fit. */
 static uint32_t invert(int32_t row[3][TRIAX_ROW_WORDS])
 {
     const int32_t u0[3] = {row[0][3], row[1][3], row[2][3]};
     int32_t adjugate[3][3];
-    int64_t determinant = 0;
     int32_t inverse;
     uint32_t fits = 1u;
     uint32_t i;
-    uint32_t j;
 
+    adjugate_of(row, adjugate);
+    inverse = reciprocal(determinant_of(row[0], adjugate));
     for (i = 0u; i < 3u; i++) {
-        const uint32_t i1 = (i + 1u) % 3u;
-        const uint32_t i2 = (i + 2u) % 3u;
-        for (j = 0u; j < 3u; j++) {
-            const int32_t *const p = row[(j + 1u) % 3u];
-            const int32_t *const q = row[(j + 2u) % 3u];
-            const int64_t minor_ji = minor_of(p[i1], p[i2], q[i1], q[i2]);
-            adjugate[i][j] = saturate32(asr64_31(minor_ji));
-        }
-    }
-    for (j = 0u; j < 3u; j++) {
-        determinant += asr64_2(times(row[0][j], adjugate[j][0]));
-    }
-    inverse = reciprocal(saturate32(asr64_29(determinant)));
-    for (i = 0u; i < 3u; i++) {
-        int64_t product = 0;
-        int64_t row_sum = 0;
-        for (j = 0u; j < 3u; j++) {
-            const int64_t gain = times(adjugate[i][j], inverse) + INT64_C(1073741824);
-            row[i][j] = saturate32(asr64_31(gain));
-            product += asr64_2(times(row[i][j], u0[j]));
-            row_sum += magnitude(row[i][j]);
-        }
-        /* Half up, and half an output LSB for the rounding of triax_apply. */
-        row[i][3] = saturate32(-asr64_30(product + INT64_C(536870912)));
-        row_sum += 2 * magnitude(row[i][3]);
-        if (row_sum >= ROW_LIMIT) {
+        if (invert_row(row[i], adjugate[i], inverse, u0) >= ROW_LIMIT) {
             fits = 0u;
         }
     }
@@ -187,11 +222,24 @@ static void clear_rows(int32_t row[3][TRIAX_ROW_WORDS])
 {
     uint32_t i;
     uint32_t j;
-    for (i = 0u; i < 3u; i++) {
-        for (j = 0u; j < 4u; j++) {
+    for (j = 0u; j < 4u; j++) {
+        for (i = 0u; i < 3u; i++) {
             row[i][j] = 0;
         }
     }
+}
+
+/* The functions at a temperature, inverted; rows of zeros, and 0, when a row does not fit. */
+static uint32_t invert_at(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
+                          int32_t x_q31)
+{
+    uint32_t fits;
+    evaluate_rows(row, segment, x_q31);
+    fits = invert(row);
+    if (fits == 0u) {
+        clear_rows(row);
+    }
+    return fits;
 }
 
 static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)
@@ -215,9 +263,7 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
         status = TRIAX_STATUS_TEMP_HIGH;
     }
     x_q31 = x_q31_of(segment, code);
-    evaluate_rows(state->row, segment, x_q31);
-    if (invert(state->row) == 0u) {
-        clear_rows(state->row);
+    if (invert_at(state->row, segment, x_q31) == 0u) {
         status |= TRIAX_STATUS_BAD_IMAGE;
     }
     return status;

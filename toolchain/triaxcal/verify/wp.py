@@ -36,15 +36,16 @@ OPTIONS = (
 )  # fmt: skip
 OF_VALUES = (
     "s32", "high_word", "asr32", "asr64", "saturate32", "magnitude", "times", "evaluate",
-    "x_q31_of", "rate_q31_of", "reciprocal", "above_min", "beyond_range", "out_of_range",
-    "copy_rows",
+    "x_q31_of", "rate_q31_of", "above_min", "beyond_range", "out_of_range", "copy_rows",
+    "cofactor", "reciprocal", "gain", "offset_of",
 )  # fmt: skip
 """Functions proven with every definition."""
 OF_MEMORY = (
     "horner_step", "evaluate_column", "evaluate_rows", "rounded", "clamp_raw", "apply_row",
     "apply_rows", "set_temperature", "apply", "sensitivity_sum", "copy_terms",
     "rate_offset_of", "add_rate", "set_temperature_rate",
-    "minor_of", "invert", "clear_rows",
+    "cofactor_at", "adjugate_of", "determinant_of", "invert_row", "invert", "clear_rows",
+    "invert_at",
 )  # fmt: skip
 SMOKE = "_wp_smoke_"
 """Name of a goal that asks whether anything follows from nothing: WP must not prove it."""
@@ -74,7 +75,7 @@ class Place:
 
 
 FOLLOWING = (
-    "row_bounded_of", "words_fit_of", "column_still", "terms_still",
+    "row_bounded_of", "words_fit_of", "quarter_fits", "column_still", "terms_still",
     "rate_bounded", "fourth", "moved_bounded_of", "room_of", "at_rest", "not_moved",
 )  # fmt: skip
 """Lemmas that follow from other lemmas."""
