@@ -10,6 +10,7 @@ import itertools
 import random
 import re
 import struct
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,7 +30,7 @@ from plans import (
     vectors,
 )
 from triaxcal.codegen.image import constant_words, image_bytes
-from triaxcal.codegen.image_cases import SENSITIVITY_LIMIT, layout_of
+from triaxcal.codegen.image_cases import SENSITIVITY_LIMIT, image_cases, layout_of
 from triaxcal.codegen.image_edges import image_edges
 from triaxcal.codegen.render import render_routine, specification
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
@@ -194,6 +195,36 @@ def test_specification_and_model_agree(name: str) -> None:
     compare_constants(name)
 
 
+@pytest.mark.parametrize("name", [SEGMENTED, "direct-cubic-24-bit"])
+def test_the_loader_accepts_what_the_model_does(name: str) -> None:
+    """Images that are damaged, at every limit, wild, and with an identity."""
+    plan = random_plan(random.Random(name), WRITTEN[name])
+    spec = defined(plan)
+    verdicts = []
+    for case in image_cases(plan, image_bytes(plan)):
+        # One byte of sixteen is damaged here, and of each word of the header.
+        if (damaged := re.fullmatch(r"bit of byte (\d+)", case.name)) and int(damaged[1]) % 16 > 0:
+            continue
+        found = spec["accepted"](Pointer(list(case.image)), len(case.image))
+        assert found == case.accepted, case.name
+        verdicts.append(found)
+    assert verdicts.count(True) > 20
+    assert verdicts.count(False) > 100
+
+
+def test_words_and_crc_of_an_image() -> None:
+    plan = random_plan(random.Random(1), WRITTEN[SEGMENTED])
+    spec = defined(plan)
+    image = random.Random(2).randbytes(400)
+    read = Pointer(list(image))
+    for i, word in enumerate(struct.unpack("<100I", image)):
+        assert spec["word"](read, i) == word
+    for i, word in enumerate(struct.unpack("<100i", image)):
+        assert spec["int_word"](read, i) == word
+    for size in (0, 1, 7, 400):
+        assert spec["crc_of"](read, size) == zlib.crc32(image[:size])
+
+
 def test_small_numbers_exhaustively() -> None:
     plan = random_plan(random.Random(1), COVERING["direct-cubic-24-bit"])
     spec = defined(plan)
@@ -277,3 +308,27 @@ def test_a_mistake_in_the_specification_is_seen(name: str, monkeypatch: pytest.M
     monkeypatch.setattr(f"{__name__}.specification", lambda *_, **__: text.replace(old, new))
     with pytest.raises((AssertionError, IndexError)):
         test_specification_and_model_agree(SEGMENTED)
+
+
+LOADER_FAULTS = {
+    "another CRC": ("0xEDB88320", "0xEDB88321"),
+    "bytes from the other end": ("1] << 8", "1] << 24"),
+    "no limit of the last code": (
+        "first_code(image, s + 1) - 1 : max_code",
+        "max_code(image) : max_code",
+    ),
+    "functions of another row": ("row_words_fit(image, s, 8)", "row_words_fit(image, s, 4)"),
+    "any identity": ("==> identity_fits(image))", "==> size > 0)"),
+    "no header": ("&& header_fits(image) &&", "&&"),
+}
+
+
+@pytest.mark.parametrize("name", list(LOADER_FAULTS))
+def test_a_mistake_in_what_is_accepted_is_seen(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    old, new = LOADER_FAULTS[name]
+    plan = random_plan(random.Random(SEGMENTED), WRITTEN[SEGMENTED])
+    text = specification(plan, opaque=False)
+    assert text.count(old) == 1
+    monkeypatch.setattr(f"{__name__}.specification", lambda *_, **__: text.replace(old, new))
+    with pytest.raises(AssertionError):
+        test_the_loader_accepts_what_the_model_does(SEGMENTED)

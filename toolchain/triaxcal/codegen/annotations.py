@@ -30,6 +30,17 @@ def blanked_contracts(text: str) -> str:
     return _CONTRACT.sub(lambda found: "\n" * found[0].count("\n"), text)
 
 
+def loader_not_covered(shape: Shape) -> str:
+    """Which part of a shape has no contracts in its loader; "" where all have them."""
+    parts = {
+        "the inverse form": shape.inverse is not None,
+        "further terms": shape.adds_to_sums or shape.rate,
+        "sums of high words": shape.high_words,
+        "functions of order 1, 4 and above": shape.order not in (0, 2, 3),
+    }
+    return next((name for name, has in parts.items() if has), "")
+
+
 def not_covered(shape: Shape) -> str:
     """Which part of a shape has no complete contracts; "" where all have them."""
     narrow = shape.raw_max - shape.raw_min != 2**32 - 1

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from triaxcal.codegen.annotations import not_covered, with_contracts, without_annotations
+from triaxcal.codegen.annotations import (
+    loader_not_covered,
+    not_covered,
+    with_contracts,
+    without_annotations,
+)
 from triaxcal.codegen.forms import (
     assembly,
     form_of,
@@ -92,7 +97,12 @@ def _portable_context(plan: Plan) -> dict[str, Any]:
 def _annotated(plan: Plan, form: str, context: dict[str, Any]) -> str:
     """The C file of a form with all annotations."""
     names = names_of(plan)
-    own = {"form": form, "form_note": FORM_NOTES[form], "uses": helpers(plan.shape, form)}
+    own = {
+        "form": form,
+        "form_note": FORM_NOTES[form],
+        "uses": helpers(plan.shape, form),
+        "unproven": without_annotations,
+    }
     file = routine_file(plan, form)
     _, text = render(ROUTINE_FILES[1], f"shape {names.shape}", names, file=file, **context, **own)
     return text
@@ -147,6 +157,7 @@ def _routine_context(plan: Plan) -> dict[str, Any]:
         "terms": TERM_TABLES[shape.gyro],
         "force_q": plan.force_q,
         "rate_q": RATE_Q,
+        "loader_proven": not loader_not_covered(shape),
         "final_rounding": 1 << max(0, shape.output_shift - 33),
     }
 
