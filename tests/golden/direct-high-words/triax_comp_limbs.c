@@ -248,7 +248,7 @@ static uint32_t crc32(const uint8_t *data, size_t size)
             crc = (crc >> 1) ^ (((crc & 1u) != 0u) ? 0xEDB88320u : 0u);
         }
     }
-    return ~crc;
+    return UINT32_MAX - crc;
 }
 
 /* Bound of |p| over |x| < 2^31, or INT64_MAX when a step of Horner's rule could overflow. */
