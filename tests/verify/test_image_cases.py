@@ -17,7 +17,7 @@ from verify.conftest import Planter
 
 WRONG = [
     ("direct-two-segments", ">= ROW_LIMIT", "> ROW_LIMIT"),
-    ("inverse", "if (row_sum >= ROW_LIMIT)", "if (row_sum > ROW_LIMIT)"),
+    ("inverse", "u0) >= ROW_LIMIT)", "u0) > ROW_LIMIT)"),
     ("inverse", "(divisor < INT64_C(1073741825))", "(divisor < INT64_C(1073741824))"),
     ("saturating", "(bound / 2) + 1", "(bound / 2)"),
     ("saturating", "segment->gain > 0", "segment->gain >= 0"),
