@@ -70,7 +70,10 @@ def test_opaque_specification_defines_no_product(subjects: dict[str, Subject]) -
     assert {"within", "value_bounded", "floors_nest"} <= lemmas
     # What is taken without a definition is proven with it, except what follows from other lemmas.
     others = set(re.findall(r"lemma (\w+)", opaque)) - lemmas
-    assert {"row_bounded_of", "words_make_calib"} <= others <= set(wp.FOLLOWING)
+    assert {"row_bounded_of", "words_make_calib"} <= others
+    parts = wp.lemmas_of({"specification.h": known, "opaque.h": opaque})
+    assert [part.specification for part in parts] == ["specification.h", "opaque.h"]
+    assert set(parts[1].options[0].removeprefix("-wp-prop=").split(",")) == others
 
 
 @pytest.mark.parametrize("shape", [name for name in ALL_SHAPES if name != COVERED])
@@ -145,7 +148,7 @@ def judged(
     monkeypatch.setattr(wp, "annotated_routine", lambda _: text.replace(old, new))
     monkeypatch.setattr(wp, "functions_of", lambda *_: name)
     monkeypatch.setattr(wp, "GOAL_S", 5)
-    monkeypatch.setattr(wp, "_LEMMAS", ())
+    monkeypatch.setattr(wp, "lemmas_of", lambda _: [])
     return wp.check(work)
 
 

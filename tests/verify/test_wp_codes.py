@@ -54,7 +54,7 @@ def test_every_goal_is_proven(tmp_path: Path, name: str) -> None:
 def test_test_of_the_range_is_proven(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names = ["above_min", "beyond_range", "out_of_range", "clamp_raw"]
     monkeypatch.setattr(wp, "functions_of", lambda *_: names)
-    monkeypatch.setattr(wp, "_LEMMAS", ())
+    monkeypatch.setattr(wp, "lemmas_of", lambda _: [])
     outcome = wp.check(workspace(SHAPES[CUBIC], tmp_path / "work"))
     assert outcome.result == PASSED, outcome
     assert set(outcome.figures["goals"]) == set(names)
@@ -201,9 +201,8 @@ def test_a_planted_mistake_is_not_proven(
     monkeypatch.setattr(wp, "functions_of", lambda *_: [function])
     monkeypatch.setattr(wp, "GOAL_S", 5)
     # What out_of_range takes from a lemma is right or wrong where the lemma is proven.
-    in_lemma = text == SPECIFICATION and function == "out_of_range"
-    lemmas = wp._LEMMAS if in_lemma else ()
-    monkeypatch.setattr(wp, "_LEMMAS", lemmas)
+    if not (text == SPECIFICATION and function == "out_of_range"):
+        monkeypatch.setattr(wp, "lemmas_of", lambda _: [])
     outcome = wp.check(work)
     assert outcome.result == FAILED
     assert "not proven: " in outcome.finding

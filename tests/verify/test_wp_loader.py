@@ -120,8 +120,9 @@ def test_a_planted_mistake_is_not_proven(
     monkeypatch.setattr(wp, text, changed)
     monkeypatch.setattr(wp, "GOAL_S", 5)
     of_lemmas = function == "lemmas"
+    lemmas_of = wp.lemmas_of
     # A part without functions is one of lemmas; the last has those of the constants.
-    monkeypatch.setattr(wp, "_LEMMAS", wp._LEMMAS[-1:] if of_lemmas else ())
+    monkeypatch.setattr(wp, "lemmas_of", lambda t: lemmas_of(t)[-1:] if of_lemmas else [])
     monkeypatch.setattr(wp, "functions_of", lambda *_: [] if of_lemmas else [function])
     outcome = wp.check(work)
     assert outcome.result == FAILED

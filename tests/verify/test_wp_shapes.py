@@ -109,7 +109,7 @@ def test_a_planted_mistake_is_not_proven(
     monkeypatch.setattr(wp, text, changed)
     monkeypatch.setattr(wp, "GOAL_S", 5)
     monkeypatch.setattr(wp, "functions_of", lambda *_: [function])
-    monkeypatch.setattr(wp, "_LEMMAS", ())
+    monkeypatch.setattr(wp, "lemmas_of", lambda _: [])
     outcome = wp.check(work)
     assert outcome.result == FAILED
     assert "not proven: " in outcome.finding

@@ -60,6 +60,7 @@ OF_LOADER = (
 """The same for what reads memory in the loader."""
 SMOKE = "_wp_smoke_"
 """Name of a goal that asks whether anything follows from nothing: WP must not prove it."""
+_LEMMA = re.compile(r"lemma (\w+)")
 _LINE = re.compile(r"^\[wp\] \[(.+?)\] Goal (\w+)( : Valid.*)?", re.MULTILINE)
 _SMOKE = re.compile(r"^\[wp\] \[(\w+)\] Smoke-test typed_(\w+)", re.MULTILINE)
 _COUNT = re.compile(r"Proved goals: +(\d+) / (\d+)")
@@ -85,21 +86,6 @@ class Place:
     config: Mapping[str, str]
 
 
-FOLLOWING = (
-    "row_bounded_of", "words_fit_of", "quarter_fits", "column_still", "terms_still",
-    "rate_bounded", "fourth", "moved_bounded_of", "room_of", "at_rest", "not_moved",
-    "function_stays", "segment_stays", "split_12", "next_function", "whole_row",
-    "each_function", "rows_make_segment", "segment_has_rows", "row_words", "each_word",
-    "words_make_functions", "functions_make_words", "segment_words", "last_words",
-    "each_segment", "codes_ordered", "words_make_calib",
-)  # fmt: skip
-"""Lemmas that follow from other lemmas."""
-_LEMMAS = (
-    Part((), "specification.h", ("-wp-prop=@lemma",)),
-    Part((), "opaque.h", ("-wp-prop=" + ",".join(FOLLOWING),)),
-)
-
-
 def check(work: Workspace) -> Outcome:
     """Prove every function; the loader too, where it has contracts.
 
@@ -114,7 +100,7 @@ def check(work: Workspace) -> Outcome:
     texts = write_texts(work, folder)
     known = _known(texts, found)
     before = known.is_file()
-    goals = json.loads(known.read_text(encoding="utf-8")) if before else _prove(work, folder)
+    goals = json.loads(known.read_text(encoding="utf-8")) if before else _prove(work, folder, texts)
     unproven = [name for name, goal in goals.items() if not goal["prover"]]
     if not before and not unproven:
         known.parent.mkdir(parents=True, exist_ok=True)
@@ -188,20 +174,30 @@ def _known(texts: dict[str, str], versions: dict[str, str]) -> Path:
     return Path(home) / "triaxcal" / "wp" / f"{name}.json"
 
 
-def _prove(work: Workspace, folder: Path) -> dict[str, dict[str, str]]:
+def _prove(work: Workspace, folder: Path, texts: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Every goal, with its function, its prover (none where unproven) and the time it took."""
     place = prepared(work, folder)
-    present = functions_of((folder / place.file).read_text(encoding="utf-8"), place.linked)
+    present = functions_of(texts[place.file], place.linked)
+    # The longest first, so that none is left alone at the end.
+    parts = [*reversed(parts_of(present)), *lemmas_of(texts)]
     goals: dict[str, dict[str, str]] = {}
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        for found in pool.map(lambda part: goals_of(place, part), _parts_and_lemmas(present)):
+        for found in pool.map(lambda part: goals_of(place, part), parts):
             goals |= found
     return goals
 
 
-def _parts_and_lemmas(present: Sequence[str]) -> list[Part]:
-    """The longest first, so that none is left alone at the end."""
-    return [*reversed(parts_of(present)), *_LEMMAS]
+def lemmas_of(texts: Mapping[str, str]) -> list[Part]:
+    """Runs that prove the lemmas of both specifications.
+
+    Those of specification.h from the definitions; those that opaque.h has alone from the others.
+    """
+    known, opaque = (_LEMMA.findall(texts[name]) for name in ("specification.h", "opaque.h"))
+    following = [name for name in opaque if name not in known]
+    parts = [Part((), "specification.h", ("-wp-prop=@lemma",))]
+    if following:
+        parts.append(Part((), "opaque.h", (f"-wp-prop={','.join(following)}",)))
+    return parts
 
 
 def functions_of(text: str, linked: str) -> list[str]:
