@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from plans import integer_plan, integer_shape
-from triaxcal.codegen.render import annotated_routine, render_routine, specification
-from triaxcal.fixedpoint.proof import prove
+from triaxcal.codegen.render import annotated_routine, specification
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.verify import wp
 from triaxcal.verify.outcome import FAILED, PASSED
 from triaxcal.verify.workspace import Workspace
 from verify.conftest import needs
 from verify.test_wp import nothing_known
+from verify.wp_cases import SPECIFICATION, C, plant, workspace_of
 
 __all__ = ["nothing_known"]
 
@@ -36,9 +36,7 @@ CUBIC, ODD, CONSTANT, FIFTH, HIGH = (list(SHAPES)[i] for i in (0, 1, 3, 5, 6))
 def workspace(shape: Shape, folder: Path) -> Workspace:
     """The routine of a shape, with constants that WP does not read."""
     one = [[[1] * (shape.order + 1) for _ in range(12)] for _ in range(shape.segments)]
-    plan = integer_plan(shape, one)
-    files = {name: text.encode() for name, text in render_routine(plan).items()}
-    return Workspace.create(folder, files, plan, prove(plan))
+    return workspace_of(integer_plan(shape, one), folder)
 
 
 @PROVERS
@@ -60,7 +58,6 @@ def test_test_of_the_range_is_proven(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert set(outcome.figures["goals"]) == set(names)
 
 
-C, SPECIFICATION = "annotated_routine", "specification"
 FAULTS = {
     "one less above the minimum": (
         CUBIC,
@@ -194,10 +191,7 @@ def test_a_planted_mistake_is_not_proven(
     original = {C: annotated_routine, SPECIFICATION: specification}[text]
     assert old in str(original(work.plan, **({} if text == C else {"opaque": False})))
 
-    def changed(*args: object, **options: object) -> str:
-        return str(original(*args, **options)).replace(old, new, 1)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(wp, text, changed)
+    plant(monkeypatch, text, old, new)
     monkeypatch.setattr(wp, "functions_of", lambda *_: [function])
     monkeypatch.setattr(wp, "GOAL_S", 5)
     # What out_of_range takes from a lemma is right or wrong where the lemma is proven.

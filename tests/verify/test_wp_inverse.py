@@ -8,12 +8,10 @@ from pathlib import Path
 import pytest
 
 from plans import COVERING, random_plan
-from triaxcal.codegen.render import annotated_routine, render_routine
-from triaxcal.fixedpoint.proof import prove
 from triaxcal.fixedpoint.shape import Shape
-from triaxcal.verify import wp
 from triaxcal.verify.workspace import Workspace
 from verify.conftest import needs
+from verify.wp_cases import SPECIFICATION, C, refuse_proof, workspace_of
 
 PROVERS = needs("frama-c", "why3", "cvc4", "z3")
 SHAPE = COVERING["inverse-32-bit-three-segments"]
@@ -21,12 +19,9 @@ SHAPE = COVERING["inverse-32-bit-three-segments"]
 
 def workspace(shape: Shape, folder: Path) -> Workspace:
     """The routine of a shape."""
-    plan = random_plan(random.Random(1), shape)
-    files = {name: text.encode() for name, text in render_routine(plan).items()}
-    return Workspace.create(folder, files, plan, prove(plan))
+    return workspace_of(random_plan(random.Random(1), shape), folder)
 
 
-C, SPECIFICATION = "annotated_routine", "specification"
 INNER = "; j++) {\n        /*@ loop invariant 0 <= i <= 3;"
 """Between a loop over columns and the one over rows inside it."""
 FAULTS = {
@@ -83,16 +78,4 @@ FAULTS = {
 def test_a_planted_mistake_is_not_proven(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    text, function, old, new = FAULTS[name]
-    work = workspace(SHAPE, tmp_path / "work")
-    original = getattr(wp, text)
-    assert old in annotated_routine(work.plan) + wp.specification(work.plan, opaque=False)
-
-    def changed(*args: object, **options: object) -> str:
-        return str(original(*args, **options)).replace(old, new, 1)
-
-    monkeypatch.setattr(wp, text, changed)
-    wp.write_texts(work, work.folder / "wp")
-    place = wp.prepared(work, work.folder / "wp")
-    (part,) = wp.parts_of([function])
-    assert wp.is_proven(place, part, 5) is False
+    refuse_proof(workspace(SHAPE, tmp_path / "work"), monkeypatch, FAULTS[name])

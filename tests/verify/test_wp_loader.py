@@ -16,6 +16,7 @@ from triaxcal.verify.outcome import FAILED
 from verify.conftest import needs
 from verify.test_wp import nothing_known
 from verify.test_wp_codes import workspace
+from verify.wp_cases import SPECIFICATION, C, plant
 
 __all__ = ["nothing_known"]
 
@@ -49,7 +50,6 @@ def test_the_loader_has_contracts_where_it_is_covered(
     assert ("/*@" in text[text.index("uint32_t word_at") :]) == (not reason)
 
 
-C, SPECIFICATION = "annotated_routine", "specification"
 FAULTS = {
     "a byte one bit too high": (C, "word_at", "p[2] << 16", "p[2] << 17"),
     "bytes exchanged": (C, "word_at", "(uint32_t)p[1] << 8", "(uint32_t)p[2] << 8"),
@@ -114,10 +114,7 @@ def test_a_planted_mistake_is_not_proven(
     original = {C: annotated_routine, SPECIFICATION: specification}[text]
     assert str(original(work.plan, **({} if text == C else {"opaque": False}))).count(old) == 1
 
-    def changed(*args: object, **options: object) -> str:
-        return str(original(*args, **options)).replace(old, new)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(wp, text, changed)
+    plant(monkeypatch, text, old, new)
     monkeypatch.setattr(wp, "GOAL_S", 5)
     of_lemmas = function == "lemmas"
     lemmas_of = wp.lemmas_of

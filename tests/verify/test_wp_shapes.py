@@ -18,6 +18,7 @@ from triaxcal.verify.outcome import FAILED, PASSED
 from triaxcal.verify.workspace import Workspace
 from verify.conftest import UNITS, needs
 from verify.test_wp import nothing_known
+from verify.wp_cases import SPECIFICATION, C, plant
 
 __all__ = ["nothing_known"]
 
@@ -53,7 +54,6 @@ def test_every_goal_is_proven(work: Workspace) -> None:
     assert {"set_temperature", "apply", "lemmas"} <= set(outcome.figures["goals"])
 
 
-C, SPECIFICATION = "annotated_routine", "specification"
 FAULTS = {
     "saturation at the other end": (
         "saturating", C, "saturate32",
@@ -100,13 +100,9 @@ def test_a_planted_mistake_is_not_proven(
     work: Workspace, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     _, text, function, old, new = FAULTS[name]
-    original = getattr(wp, text)
     assert old in annotated_routine(work.plan) + wp.specification(work.plan, opaque=False)
 
-    def changed(*args: object, **options: object) -> str:
-        return str(original(*args, **options)).replace(old, new, 1)
-
-    monkeypatch.setattr(wp, text, changed)
+    plant(monkeypatch, text, old, new)
     monkeypatch.setattr(wp, "GOAL_S", 5)
     monkeypatch.setattr(wp, "functions_of", lambda *_: [function])
     monkeypatch.setattr(wp, "lemmas_of", lambda _: [])

@@ -11,9 +11,7 @@ import pytest
 
 from plans import INT32_MAX, INT32_MIN, integer_plan, integer_shape
 from triaxcal.codegen.annotations import not_covered
-from triaxcal.codegen.render import annotated_routine, render_routine
 from triaxcal.fixedpoint.plan import Plan
-from triaxcal.fixedpoint.proof import prove
 from triaxcal.fixedpoint.rate import RatePlan
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.verify import wp
@@ -21,6 +19,7 @@ from triaxcal.verify.outcome import PASSED
 from triaxcal.verify.workspace import Workspace
 from verify.conftest import needs
 from verify.test_wp import nothing_known
+from verify.wp_cases import SPECIFICATION, C, refuse_proof, workspace_of
 
 __all__ = ["nothing_known"]
 
@@ -52,9 +51,7 @@ def plan_of(shape: Shape) -> Plan:
 
 def workspace(shape: Shape, folder: Path) -> Workspace:
     """The routine of a shape."""
-    plan = plan_of(shape)
-    files = {name: text.encode() for name, text in render_routine(plan).items()}
-    return Workspace.create(folder, files, plan, prove(plan))
+    return workspace_of(plan_of(shape), folder)
 
 
 @PROVERS
@@ -81,7 +78,6 @@ def test_no_lemma_is_taken_without_a_proof(name: str) -> None:
     assert len(opaque - known) >= 3
 
 
-C, SPECIFICATION = "annotated_routine", "specification"
 FAULTS = {
     "a term left out": (GYRO, C, "copy_terms", "k < 3u; k", "k < 2u; k"),
     "terms of rows and columns exchanged": (
@@ -159,16 +155,5 @@ FAULTS = {
 def test_a_planted_mistake_is_not_proven(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    shape, text, function, old, new = FAULTS[name]
-    work = workspace(SHAPES[shape], tmp_path / "work")
-    original = getattr(wp, text)
-    assert old in annotated_routine(work.plan) + wp.specification(work.plan, opaque=False)
-
-    def changed(*args: object, **options: object) -> str:
-        return str(original(*args, **options)).replace(old, new, 1)
-
-    monkeypatch.setattr(wp, text, changed)
-    wp.write_texts(work, work.folder / "wp")
-    place = wp.prepared(work, work.folder / "wp")
-    (part,) = wp.parts_of([function])
-    assert wp.is_proven(place, part, 5) is False
+    shape, *mistake = FAULTS[name]
+    refuse_proof(workspace(SHAPES[shape], tmp_path / "work"), monkeypatch, tuple(mistake))
