@@ -175,3 +175,24 @@ def test_what_is_proven_from_a_contradiction_fails(
     assert int(proven) == goals > 3
     assert outcome.result == FAILED
     assert "not proven: horner_step_wp_smoke_default_requires" in outcome.finding
+
+
+@PROVERS
+@pytest.mark.slow
+def test_each_contract_with_opposite_conditions_fails(plant: Planter) -> None:
+    work = plant(COVERED)
+    folder = work.folder / "wp"
+    text = wp.write_texts(work, folder)[work.named("triax_comp.c")]
+    place = wp.prepared(work, folder)
+    head = r"^/\*@(?:[^*]|\*(?!/))*?requires (?:\w+: )?([^;]*);(?:[^*]|\*(?!/))*\*/\n[^\n(]* \w+\("
+    contracts = list(re.finditer(head, text, re.MULTILINE))
+    assert len(contracts) >= 20
+    for contract in contracts:
+        condition, whole = contract[1], contract[0]
+        opposite = whole.replace("requires", f"requires !({condition});\n    requires", 1)
+        (folder / place.file).write_text(text.replace(whole, opposite, 1), encoding="utf-8")
+        (name,) = wp.functions_of(whole, place.linked)
+        (part,) = wp.parts_of([name])
+        goals = wp.goals_of(place, part)
+        failed = [goal for goal, found in goals.items() if not found["prover"]]
+        assert any(f"{name}_wp_smoke_default_requires" in goal for goal in failed), name

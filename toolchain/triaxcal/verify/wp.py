@@ -32,6 +32,8 @@ KNOWN = {"frama-c": "25.", "why3": "1.5.", "cvc4": "1.8", "z3": "4.8.12"}
 """Versions with which the proofs were made; another one may find fewer, or mean something else."""
 GOAL_S = 60
 """The slowest goal takes a tenth of it on a machine that does nothing else."""
+SMOKE_S = 1
+"""Time of a smoke test with each prover. A contradiction needs less; all else takes it all."""
 AT_ONCE = 2
 """Runs of WP beside each other."""
 OPTIONS = (
@@ -168,7 +170,9 @@ def prepared(work: Workspace, folder: Path) -> Place:
 
 def _known(texts: dict[str, str], versions: dict[str, str]) -> Path:
     """Where the goals are kept that these texts gave to these programs."""
-    content = json.dumps([texts, versions, OPTIONS, GOAL_S, OF_VALUES, OF_MEMORY, OF_LOADER])
+    content = json.dumps(
+        [texts, versions, OPTIONS, GOAL_S, SMOKE_S, OF_VALUES, OF_MEMORY, OF_LOADER]
+    )
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     name = hashlib.sha256(content.encode()).hexdigest()
     return Path(home) / "triaxcal" / "wp" / f"{name}.json"
@@ -253,7 +257,7 @@ def goals_of(place: Place, part: Part) -> dict[str, dict[str, str]]:
     """
     command, names = _command(place, part, GOAL_S)
     if names:
-        command.insert(-1, "-wp-smoke-tests")
+        command[-1:-1] = ["-wp-smoke-tests", "-wp-smoke-timeout", str(SMOKE_S)]
     answer = run(command, place.folder, place.config)
     counted = _COUNT.search(answer.text)
     if answer.code or counted is None:
