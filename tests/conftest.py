@@ -98,6 +98,7 @@ LONG = {
     "test_fit_squares.py",
     "test_guide.py",
     "test_history.py",
+    "test_imu_angles.py",
     "test_imu_compiled_truth.py",
     "test_imu_delivery.py",
     "test_imu_delivery_thermal.py",

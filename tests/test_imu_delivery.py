@@ -206,6 +206,8 @@ def test_what_is_written_and_said(ran: Ran) -> None:
     assert stated["gyro"]["error_deg_per_h"] == pytest.approx(total)
     assert f"of the fitted model: together {total:.3g} deg/h" in ran.output
     fitted = json.loads((ran.folder / "calibration.json").read_text(encoding="utf-8"))
+    assert "angles" not in fitted["firmware"]["device"]  # as before there were any
+    assert "angles" not in stated
     files = ran.made.done.unit.path, ran.made.done.unit.recording
     digests = b"".join(hashlib.sha256(file.read_bytes()).digest() for file in files)
     assert fitted["inputs_sha256"] == stated["inputs_sha256"] == hashlib.sha256(digests).hexdigest()

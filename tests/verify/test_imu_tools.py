@@ -15,7 +15,8 @@ from test_imu import imu_of, triads
 from triaxcal.cli.main import main
 from triaxcal.codegen.imu import ImuBuild, build_imu
 from triaxcal.simulation.unit import write_simulated_unit
-from triaxcal.verify import cost, gappa, imu
+from triaxcal.unit.angles import PITCH_ROLL, AnglesChoice
+from triaxcal.verify import angles, cost, cppcheck, gappa, imu
 from triaxcal.verify.campaign import CHECKS
 from triaxcal.verify.image_reader import image_length
 from triaxcal.verify.outcome import FAILED, PASSED
@@ -208,3 +209,46 @@ def test_constant_functions_are_bounded_exactly(tmp_path: Path) -> None:
     outcome = gappa.check(Workspace.create(tmp_path, files, flat.accel, flat.accel_bound))
     assert outcome.result == PASSED, outcome
     assert outcome.figures["ratio_to_exact"] == pytest.approx(1.0, abs=1e-12)
+
+
+ANGLE_CHECKS = {key: check for key, _, check in angles.CHECKS}
+
+
+@pytest.fixture(scope="module")
+def with_angles() -> ImuBuild:
+    """An IMU whose device makes pitch and roll."""
+    return build_imu(
+        imu_of(), triads(), (PROVENANCE, PROVENANCE), 1000, choice=AnglesChoice(PITCH_ROLL)
+    )
+
+
+@needs("gcc", "clang")
+@pytest.mark.parametrize("key", ["angles_gcc_analyzer", "angles_gcc_sanitizers"])
+def test_the_angles_are_checked_with_the_accelerometer(
+    with_angles: ImuBuild, tmp_path: Path, key: str
+) -> None:
+    works = imu.triads(tmp_path, with_angles)
+    assert works[imu.GYRO].angles is None
+    outcome = ANGLE_CHECKS[key](works[imu.ACCELEROMETER])
+    assert outcome.result == PASSED, outcome
+
+
+@needs("frama-c", "cppcheck", "clang", "arm-none-eabi-gcc", "qemu-system-arm")
+@pytest.mark.slow
+def test_every_check_of_the_angles_of_an_imu_passes(with_angles: ImuBuild, tmp_path: Path) -> None:
+    work = imu.triads(tmp_path, with_angles)[imu.ACCELEROMETER]
+    for check in (cppcheck.check, *ANGLE_CHECKS.values()):
+        outcome = check(work)
+        assert outcome.result == PASSED, outcome
+
+
+@needs("gcc")
+def test_a_planted_mistake_in_the_angles_of_an_imu_is_found(
+    with_angles: ImuBuild, tmp_path: Path
+) -> None:
+    name = "triax_angles.c"
+    text = with_angles.files[name].replace(b"83443u", b"83442u")
+    assert text != with_angles.files[name]
+    wrong = replace(with_angles, files={**with_angles.files, name: text})
+    work = imu.triads(tmp_path, wrong)[imu.ACCELEROMETER]
+    assert ANGLE_CHECKS["angles_gcc_sanitizers"](work).result == FAILED

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from triaxcal.api.angles import Angles, angles_of, asked_for
 from triaxcal.api.calibration import Calibration
 from triaxcal.base.arrays import int32
 from triaxcal.base.errors import RefusedError
@@ -21,7 +21,7 @@ from triaxcal.codegen.angles import GeneratedAngles
 from triaxcal.codegen.routines import Int32Array, UInt32Array, routines_of, start_generated
 from triaxcal.delivery.firmware import make_firmware
 from triaxcal.delivery.fitted import refuse_beyond_limits
-from triaxcal.fixedpoint.angles import AnglesPlan, angles
+from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.integer_model import apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound, prove
@@ -31,7 +31,6 @@ from triaxcal.unit.arithmetic import checked_arithmetic
 from triaxcal.unit.prefix import checked_prefix
 
 Answers = tuple[Int32Array, UInt32Array]
-Angles = tuple[npt.NDArray[np.integer[Any]], UInt32Array]
 _BLOCK = 1 << 16
 """Rows that are computed at a time: the working arrays stay small."""
 
@@ -150,9 +149,7 @@ class Firmware:
         RefusedError
             For another shape, a number beyond int32, or a unit without [firmware] angles.
         """
-        plan = self.angles_plan
-        angle, status = angles(plan, int32("accel", accel, 3).astype(np.int64))
-        return angle.astype(np.uint32 if plan.zenith else np.int32), status.astype(np.uint32)
+        return angles_of(self.angles_plan, accel)
 
     @property
     def angles_plan(self) -> AnglesPlan:
@@ -163,15 +160,7 @@ class Firmware:
         RefusedError
             For a unit without [firmware] angles.
         """
-        plan = self._made.angles
-        if plan is None:
-            raise RefusedError(
-                "angles",
-                f"unit {self.unit} states none",
-                expected='[firmware] angles = "zenith-tool-face" or "pitch-roll"',
-                remedy="state it in unit.toml",
-            )
-        return plan
+        return asked_for(self._made.angles, self.unit, "firmware")
 
     def model(self, raw_codes: Any, temp_codes: Any, rate_codes: Any = None) -> FloatArray:
         """The same functions in floats, shape (n, 3), in g: `bound` is against these.

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from triaxcal.api.angles import Angles, angles_of, asked_for
 from triaxcal.api.imu import ImuCalibration
 from triaxcal.base.arrays import int32
 from triaxcal.base.errors import RefusedError
@@ -16,6 +17,7 @@ from triaxcal.base.publish import publish
 from triaxcal.codegen.imu import ImuBuild, imu_answers
 from triaxcal.codegen.routines import Int32Array, UInt32Array
 from triaxcal.delivery.imu import ImuC, imu_c
+from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.unit.arithmetic import checked_arithmetic
 from triaxcal.unit.prefix import checked_prefix
 
@@ -94,6 +96,39 @@ class ImuFirmware:
             )
         temps = [np.ascontiguousarray(np.broadcast_to(t, (len(accel),))) for t in temps]
         return imu_answers(self.build.accel, self.build.gyro, (temps[0], accel, gyro, temps[-1]))
+
+    def angles(self, accel: Any) -> Angles:
+        """Answers of `triax_angles`: the two angles of [device] angles.
+
+        Parameters
+        ----------
+        accel : array_like of whole numbers, shape (n, 3)
+            Accelerations that `apply` gives, any int32.
+
+        Returns
+        -------
+        angle : array of uint32 or int32, shape (n, 2)
+            Binary angles, 2^32 a turn: zenith and tool face (uint32), or pitch and roll (int32).
+        status : array of uint32, shape (n,)
+            Bits of docs/reference/c-api.md; 0 is good. None of them is one of `apply`.
+
+        Raises
+        ------
+        RefusedError
+            For another shape, a number beyond int32, or an IMU without [device] angles.
+        """
+        return angles_of(self.angles_plan, accel)
+
+    @property
+    def angles_plan(self) -> AnglesPlan:
+        """What `angles` needs to know.
+
+        Raises
+        ------
+        RefusedError
+            For an IMU without [device] angles.
+        """
+        return asked_for(self.build.angles, self.unit, "device")
 
     def check(self) -> int:
         """Vectors on which Python, the reference C and the generated C agreed."""

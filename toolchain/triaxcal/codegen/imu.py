@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.angles import angles_plan, render_angles
+from triaxcal.codegen.angles_check import AnglesCheck, check_angles
 from triaxcal.codegen.compiler import library_folder, start_reference
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.crosscheck import RANDOM_VECTORS, CrossCheck, cross_check, vector_sets
@@ -28,11 +30,13 @@ from triaxcal.codegen.routines import (
 )
 from triaxcal.codegen.selftest import check_selftest, render_selftest
 from triaxcal.codegen.templates import render
+from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.fixedpoint.gyro import make_gyro_plan
 from triaxcal.fixedpoint.integer_model import STATUS_BAD_IMAGE, STATUS_OK, apply, set_temperature
 from triaxcal.fixedpoint.plan import Plan, Triad, make_plan
 from triaxcal.fixedpoint.proof import Bound, prove
 from triaxcal.model.methods.imu import ImuCompensation
+from triaxcal.unit.angles import AnglesChoice
 
 IMU_FILES = ("triax_imu.h", "triax_imu.c")
 IMU_IMAGE_FILE = "triax_imu.bin"
@@ -62,6 +66,8 @@ class ImuBuild:
         The compiler of the check, and its version.
     two_thermometers : bool
         Whether the gyro is compensated by the codes of a thermometer of its own.
+    angles, angles_check : AnglesPlan and AnglesCheck, or None
+        Of the angles, where the device makes them of the accelerometer's result.
     """
 
     accel: Plan
@@ -75,6 +81,8 @@ class ImuBuild:
     files: dict[str, bytes]
     compiler: str
     two_thermometers: bool = False
+    angles: AnglesPlan | None = None
+    angles_check: AnglesCheck | None = None
 
 
 def build_imu(
@@ -84,8 +92,11 @@ def build_imu(
     random_vectors: int = RANDOM_VECTORS,
     *,
     two_thermometers: bool = False,
+    choice: AnglesChoice | None = None,
 ) -> ImuBuild:
     """Plan, render, prove and check the C of an IMU; pairs are of accelerometer and gyro.
+
+    `choice` is that of the angles, where the device makes them.
 
     Raises
     ------
@@ -94,7 +105,10 @@ def build_imu(
     """
     accel = replace(make_plan(imu.accel, triads[0]), reading="g")
     gyro = replace(make_gyro_plan(imu, triads[1], accel.shape.output_q), reading="rad/s")
-    files = render_imu(accel, gyro, triads, provenances, two_thermometers=two_thermometers)
+    angles = None if choice is None else angles_plan(choice, accel)
+    files = render_imu(
+        accel, gyro, triads, provenances, two_thermometers=two_thermometers, angles=angles
+    )
     bounds = prove(accel), prove(gyro)
     with library_folder() as folder:
         for file, content in files.items():
@@ -109,6 +123,7 @@ def build_imu(
         )
         for plan, provenance in zip((accel, gyro), provenances, strict=True):
             check_selftest(plan, provenance, library)
+        angles_check = None if angles is None else check_angles(angles, library)
         image = files[names_of(accel).file(IMU_IMAGE_FILE)]
         samples = imu_vectors(accel, gyro, two_thermometers=two_thermometers)
         vectors = _check_both(accel, gyro, GeneratedImu(library), image, samples)
@@ -122,7 +137,9 @@ def build_imu(
             )
     carried = rate_bound(gyro, bounds[1], bounds[0])
     found = ImuBuild(accel, gyro, *bounds, carried, *checks, vectors, files, compiler)
-    return replace(found, two_thermometers=two_thermometers)
+    return replace(
+        found, two_thermometers=two_thermometers, angles=angles, angles_check=angles_check
+    )
 
 
 def render_imu(
@@ -132,6 +149,7 @@ def render_imu(
     provenances: tuple[Provenance, Provenance],
     *,
     two_thermometers: bool = False,
+    angles: AnglesPlan | None = None,
 ) -> dict[str, bytes]:
     """Every file of an IMU, by name."""
     texts = {**render_routine(accel), **render_routine(gyro)}
@@ -143,6 +161,7 @@ def render_imu(
     context = imu_context(accel, gyro, two_thermometers=two_thermometers)
     shapes = f"shapes {names.shape} and {names_of(gyro).shape}"
     texts |= dict(render(name, shapes, names, **context) for name in IMU_FILES)
+    texts |= {} if angles is None else render_angles(angles, names)
     files = {name: text.encode() for name, text in texts.items()}
     files[names.file(IMU_IMAGE_FILE)] = b"".join(
         with_identity(image_bytes(plan), triad.temperature_sensor, provenance)

@@ -166,7 +166,12 @@ def _signed_columns(unit: DynamicDescription) -> dict[str, tuple[list[str], bool
 def firmware_document(done: DynamicUnit, verdict: ImuVerdict) -> dict[str, Any]:
     """The key `firmware` of calibration.json; nothing where there is no [device]."""
     device = done.unit.device
-    return {} if device is None else {"firmware": plain(saved_for_c(done, device, verdict))}
+    if device is None:
+        return {}
+    found = plain(saved_for_c(done, device, verdict))
+    if device.angles is None:
+        del found["device"]["angles"]
+    return {"firmware": found}
 
 
 def read_saved_for_c(source: str, document: Mapping[str, Any]) -> SavedForC:

@@ -184,7 +184,11 @@ def imu_c(fitted: FittedImu) -> ImuC:
         ),
     )
     build = build_imu(
-        functions, triads, fitted.provenances, two_thermometers=device.two_thermometers
+        functions,
+        triads,
+        fitted.provenances,
+        two_thermometers=device.two_thermometers,
+        choice=device.angles,
     )
     errors = _model_errors(model, functions, device, build)
     _refuse_model_errors(fitted.source, errors)

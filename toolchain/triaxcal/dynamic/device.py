@@ -11,6 +11,7 @@ from triaxcal.base.keys import TableKeys, Values, keys_of, setting
 from triaxcal.base.kinds import interval, number, whole
 from triaxcal.model.thermal.shape import PLAUSIBLE_DEGC
 from triaxcal.unit.adc import Adc, whole_adc
+from triaxcal.unit.angles import AngleKeys, AnglesChoice
 from triaxcal.unit.arithmetic import ARITHMETIC, PORTABLE
 from triaxcal.unit.choices import OUTPUT_Q_RANGE
 from triaxcal.unit.prefix import DEFAULT_PREFIX, PREFIX
@@ -49,6 +50,8 @@ class Device:
     arithmetic
         How the C forms its products, as in [firmware]. The gyro has limbs for thumb1 and the
         portable form for thumb2. Both have the portable form for high-words.
+    angles : AnglesChoice or None
+        Which angles the device makes of the compensated acceleration, as in [firmware].
     """
 
     temperature_sensor: TemperatureSensor
@@ -68,6 +71,7 @@ class Device:
     gyro_rate_q: int = setting(whole(*OUTPUT_Q_RANGE), 19)
     prefix: str = setting(PREFIX, DEFAULT_PREFIX)
     arithmetic: str = setting(ARITHMETIC, PORTABLE)
+    angles: AnglesChoice | None = None
 
     @property
     def two_thermometers(self) -> bool:
@@ -100,7 +104,12 @@ class Device:
 DEVICE = TableKeys(
     "device",
     "What the firmware's codes stand for, and where it works. Without it there is no C.",
-    (*keys_of(Device)[:4], *keys_of(TemperatureSensor), *keys_of(Device)[4:]),
+    (
+        *keys_of(Device)[:4],
+        *keys_of(TemperatureSensor),
+        *keys_of(Device)[4:],
+        *keys_of(AngleKeys),
+    ),
     optional=True,
 )
 REQUIRED = tuple(key.name for key in DEVICE.keys if key.required)
@@ -117,7 +126,11 @@ def device_of(values: Values) -> Device | None:
     """
     if not values:
         return None
-    found = values.record(Device, temperature_sensor=values.record(TemperatureSensor))
+    found = values.record(
+        Device,
+        temperature_sensor=values.record(TemperatureSensor),
+        angles=values.record(AngleKeys).choice,
+    )
     for key in ("gyro_degc_at_zero", "gyro_range_degc"):
         if key in values and not found.two_thermometers:
             raise RefusedError(

@@ -16,13 +16,15 @@ from triaxcal.dynamic.device import REQUIRED
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
 from triaxcal.report.a2l import Triad, linked_a2l
+from triaxcal.report.words.angles import angles_document, angles_words
 from triaxcal.report.words.firmware import checked_words, proven_words
 from triaxcal.report.words.numbers import g_in_words, significant, thousands
 
 VERIFICATION_FILE = "verification.json"
 C_FILES = (
     "*_comp.h", "*_comp.c", "*_calib.h", "*_calib.c", "*_calib.a2l", "*_selftest.h",
-    "*_selftest.c", "*_imu.h", "*_imu.c", "*_imu.bin", VERIFICATION_FILE,
+    "*_selftest.c", "*_angles.h", "*_angles.c", "*_imu.h", "*_imu.c", "*_imu.bin",
+    VERIFICATION_FILE,
 )  # fmt: skip
 """What a unit with [device] receives besides; * is its prefix."""
 NO_C = "none: unit.toml has no [device]; add it with " + ", ".join(REQUIRED)
@@ -93,6 +95,7 @@ def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:
             "model_error_deg_per_h": c.gyro_model_error_deg_per_h,
             "error_deg_per_h": c.gyro_error_deg_per_h,
         },
+        **angles_document(build.angles, build.angles_check),
         "both_together_vectors": build.vectors,
         "mismatches": 0,
         "files_sha256": sha256_of_files(build.files),
@@ -157,6 +160,13 @@ def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
             "; ".join(c.fitted.left_out) or "nothing: every estimated effect is corrected",
         ),
     ]
+    words = angles_words(build.angles, build.angles_check)
+    if words is not None:
+        shown = (
+            f"within {words.proven} arcsec of the exact ones of the accelerometer's result: "
+            f"proven; {thousands(words.vectors)} vectors: Python = generated C"
+        )
+        rows.append((f"Angles, {words.names}", shown))
     constant = constant_triads(made)
     if constant:
         rows.append(
@@ -214,6 +224,13 @@ def imu_c_lines(made: ImuDelivery) -> list[str]:
         f"                {together[1]} deg/h",
         f"  checked       {agree}",
     ]
+    words = angles_words(build.angles, build.angles_check)
+    if words is not None:
+        vectors = thousands(words.vectors, " ")
+        lines += [
+            f"  angles        {words.names}; proven within {words.proven} arcsec,",
+            f"                {vectors} vectors: Python and generated C agree",
+        ]
     lines += [f"  not corrected {title}" for title in c.fitted.left_out]
     for what in constant_triads(made):
         lines += [

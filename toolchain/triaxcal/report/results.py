@@ -2,42 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from triaxcal.base.jsontext import json_bytes, sha256_of_files
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.names import shape_id
 from triaxcal.codegen.tryout import BEFORE
 from triaxcal.delivery.saved import header
 from triaxcal.delivery.unit import Delivery
-from triaxcal.fixedpoint.angles import ARCSEC_PER_UNIT
-
-
-def _angles(delivery: Delivery) -> dict[str, Any]:
-    """Of triax_angles, where the device has it: proven, and seen on how many vectors."""
-    plan, check = delivery.firmware.angles, delivery.angles_check
-    if plan is None or check is None:
-        return {}
-    terms = check.bound.first, check.bound.second
-    return {
-        "angles": {
-            "pair": plan.choice.pair,
-            "rest_within_g": plan.choice.rest_within_g,
-            "second_angle_from_deg": plan.choice.second_from_deg,
-            "errors": [
-                {
-                    "angle": plan.choice.names[k],
-                    "bound_units": float(check.bound.units[k]),
-                    "bound_arcsec": float(check.bound.units[k]) * ARCSEC_PER_UNIT,
-                    "terms_units": {t.name: float(t.units) for t in terms[k]},
-                    "largest_seen_units": check.largest_units[k],
-                }
-                for k in range(2)
-            ],
-            "vectors": check.vectors,
-            "mismatches": 0,
-        }
-    }
+from triaxcal.report.words.angles import angles_document
 
 
 def verification_json(delivery: Delivery) -> bytes:
@@ -67,7 +38,7 @@ def verification_json(delivery: Delivery) -> bytes:
             "images": check.images,
             "mismatches": 0,
         },
-        **_angles(delivery),
+        **angles_document(delivery.firmware.angles, delivery.angles_check),
         "residuals_g": {
             m.method.name: [
                 {

@@ -9,11 +9,11 @@ from triaxcal.delivery.order import Functions
 from triaxcal.delivery.unit import Delivery
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.core.recorded import RecordingFit
-from triaxcal.fixedpoint.angles import ARCSEC_PER_UNIT
 from triaxcal.model.metrological import unpack_constants
 from triaxcal.model.positions import AXES
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.stated.words import caution_words
+from triaxcal.report.words.angles import angles_words
 from triaxcal.report.words.measured import measured_words
 from triaxcal.report.words.numbers import thousands
 from triaxcal.report.words.shares import share_rows
@@ -236,16 +236,14 @@ def _high_words(delivery: Delivery) -> list[str]:
 
 def _angles(delivery: Delivery) -> list[str]:
     """Of triax_angles, where the device has it."""
-    plan, check = delivery.firmware.angles, delivery.angles_check
-    if plan is None or check is None:
+    words = angles_words(delivery.firmware.angles, delivery.angles_check)
+    if words is None:
         return []
-    proven = [f"{float(u) * ARCSEC_PER_UNIT:.4f}" for u in check.bound.units]
-    vectors = thousands(check.total, " ")
     return [
         _entry(
             "angles",
-            f"{' and '.join(plan.choice.names)} within {' and '.join(proven)} arcsec of the exact "
-            f"ones: proven; {vectors} vectors bit for bit",
+            f"{words.names} within {words.proven} arcsec of the exact ones: proven; "
+            f"{thousands(words.vectors, ' ')} vectors bit for bit",
         )
     ]
 

@@ -1,9 +1,11 @@
-"""[firmware] angles of unit.toml: which angles the device makes of the compensated triad."""
+"""Angles of the device: keys of [firmware], and of an IMU's [device], and what they choose."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from triaxcal.base.keys import setting
+from triaxcal.base.kinds import number, word
 from triaxcal.model.orientation import AIRCRAFT, INCLINOMETER
 
 NONE, ZENITH_TOOL_FACE, PITCH_ROLL = "none", "zenith-tool-face", "pitch-roll"
@@ -45,6 +47,28 @@ class AnglesChoice:
         return KINDS[self.pair]
 
 
-def angles_choice(pair: str, rest_within_g: float, second_from_deg: float) -> AnglesChoice | None:
-    """The choice that unit.toml states; None for no angles."""
-    return None if pair == NONE else AnglesChoice(pair, rest_within_g, second_from_deg)
+@dataclass(frozen=True)
+class AngleKeys:
+    """The keys.
+
+    Attributes
+    ----------
+    angles
+        Which two angles triax_angles makes of the compensated acceleration; none leaves it out.
+    rest_within_g
+        Of triax_angles: |a| further than this from 1 g is flagged, the unit is not at rest.
+    second_angle_from_deg
+        Of triax_angles: tool face, or roll, is flagged as poor where its axis is nearer to the
+        plumb line than this.
+    """
+
+    angles: str = setting(word(ANGLES), NONE)
+    rest_within_g: float = setting(number(1e-4, 0.9), REST_WITHIN_G, "g")
+    second_angle_from_deg: float = setting(number(1e-3, 45.0), SECOND_FROM_DEG, "deg")
+
+    @property
+    def choice(self) -> AnglesChoice | None:
+        """What they state; None for no angles."""
+        if self.angles == NONE:
+            return None
+        return AnglesChoice(self.angles, self.rest_within_g, self.second_angle_from_deg)

@@ -12,7 +12,7 @@ from pathlib import Path
 from triaxcal.base.keys import DESCRIPTION, FileKeys, TableKeys, Values, many_of
 from triaxcal.base.tomltable import content_of, shown, text_of, toml_document
 from triaxcal.unit.adc import ADC, RECORDED_ADC, Adc, adc_of, recorded_adc
-from triaxcal.unit.angles import AnglesChoice, angles_choice
+from triaxcal.unit.angles import AngleKeys, AnglesChoice
 from triaxcal.unit.arithmetic import PORTABLE
 from triaxcal.unit.certificate import CERTIFICATE, CertificateDetails, certificate_details
 from triaxcal.unit.choices import FIT, SENSOR, Compensation, Fit, Sensor, compensation_table
@@ -261,9 +261,7 @@ def _unit_of(name: str, tables: Mapping[str, Values]) -> UnitDescription:
         priors=tables["priors"].record(Priors),
         firmware_terms=firmware.terms,
         prefix=firmware.prefix,
-        angles=angles_choice(
-            firmware.angles, firmware.rest_within_g, firmware.second_angle_from_deg
-        ),
+        angles=tables["firmware"].record(AngleKeys).choice,
         arithmetic=firmware.arithmetic,
         nominal_v_per_g=sensor.nominal_v_per_g,
         nominal_tolerance=sensor.nominal_tolerance,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from triaxcal.base.keys import TableKeys, setting
+from triaxcal.base.keys import TableKeys, keys_of, setting
 from triaxcal.base.kinds import number, word
-from triaxcal.unit.angles import ANGLES, NONE, REST_WITHIN_G, SECOND_FROM_DEG
+from triaxcal.unit.angles import AngleKeys
 from triaxcal.unit.arithmetic import ARITHMETIC, PORTABLE
 from triaxcal.unit.prefix import DEFAULT_PREFIX, PREFIX
 
@@ -60,13 +60,6 @@ class FirmwareChoice:
     prefix
         What the names of functions, types, macros and files in the C begin with. Give each sensor
         of a program its own.
-    angles
-        Which two angles triax_angles makes of the compensated acceleration; none leaves it out.
-    rest_within_g
-        Of triax_angles: |a| further than this from 1 g is flagged, the unit is not at rest.
-    second_angle_from_deg
-        Of triax_angles: tool face, or roll, is flagged as poor where its axis is nearer to the
-        plumb line than this.
     arithmetic
         How the C forms its products. limbs, thumb2 and thumb1 give a second file, as
         triax_comp_thumb2.c, which is compiled in place of triax_comp.c and gives the same bits.
@@ -78,10 +71,11 @@ class FirmwareChoice:
 
     terms: str = setting(word(FIRMWARE_TERMS), AUTO)
     prefix: str = setting(PREFIX, DEFAULT_PREFIX)
-    angles: str = setting(word(ANGLES), NONE)
-    rest_within_g: float = setting(number(1e-4, 0.9), REST_WITHIN_G, "g")
-    second_angle_from_deg: float = setting(number(1e-3, 45.0), SECOND_FROM_DEG, "deg")
     arithmetic: str = setting(ARITHMETIC, PORTABLE)
 
 
-PRIORS, FIRMWARE = TableKeys.of(Priors), TableKeys.of(FirmwareChoice)
+_TERMS, _PREFIX, _ARITHMETIC = keys_of(FirmwareChoice)
+PRIORS = TableKeys.of(Priors)
+FIRMWARE = replace(
+    TableKeys.of(FirmwareChoice), keys=(_TERMS, _PREFIX, *keys_of(AngleKeys), _ARITHMETIC)
+)

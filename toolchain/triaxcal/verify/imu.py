@@ -103,8 +103,9 @@ def triads(folder: Path, build: ImuBuild) -> dict[str, Workspace]:
     length = image_length(image) + IDENTITY_SIZE
     accel = {**build.files, names_of(build.accel).file(IMAGE): image[:length]}
     gyro = {**build.files, names_of(build.gyro).file(IMAGE): image[length:]}
+    parts = build.accel, build.accel_bound, build.angles
     return {
-        ACCELEROMETER: Workspace.create(folder / "accel", accel, build.accel, build.accel_bound),
+        ACCELEROMETER: Workspace.create(folder / "accel", accel, *parts),
         GYRO: Workspace.create(folder / "gyro", gyro, build.gyro, build.gyro_bound),
     }
 

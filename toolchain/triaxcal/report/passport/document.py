@@ -16,6 +16,7 @@ from triaxcal.report.passport.head import unshown
 from triaxcal.report.stated.statements import stated_json
 from triaxcal.report.stated.words import caution_words
 from triaxcal.report.texts.speaker import speaker
+from triaxcal.report.words.angles import uncertainty_document
 from triaxcal.uncertainty.budget import Budget
 from triaxcal.uncertainty.coverage import LEVEL
 from triaxcal.unit.passport import ENGLISH
@@ -40,7 +41,7 @@ def passport_json(p: Passport) -> bytes:
         },
         **_judged(p),
         **_known(p),
-        **_angles(p),
+        **uncertainty_document(p.angles),
         "warnings": [*p.uncertainty.warnings, *filter(None, [p.cause])],
         "compensation": d.firmware.functions.document(),
         "files_sha256": sha256_of_files(d.files),
@@ -94,24 +95,6 @@ def _judged(p: Passport) -> dict[str, Any]:
             for a in p.acceptance
         ],
         "limits_without_dwells": list(p.unchecked),
-    }
-
-
-def _angles(p: Passport) -> dict[str, Any]:
-    """Uncertainty of the angles of the device over the first of them."""
-    if p.angles is None:
-        return {}
-    a = p.angles
-    return {
-        "angles": {
-            "names": list(a.names),
-            "second": "times the sine of the angle between its axis and the plumb line",
-            "first_deg": a.first_deg.tolist(),
-            "expanded_uncertainty_at_t0_arcsec": a.at_t0.tolist(),
-            "expanded_uncertainty_over_range_arcsec": a.over_range.tolist(),
-            "arcsec_per_mg_of_bias": a.per_offset.tolist(),
-            "arcsec_per_1e_3_of_scale": a.per_scale.tolist(),
-        }
     }
 
 

@@ -1,0 +1,221 @@
+"""Angles of a whole IMU: keys, C, API, results, what is known of them, and a planted mistake."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import triaxcal
+from builds import PROVENANCE
+from test_imu import imu_of, triads
+from test_imu_delivery import SIM, change, copied
+from triaxcal.base.errors import RefusedError
+from triaxcal.cli.main import main
+from triaxcal.codegen import imu as codegen
+from triaxcal.codegen.angles import GeneratedAngles, render_angles
+from triaxcal.codegen.imu import ImuBuild, build_imu
+from triaxcal.codegen.names import Names
+from triaxcal.codegen.routines import start_generated_imu
+from triaxcal.dynamic.description import read_dynamic
+from triaxcal.dynamic.device import Device
+from triaxcal.fixedpoint.angles import (
+    STATUS_NOT_AT_REST,
+    STATUS_SECOND_ANGLE,
+    AnglesPlan,
+)
+from triaxcal.fixedpoint.integer_model import STATUS_SATURATED, STATUS_TEMP_LOW
+from triaxcal.report.imuc import C_FILES
+from triaxcal.simulation.unit import write_simulated_unit
+from triaxcal.unit.angles import PITCH_ROLL, ZENITH_TOOL_FACE, AnglesChoice
+
+PROVENANCES = (PROVENANCE, PROVENANCE)
+ANGLES_FILES = {"triax_angles.h", "triax_angles.c"}
+
+
+def device_of(folder: Path, more: str) -> Device:
+    unit = copied(folder / "IMU-SIM")
+    change(unit, "unit.toml", "accel_bits = 21", f"{more}\naccel_bits = 21")
+    device = read_dynamic(unit).device
+    assert device is not None
+    return device
+
+
+# ---- keys ----
+
+
+def test_the_keys_are_those_of_firmware(tmp_path: Path) -> None:
+    found = device_of(tmp_path, 'angles = "zenith-tool-face"\nrest_within_g = 0.1')
+    assert found.angles == AnglesChoice(ZENITH_TOOL_FACE, 0.1)
+    plain = read_dynamic(SIM).device
+    assert plain is not None
+    assert plain.angles is None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('angles = "zenith"', "[device] angles: found 'zenith'"),
+        ('angles = "pitch-roll"\nrest_within_g = 1.5', "[device] rest_within_g: found 1.5"),
+        ("second_angle_from_deg = 0", "[device] second_angle_from_deg: found 0"),
+    ],
+)
+def test_wrong_keys_are_refused(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(RefusedError) as refusal:
+        device_of(tmp_path, text)
+    assert message in str(refusal.value)
+
+
+# ---- the C ----
+
+
+@pytest.fixture(scope="module")
+def build() -> ImuBuild:
+    return build_imu(imu_of(), triads(), PROVENANCES, 1000, choice=AnglesChoice(PITCH_ROLL))
+
+
+def test_an_imu_has_the_angles_of_its_accelerometer(build: ImuBuild) -> None:
+    plain = build_imu(imu_of(), triads(), PROVENANCES, 1000)
+    assert (plain.angles, plain.angles_check) == (None, None)
+    assert set(build.files) - set(plain.files) == ANGLES_FILES
+    assert {name: build.files[name] for name in plain.files} == plain.files
+    assert build.angles == AnglesPlan(AnglesChoice(PITCH_ROLL), build.accel.shape.output_q)
+    assert build.angles_check is not None
+    assert build.angles_check.total > 90_000
+    assert max(build.angles_check.largest_units) > 15
+
+
+def test_the_bits_of_the_angles_are_none_of_both_triads(build: ImuBuild, tmp_path: Path) -> None:
+    header = build.files["triax_comp.h"].decode() + build.files["triax_imu.h"].decode()
+    defined = [line.split() for line in header.splitlines() if "#define TRIAX_STATUS_" in line]
+    values = {int(words[2].rstrip("u")) for words in defined if words[2].rstrip("u").isdigit()}
+    assert {STATUS_TEMP_LOW, STATUS_SATURATED} <= values
+    own = STATUS_SECOND_ANGLE | STATUS_NOT_AT_REST
+    assert not any(own & (value | value * codegen.GYRO_STATUS) for value in values)
+    for name, content in build.files.items():
+        (tmp_path / name).write_bytes(content)
+    assert build.angles is not None
+    library = start_generated_imu(tmp_path, tmp_path).load()
+    g = 1 << build.angles.output_q
+    accel = np.array([[0, 0, g], [-g, 0, 0], [0, 0, 0], [0, g, 0]], np.int32)
+    angle, status = GeneratedAngles(library, build.angles).run(accel)
+    assert status.tolist() == [0, STATUS_SECOND_ANGLE, own, 0]
+    degrees = angle * (360 / 2**32)
+    assert np.abs(degrees - [[0, 0], [90, 0], [0, 0], [0, 90]]).max() < 0.015 / 3600
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("83443u", "83442u"), ("TRIAX_STATUS_NOT_AT_REST", "TRIAX_STATUS_OK")]
+)
+def test_a_planted_mistake_in_the_angles_is_refused(
+    old: str, new: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def planted(plan: AnglesPlan, names: Names) -> dict[str, str]:
+        texts = render_angles(plan, names)
+        assert old in texts["triax_angles.c"]
+        return {**texts, "triax_angles.c": texts["triax_angles.c"].replace(old, new)}
+
+    monkeypatch.setattr(codegen, "render_angles", planted)
+    with pytest.raises(RefusedError, match="cross-check of triax_angles, vector"):
+        build_imu(imu_of(), triads(), PROVENANCES, 100, choice=AnglesChoice(ZENITH_TOOL_FACE))
+
+
+# ---- a delivery ----
+
+
+@pytest.fixture(scope="module")
+def delivered(tmp_path_factory: pytest.TempPathFactory) -> tuple[triaxcal.Delivered, Path]:
+    """IMU-SIM with angles and a prefix, from a short recording."""
+    base = tmp_path_factory.mktemp("angles")
+    unit = copied(base / "IMU-ANGLES")
+    change(unit, "unit.toml", "0.0078125", "0.125")
+    toml = unit / "unit.toml"
+    toml.write_text(f'{toml.read_text()}angles = "zenith-tool-face"\nprefix = "north"\n')
+    write_simulated_unit(unit)
+    return triaxcal.deliver(unit, base / "build"), unit
+
+
+def test_files_and_what_was_shown(delivered: tuple[triaxcal.Delivered, Path]) -> None:
+    done, _ = delivered
+    assert {"north_angles.h", "north_angles.c"} <= set(done.files)
+    assert {"*_angles.h", "*_angles.c"} <= set(C_FILES)
+    shown = json.loads((done.folder / "verification.json").read_text())["angles"]
+    assert [e["angle"] for e in shown["errors"]] == ["zenith", "tool face"]
+    for error in shown["errors"]:
+        assert 0 < error["largest_seen_units"] <= error["bound_units"]
+    assert "  angles        zenith and tool face; proven within 0.0139 and " in done.summary
+    page = (done.folder / "dynamic.html").read_text()
+    assert "Angles, zenith and tool face" in page
+
+
+def test_python_gives_the_angles_of_an_imu(delivered: tuple[triaxcal.Delivered, Path]) -> None:
+    """Of the calibration that was saved, under another prefix and in another arithmetic too."""
+    done, _ = delivered
+    cal = triaxcal.load_imu(done.folder / "calibration.json")
+    fw = triaxcal.firmware_imu(cal)
+    name = "north_angles.c"
+    assert fw.files[name] == (done.folder / name).read_bytes()
+    # A code is 10 micro-g: gravity along z, 30 deg to the side of -x, and none.
+    raw = np.array([[0, 0, 100_000], [-50_000, 0, 86_603], [0, 0, 0]])
+    accel, _, status = fw.apply(raw, np.zeros((3, 3), int), 160)
+    assert not status.any()
+    angle, status = fw.angles(accel)
+    assert angle.dtype == np.uint32
+    assert status[2] & STATUS_NOT_AT_REST
+    degrees = angle * (360 / 2**32)
+    assert degrees[:2, 0] == pytest.approx([0.0, 30.0], abs=1.0)
+    assert abs((degrees[1, 1] + 180) % 360 - 180) < 1.0
+    for other in (
+        triaxcal.firmware_imu(cal, prefix="left"),
+        triaxcal.firmware_imu(cal, arithmetic="thumb1"),
+    ):
+        assert f"{other.prefix}_angles.c" in other.files
+        again, flags = other.angles(accel)
+        assert np.array_equal(again, angle)
+        assert np.array_equal(flags, status)
+    assert other.angles_plan.halves
+    with pytest.raises(RefusedError, match="accel: "):
+        fw.angles([[1, 2]])
+
+
+def test_the_command_writes_them_under_another_prefix(
+    delivered: tuple[triaxcal.Delivered, Path], tmp_path: Path
+) -> None:
+    folder = tmp_path / "c"
+    arguments = ["firmware", str(delivered[0].folder), "--prefix", "left", "--into", str(folder)]
+    done = CliRunner().invoke(main, arguments, catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert {"left_angles.h", "left_angles.c"} <= {p.name for p in folder.iterdir()}
+
+
+def without_angles(document: dict[str, object]) -> None:
+    del document["firmware"]["device"]["angles"]  # type: ignore[attr-defined]
+
+
+def no_angles(document: dict[str, object]) -> None:
+    document["firmware"]["device"]["angles"] = None  # type: ignore[index]
+
+
+@pytest.mark.parametrize("change_of", [without_angles, no_angles])
+def test_a_file_without_angles_has_none(
+    change_of: Callable[[dict[str, object]], None],
+    delivered: tuple[triaxcal.Delivered, Path],
+    tmp_path: Path,
+) -> None:
+    """As every file of an earlier triaxcal."""
+    document = json.loads((delivered[0].folder / "calibration.json").read_text())
+    change_of(document)
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(document))
+    fw = triaxcal.firmware_imu(triaxcal.load_imu(path))
+    assert not [name for name in fw.files if "angles" in name]
+    with pytest.raises(RefusedError) as refusal:
+        fw.angles([[0, 0, 1]])
+    assert str(refusal.value) == (
+        "angles: unit IMU-ANGLES states none; expected [device] angles = "
+        '"zenith-tool-face" or "pitch-roll"; state it in unit.toml'
+    )
