@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -13,7 +15,7 @@ from builds import PROVENANCE, Built
 from device import node as xcp
 from plans import COVERING, SENSOR, random_plan
 from plans import vectors as at_limits
-from triaxcal.cli.rig_fil import build_node
+from triaxcal.cli.rig_fil import build_node, routine_of
 from triaxcal.codegen.crosscheck import python_routine
 from triaxcal.codegen.identity import with_identity
 from triaxcal.codegen.image import image_bytes
@@ -27,10 +29,23 @@ from triaxcal.unit.description import read_unit
 
 SAMPLES = 5000
 REPO = Path(__file__).parents[2]
+BENCH = REPO / "units" / "AT-SIM-BENCH"
 
 
 def main(target: Path) -> None:
-    folder = REPO / "units" / "AT-SIM-BENCH"
+    delivery = rig_node(target / "plain", BENCH)
+    with tempfile.TemporaryDirectory() as name:
+        unit = Path(name) / BENCH.name
+        shutil.copytree(BENCH, unit)
+        with (unit / "unit.toml").open("a", encoding="utf-8") as file:
+            file.write('\n[firmware]\nangles = "zenith-tool-face"\n')
+        rig_node(target / "angles", unit)
+    xcp_node(target / "xcp", delivery)
+
+
+def rig_node(target: Path, folder: Path) -> Delivery:
+    """The node that compensates, and what it has to answer."""
+    target.mkdir()
     unit = read_unit(folder)
     plan = read_plan(REPO / "rig" / "plans" / "five-temperatures.toml", unit)
     delivery = deliver(folder)
@@ -38,9 +53,9 @@ def main(target: Path) -> None:
     limits = (delivery.plan.temp_min_code, delivery.plan.temp_max_code)
     temps, raw = vectors(SAMPLES, limits, 11)
     each = np.repeat(temps, BATCH)[:SAMPLES]
-    accel, status = python_routine(delivery.plan)(each, raw)
-    np.savez(target / "answers.npz", temps=temps, raw=raw, accel=accel, status=status)
-    xcp_node(target / "xcp", delivery)
+    values, status = routine_of(delivery.firmware)(each, raw)
+    np.savez(target / "answers.npz", temps=temps, raw=raw, values=values, status=status)
+    return delivery
 
 
 def xcp_node(target: Path, delivery: Delivery) -> None:

@@ -148,8 +148,9 @@ def test_a_device_that_is_taken_away_and_comes_back(vcan):
     source.close()
 
 
-def test_firmware_in_the_loop_bit_for_bit(vcan):
-    work = Path(WORK)
+@pytest.mark.parametrize("node", ["plain", "angles"])
+def test_firmware_in_the_loop_bit_for_bit(vcan, node):
+    work = Path(WORK) / node
     with np.load(work / "answers.npz") as recorded:
         answers = {name: recorded[name] for name in recorded.files}
     at = [0]
@@ -158,14 +159,14 @@ def test_firmware_in_the_loop_bit_for_bit(vcan):
         rows = slice(at[0], at[0] + len(raw))
         np.testing.assert_array_equal(answers["raw"][rows], raw)
         at[0] += len(raw)
-        return answers["accel"][rows], answers["status"][rows]
+        return answers["values"][rows], answers["status"][rows]
 
     process = subprocess.Popen([str(work / "rig_node"), "can", vcan])
     try:
         link = socketcan.can_socket(vcan, fd=False)
         link.setsockopt(socket.SOL_SOCKET, 33, 4 << 20)
         time.sleep(1.0)  # until the node has bound its socket
-        dbc = read_dbc(default_dbc())
+        dbc = read_dbc(default_dbc(), angles=node == "angles")
         done = exchange(SocketPort(link), dbc, answers["temps"], answers["raw"], routine)
         assert done.samples == 5000
         link.close()
