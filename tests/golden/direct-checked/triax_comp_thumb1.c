@@ -358,18 +358,6 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
         : "r5", "r6", "r12", "cc", "memory");
 }
 
-static int32_t clamp_raw(int32_t code)
-{
-    int32_t result = code;
-    if (result < TRIAX_RAW_MIN) {
-        result = TRIAX_RAW_MIN;
-    }
-    if (result > TRIAX_RAW_MAX) {
-        result = TRIAX_RAW_MAX;
-    }
-    return result;
-}
-
 /* code - TRIAX_RAW_MIN modulo 2^32: a code below the range is far above it. Neither branch wraps. */
 static uint32_t above_min(int32_t code)
 {
@@ -386,6 +374,18 @@ static uint32_t beyond_range(uint32_t bits)
 static uint32_t out_of_range(int32_t ux, int32_t uy, int32_t uz)
 {
     return beyond_range((above_min(ux) | above_min(uy)) | above_min(uz));
+}
+
+static int32_t clamp_raw(int32_t code)
+{
+    int32_t result = code;
+    if (result < TRIAX_RAW_MIN) {
+        result = TRIAX_RAW_MIN;
+    }
+    if (result > TRIAX_RAW_MAX) {
+        result = TRIAX_RAW_MAX;
+    }
+    return result;
 }
 
 static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)

@@ -115,13 +115,6 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
         : "r5", "r6", "r8", "r10", "r11", "r12", "lr", "memory");
 }
 
-static int32_t clamp_raw(int32_t code)
-{
-    int32_t result = code;
-    __asm__("ssat %0, #24, %1" : "=r"(result) : "r"(code));
-    return result;
-}
-
 /* code - TRIAX_RAW_MIN modulo 2^32: a code below the range is far above it. Neither branch wraps. */
 static uint32_t above_min(int32_t code)
 {
@@ -138,6 +131,13 @@ static uint32_t beyond_range(uint32_t bits)
 static uint32_t out_of_range(int32_t ux, int32_t uy, int32_t uz)
 {
     return beyond_range((above_min(ux) | above_min(uy)) | above_min(uz));
+}
+
+static int32_t clamp_raw(int32_t code)
+{
+    int32_t result = code;
+    __asm__("ssat %0, #24, %1" : "=r"(result) : "r"(code));
+    return result;
 }
 
 static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)

@@ -125,18 +125,6 @@ static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t
     }
 }
 
-static int32_t clamp_raw(int32_t code)
-{
-    int32_t result = code;
-    if (result < TRIAX_RAW_MIN) {
-        result = TRIAX_RAW_MIN;
-    }
-    if (result > TRIAX_RAW_MAX) {
-        result = TRIAX_RAW_MAX;
-    }
-    return result;
-}
-
 /* code - TRIAX_RAW_MIN modulo 2^32: a code below the range is far above it. Neither branch wraps. */
 static uint32_t above_min(int32_t code)
 {
@@ -153,6 +141,18 @@ static uint32_t beyond_range(uint32_t bits)
 static uint32_t out_of_range(int32_t ux, int32_t uy, int32_t uz)
 {
     return beyond_range((above_min(ux) | above_min(uy)) | above_min(uz));
+}
+
+static int32_t clamp_raw(int32_t code)
+{
+    int32_t result = code;
+    if (result < TRIAX_RAW_MIN) {
+        result = TRIAX_RAW_MIN;
+    }
+    if (result > TRIAX_RAW_MAX) {
+        result = TRIAX_RAW_MAX;
+    }
+    return result;
 }
 
 static void copy_terms(triax_state_t *state, const triax_calib_t *calib)

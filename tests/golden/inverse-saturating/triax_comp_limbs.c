@@ -246,6 +246,13 @@ static uint32_t invert(int32_t row[3][TRIAX_ROW_WORDS])
     return fits;
 }
 
+/* code - TRIAX_RAW_MIN modulo 2^32: a code below the range is far above it. Neither branch wraps. */
+static uint32_t above_min(int32_t code)
+{
+    return (code < TRIAX_RAW_MIN) ? (uint32_t)(((int64_t)code - TRIAX_RAW_MIN) + INT64_C(4294967296))
+                                 : (uint32_t)((int64_t)code - TRIAX_RAW_MIN);
+}
+
 static int32_t clamp_raw(int32_t code)
 {
     int32_t result = code;
@@ -256,13 +263,6 @@ static int32_t clamp_raw(int32_t code)
         result = TRIAX_RAW_MAX;
     }
     return result;
-}
-
-/* code - TRIAX_RAW_MIN modulo 2^32: a code below the range is far above it. Neither branch wraps. */
-static uint32_t above_min(int32_t code)
-{
-    return (code < TRIAX_RAW_MIN) ? (uint32_t)(((int64_t)code - TRIAX_RAW_MIN) + INT64_C(4294967296))
-                                 : (uint32_t)((int64_t)code - TRIAX_RAW_MIN);
 }
 
 static void clear_rows(int32_t row[3][TRIAX_ROW_WORDS])
