@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 
 import triaxcal
-from compiled_judge import G, Ran, delivered, folder_of
+from compiled_judge import DEVICE, G, Ran, delivered, folder_of
 from thermal_cases import POINTS, at_point, ramp, true_at, truth_of
 from triaxcal.base.errors import RefusedError
+from triaxcal.codegen.angles import GeneratedAngles
 from triaxcal.delivery.imu import deliver_imu
-from triaxcal.dynamic.blocks.base import LOWER
+from triaxcal.delivery.imuangles import accelerometer_uncertainty, imu_angles
+from triaxcal.dynamic.blocks.base import ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX, LOWER
+from triaxcal.dynamic.thermalcurves import covariance_at, joint_covariance_at
 from triaxcal.dynamic.unit import calibrate_unit
 from triaxcal.evidence.examine import examine
+from triaxcal.model.orientation import AIRCRAFT, gravity_direction
 from triaxcal.report.dynamic import dynamic_files, dynamic_summary
 
 BETWEEN = (-25.0, 5.0, 35.0, 70.0)
@@ -26,7 +30,8 @@ BETWEEN = (-25.0, 5.0, 35.0, 70.0)
 def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
     truth = truth_of(3)
     points = [at_point(truth, t, 300 + k) for k, t in enumerate(POINTS)]
-    return delivered(tmp_path_factory.mktemp("over"), truth, points)
+    device = f'{DEVICE}angles = "pitch-roll"\n'
+    return delivered(tmp_path_factory.mktemp("over"), truth, points, device)
 
 
 def codes(ran: Ran, degc: float, force_g: np.ndarray, rate: np.ndarray) -> list[np.ndarray]:
@@ -69,6 +74,70 @@ def test_the_compiled_c_gives_the_true_force_and_rate(ran: Ran, degc: float) -> 
     most = 5 * gyro_sd + 0.55 * c.device.gyro_adc.volts_per_code
     most += np.deg2rad((c.gyro_error_deg_per_h + near * 900) / 3600)
     assert np.abs(rate_found).max() < most
+
+
+def test_the_covariance_of_both_blocks_has_that_of_each(ran: Ran) -> None:
+    over = ran.made.done.over
+    assert over is not None
+    temps, fit = np.array(BETWEEN), over.choice.fit
+    joint = joint_covariance_at(fit, (ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX), temps)
+    for block, place in ((ACCELEROMETER_BIAS, slice(3)), (ACCELEROMETER_MATRIX, slice(3, 9))):
+        alone = covariance_at(fit, block, temps, None)  # type: ignore[arg-type]
+        assert np.allclose(joint[:, place, place], alone, rtol=1e-9, atol=0)
+    u = accelerometer_uncertainty(ran.made.done, ran.c)
+    constants = u.sources[0].force
+    assert constants is not None
+    # Of the bias alone, K within 1 % of E: what the delivery states at each temperature.
+    stated = np.stack(
+        [np.interp(u.temps_degc, over.known.temps_degc, over.known.sd[:, i]) for i in range(3)], 1
+    )
+    found = np.sqrt(np.diagonal(constants, 0, 1, 2)[:, 3::4]) * G
+    assert np.abs(found / stated - 1).max() < 0.05
+
+
+@pytest.mark.parametrize("degc", BETWEEN)
+def test_the_angles_of_the_compiled_c_are_true_within_what_is_stated(ran: Ran, degc: float) -> None:
+    """Pitch and roll of a true orientation, at temperatures that were not recorded."""
+    angles, known = ran.c.build.angles, imu_angles(ran.made.done, ran.c)
+    assert angles is not None
+    assert known is not None
+    rng = np.random.default_rng(2)
+    true = np.radians(np.column_stack([rng.uniform(-85, 85, 300), rng.uniform(-180, 180, 300)]))
+    force = gravity_direction(AIRCRAFT, true)
+    raw_accel, raw_gyro = codes(ran, degc, force, np.zeros_like(force))
+    temp = np.full(len(force), ran.c.device.temperature_sensor.code(degc), np.int32)
+    _, (accel, _, status) = ran.generated.run(None, temp, raw_accel, raw_gyro)
+    assert not status.any()
+    angle, flags = GeneratedAngles(ran.generated.library, angles).run(accel)
+    assert not flags.any()
+    off = (angle * (2 * np.pi / 2**32) - true + np.pi) % (2 * np.pi) - np.pi
+    off[:, 1] *= np.cos(true[:, 0])
+    off_arcsec = np.abs(np.degrees(off) * 3600)
+    stated = np.stack(
+        [np.interp(np.degrees(true[:, 0]), known.first_deg, u) for u in known.over_range.T], 1
+    )
+    # Five standard deviations of 95 % / 1.96; the thermometer's own code as in the test above.
+    near = np.degrees(0.0625 / 60 * 0.06 / G) * 3600
+    assert (off_arcsec < stated * 5 / 1.96 + near).all()
+    # And it is no wide guess: the unit changes by 60 mm/s^2, 1260 arcsec, over temperature.
+    assert stated.max() < 100
+
+
+def test_the_angles_are_known_over_temperature_in_json_and_on_the_page(ran: Ran) -> None:
+    files = dynamic_files(ran.made)
+    shown = json.loads(files["verification.json"])["angles"]["uncertainty"]
+    assert shown["names"] == ["pitch", "roll"]
+    assert shown["not_in_it"] == [
+        "the mounting of the unit",
+        "the noise of a sample",
+        "drift since the recording",
+    ]
+    over, at_t0 = (
+        np.array(shown[f"expanded_uncertainty_{where}_arcsec"]) for where in ("over_range", "at_t0")
+    )
+    assert (over >= at_t0).all()
+    assert (over > 1.2 * at_t0).any()  # nothing was recorded between the points
+    assert b"Angles of the device" in files["dynamic.html"]
 
 
 def test_constants_of_one_temperature_would_be_far_off(ran: Ran) -> None:

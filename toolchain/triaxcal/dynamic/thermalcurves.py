@@ -56,6 +56,25 @@ def covariance_at(fit: Fit, block: StateBlock, temps_degc: FloatArray, basis: Ba
     return found * np.outer(prior, prior)
 
 
+def joint_covariance_at(
+    fit: Fit, blocks: Sequence[StateBlock], temps_degc: FloatArray
+) -> FloatArray:
+    """Covariance of the constants of several blocks, one after the other, as `covariance_at`.
+
+    By their functions alone: without what a group that is free may differ from its own.
+    """
+    rows = []
+    for block in blocks:
+        places, values = fit.places[block.name], fit.shapes[block.name].basis(temps_degc)
+        for state, place in zip(block.states, places, strict=True):
+            row = np.zeros((len(temps_degc), len(fit.covariance)))
+            row[:, place] = values * (state.prior_sd * state.per_unit)
+            rows.append(row)
+    stacked = np.stack(rows, axis=1)
+    found: FloatArray = stacked @ fit.covariance @ np.swapaxes(stacked, 1, 2)
+    return found
+
+
 def averaged_covariance(
     curves: Curves, known: Information, choice: Choice, block: StateBlock, temps_degc: FloatArray
 ) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.delivery.imu import ImuDelivery
+from triaxcal.delivery.imuangles import imu_angles, not_in_them
 from triaxcal.delivery.imuverdict import ON_RECORDING
 from triaxcal.delivery.verdict import NOT_CHECKED, NOT_SHOWN, PASSED, REFUSED
 from triaxcal.dynamic.calibrate import DynamicResult
@@ -21,6 +22,7 @@ from triaxcal.report.imuc import NO_C, imu_verification
 from triaxcal.report.imunoise import noise_words
 from triaxcal.report.imurecording import STAYS_OFF_SD, effect_words, recorded_words
 from triaxcal.report.overtemperature import over_context
+from triaxcal.report.passport.angles import angles_context, arcsec_of_routine
 from triaxcal.report.stated.statements import statements_of
 from triaxcal.report.stated.words import label, value_words
 from triaxcal.report.texts.html import page
@@ -105,6 +107,7 @@ def dynamic_page(made: ImuDelivery, tools: Mapping[str, Mapping[str, Any]]) -> b
         "coverage": COVERAGE,
         "width": PANEL_WIDTH,
         "height": PANEL_HEIGHT,
+        "angles": _angles(made),
         "no_c": f"No C: {NO_C.removeprefix('none: ')}",
         "verification": imu_verification(made),
         "tools": [
@@ -200,6 +203,22 @@ def _warnings(made: ImuDelivery) -> list[str]:
                 f'on "{effect.name}" in [dynamic] blocks.'
             )
     return found
+
+
+def _angles(made: ImuDelivery) -> dict[str, Any] | None:
+    """Context of the section on the angles; None where the device makes none."""
+    found = imu_angles(made.done, made.c)
+    check = None if made.c is None else made.c.build.angles_check
+    if found is None or check is None:
+        return None
+    first, second = arcsec_of_routine(check)
+    note = (
+        "Worst orientation. In it: the standard deviations of the accelerometers' constants with "
+        "their correlations, the rounding of the codes, and the C. Not in it: "
+        f"{'; '.join(not_in_them(made.done))}. The routine itself is within {first} and {second} "
+        "arcsec: proven."
+    )
+    return angles_context(found, speaker(ENGLISH), note)
 
 
 def _range(place: slice) -> range:

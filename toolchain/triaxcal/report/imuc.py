@@ -9,14 +9,16 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes, sha256_of_files
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import CrossCheck
+from triaxcal.codegen.imu import ImuBuild
 from triaxcal.codegen.names import names_of, shape_id
 from triaxcal.delivery.imu import METHOD, ImuC, ImuDelivery
+from triaxcal.delivery.imuangles import imu_angles, not_in_them
 from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.device import REQUIRED
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
 from triaxcal.report.a2l import Triad, linked_a2l
-from triaxcal.report.words.angles import angles_document, angles_words
+from triaxcal.report.words.angles import angles_document, angles_words, uncertainty_document
 from triaxcal.report.words.firmware import checked_words, proven_words
 from triaxcal.report.words.numbers import g_in_words, significant, thousands
 
@@ -95,12 +97,22 @@ def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:
             "model_error_deg_per_h": c.gyro_model_error_deg_per_h,
             "error_deg_per_h": c.gyro_error_deg_per_h,
         },
-        **angles_document(build.angles, build.angles_check),
+        **_angles(made, c),
         "both_together_vectors": build.vectors,
         "mismatches": 0,
         "files_sha256": sha256_of_files(build.files),
     }
     return json_bytes(document)
+
+
+def _angles(made: ImuDelivery, c: ImuC) -> dict[str, Any]:
+    """As of a unit, and beside it what is known of the angles; nothing where there are none."""
+    found = angles_document(c.build.angles, c.build.angles_check)
+    known = uncertainty_document(imu_angles(made.done, c))
+    if known:
+        missing = {"not_in_it": list(not_in_them(made.done))}
+        found["angles"]["uncertainty"] = {**known["angles"], **missing}
+    return found
 
 
 def _triad(plan: Plan, bound: Bound, check: CrossCheck) -> dict[str, Any]:
@@ -155,24 +167,30 @@ def imu_verification(made: ImuDelivery) -> list[tuple[str, str]]:
             "Both together",
             f"{thousands(build.vectors)} vectors, constants and image: Python = generated C",
         ),
+        *_angle_rows(build),
         (
             "Not corrected",
             "; ".join(c.fitted.left_out) or "nothing: every estimated effect is corrected",
         ),
     ]
-    words = angles_words(build.angles, build.angles_check)
-    if words is not None:
-        shown = (
-            f"within {words.proven} arcsec of the exact ones of the accelerometer's result: "
-            f"proven; {thousands(words.vectors)} vectors: Python = generated C"
-        )
-        rows.append((f"Angles, {words.names}", shown))
     constant = constant_triads(made)
     if constant:
         rows.append(
             ("Constant over temperature", f"{' and '.join(constant)}: no temperature block")
         )
     return rows
+
+
+def _angle_rows(build: ImuBuild) -> list[tuple[str, str]]:
+    """What is proven of the angles' routine."""
+    words = angles_words(build.angles, build.angles_check)
+    if words is None:
+        return []
+    shown = (
+        f"within {words.proven} arcsec of the exact ones of the accelerometer's result: "
+        f"proven; {thousands(words.vectors)} vectors: Python = generated C"
+    )
+    return [(f"Angles, {words.names}", shown)]
 
 
 def _with_functions(own: float, total: float) -> str:
@@ -194,6 +212,24 @@ def _own_thermometer(c: ImuC) -> list[str]:
     codes = thousands(c.build.gyro_bound.codes, " ")
     text = f"gyro by its own thermometer: {low:g} to {high:g} degC, {codes} temperature codes"
     return [f"                {text}"]
+
+
+def _angle_lines(made: ImuDelivery, c: ImuC) -> list[str]:
+    """Proven error of the routine, and how well the angles are known."""
+    words = angles_words(c.build.angles, c.build.angles_check)
+    known = imu_angles(made.done, c)
+    if words is None or known is None:
+        return []
+    vectors = thousands(words.vectors, " ")
+    first, second = (significant(float(u)) for u in known.over_range.max(axis=0))
+    other = known.names[1]
+    axis = "z" if c.build.angles is not None and c.build.angles.zenith else "x"
+    return [
+        f"  angles        {words.names}; proven within {words.proven} arcsec,",
+        f"                {vectors} vectors: Python and generated C agree;",
+        f"                uncertainty (95 %) {first} and {second} arcsec, {other} divided by",
+        f"                the sine of the angle between axis {axis} and the plumb line",
+    ]
 
 
 def imu_c_lines(made: ImuDelivery) -> list[str]:
@@ -224,13 +260,7 @@ def imu_c_lines(made: ImuDelivery) -> list[str]:
         f"                {together[1]} deg/h",
         f"  checked       {agree}",
     ]
-    words = angles_words(build.angles, build.angles_check)
-    if words is not None:
-        vectors = thousands(words.vectors, " ")
-        lines += [
-            f"  angles        {words.names}; proven within {words.proven} arcsec,",
-            f"                {vectors} vectors: Python and generated C agree",
-        ]
+    lines += _angle_lines(made, c)
     lines += [f"  not corrected {title}" for title in c.fitted.left_out]
     for what in constant_triads(made):
         lines += [

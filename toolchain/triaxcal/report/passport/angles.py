@@ -1,4 +1,4 @@
-"""The section of the passport on the angles of the device."""
+"""The section of the passport, and of an IMU's page, on the angles of the device."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from triaxcal.codegen.angles_check import AnglesCheck
 from triaxcal.fixedpoint.angles import ARCSEC_PER_UNIT
 from triaxcal.model.types import FloatArray
 from triaxcal.report.passport.content import Passport
 from triaxcal.report.pictures.curves import HEIGHT, LEFT, RIGHT, WIDTH, Frame, x_ticks, y_ticks
 from triaxcal.report.texts.speaker import Speaker
 from triaxcal.report.words.numbers import significant
+from triaxcal.uncertainty.angles import AngleUncertainty
 
 _STYLES = (("curve", ""), ("curve2", ""))
 _AXES = (("curve", ""), ("curve2", "5 4"), ("curve", "2 3"))
@@ -24,8 +26,19 @@ def angles_section(p: Passport, t: Speaker) -> dict[str, Any] | None:
     a, check = p.angles, p.delivery.angles_check
     if a is None or check is None:
         return None
+    first, second = arcsec_of_routine(check)
+    return angles_context(a, t, t("angles.note", r_first=first, r_second=second))
+
+
+def arcsec_of_routine(check: AnglesCheck) -> tuple[str, str]:
+    """Proven errors of the routine, rounded upwards."""
+    first, second = (_upwards(float(u) * ARCSEC_PER_UNIT) for u in check.bound.units)
+    return first, second
+
+
+def angles_context(a: AngleUncertainty, t: Speaker, note: str) -> dict[str, Any]:
+    """Context of the section; `note` says where the uncertainty is from."""
     first, second = (t(f"angles.{name.replace(' ', '_')}") for name in a.names)
-    routine = [_upwards(float(u) * ARCSEC_PER_UNIT) for u in check.bound.units]
     names = {"first": first, "second": second}
     values = {
         "u_first": significant(float(a.over_range[:, 0].max())),
@@ -33,7 +46,7 @@ def angles_section(p: Passport, t: Speaker) -> dict[str, Any] | None:
     }
     return {
         "lead": t("angles.lead", **names, **values),
-        "note": t("angles.note", r_first=routine[0], r_second=routine[1]),
+        "note": note,
         "legend": t("angles.legend", **names),
         "panels": [
             {**_panel(values, styles, a.first_deg), "title": title, "alt": alt}
