@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +20,13 @@ from triaxcal.base.screentext import wrapped
 from triaxcal.cli.main import main
 from triaxcal.codegen import imu as codegen
 from triaxcal.codegen.angles import GeneratedAngles, render_angles
+from triaxcal.codegen.compiler import compile_library
 from triaxcal.codegen.imu import ImuBuild, build_imu
 from triaxcal.codegen.names import Names
 from triaxcal.codegen.routines import start_generated_imu
 from triaxcal.delivery.imu import ImuDelivery
-from triaxcal.delivery.imuangles import _by_states, _of_constants, imu_angles
+from triaxcal.delivery.imuangles import _by_states, _of_constants, imu_angles, not_in_them
+from triaxcal.dynamic.blocks import accelnonlinearity
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
 from triaxcal.dynamic.description import read_dynamic
@@ -116,6 +119,19 @@ def test_the_bits_of_the_angles_are_none_of_both_triads(build: ImuBuild, tmp_pat
     assert status.tolist() == [0, STATUS_SECOND_ANGLE, own, 0]
     degrees = angle * (360 / 2**32)
     assert np.abs(degrees - [[0, 0], [90, 0], [0, 0], [0, 90]]).max() < 0.015 / 3600
+
+
+@pytest.mark.parametrize("pair", [PITCH_ROLL, ZENITH_TOOL_FACE])
+def test_the_example_of_the_guide_compiles(pair: str, tmp_path: Path) -> None:
+    page = (SIM.parents[1] / "docs" / "how-to" / "angles.md").read_text(encoding="utf-8")
+    blocks = [text.partition("```")[0] for text in page.split("```c\n")[1:]]
+    (example,) = [block for block in blocks if "triax_imu" in block]
+    made = build_imu(imu_of(), triads(), PROVENANCES, 100, choice=AnglesChoice(pair))
+    for name, content in made.files.items():
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "example.c").write_text(example)
+    sources = [path for path in tmp_path.glob("*.c") if "selftest" not in path.name]
+    assert compile_library(sources, tmp_path / "example", [tmp_path]).load().imu_sample
 
 
 @pytest.mark.parametrize(
@@ -221,6 +237,16 @@ def test_the_uncertainty_is_stated(delivered: tuple[triaxcal.Delivered, Path]) -
     )
     assert "the sine of the angle between axis z and the plumb line" in done.summary
     assert max(map(len, wrapped(done.summary, 80).splitlines())) <= 80
+
+
+def test_an_effect_that_the_c_does_not_correct_is_named(
+    delivered: tuple[triaxcal.Delivered, Path],
+) -> None:
+    done = made_of(delivered[0]).done
+    layout = Layout((*done.result.layout.blocks, accelnonlinearity.BLOCK))
+    more = replace(done, result=replace(done.result, layout=layout))
+    (named,) = set(not_in_them(more)) - set(not_in_them(done))
+    assert named == "nonlinearity of the accelerometers, which the C does not correct"
 
 
 def test_states_become_errors_of_the_constants_at_each_temperature() -> None:
