@@ -60,6 +60,12 @@ static int32_t saturate32(int64_t value)
     return (int32_t)result;
 }
 
+/* The status of a sample of which a result was saturated; `status` is one of these four. */
+static uint32_t with_saturated(uint32_t status)
+{
+    return status | TRIAX_STATUS_SATURATED;
+}
+
 static int64_t magnitude(int32_t value)
 {
     return (value < 0) ? -(int64_t)value : (int64_t)value;
@@ -299,19 +305,19 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
     sum_x = asr64_29(sum_x);
     accel[0] = saturate32(sum_x);
     if ((int64_t)accel[0] != sum_x) {
-        status |= TRIAX_STATUS_SATURATED;
+        status = with_saturated(status);
     }
     sum_y += ((int64_t)state->row[1][3] * INT64_C(4294967296)) + INT64_C(268435456);
     sum_y = asr64_29(sum_y);
     accel[1] = saturate32(sum_y);
     if ((int64_t)accel[1] != sum_y) {
-        status |= TRIAX_STATUS_SATURATED;
+        status = with_saturated(status);
     }
     sum_z += ((int64_t)state->row[2][3] * INT64_C(4294967296)) + INT64_C(268435456);
     sum_z = asr64_29(sum_z);
     accel[2] = saturate32(sum_z);
     if ((int64_t)accel[2] != sum_z) {
-        status |= TRIAX_STATUS_SATURATED;
+        status = with_saturated(status);
     }
     return status;
 }

@@ -43,13 +43,11 @@ def loader_not_covered(shape: Shape) -> str:
 
 def not_covered(shape: Shape) -> str:
     """Which part of a shape has no complete contracts; "" where all have them."""
-    narrow = shape.raw_max - shape.raw_min != 2**32 - 1
     parts = {
         "the inverse form": shape.inverse is not None,
         "quadratic terms": shape.quadratic,
         "a term in dT/dt with constant functions": shape.rate and not shape.order,
         "a term in dT/dt with sums of high words": shape.rate and shape.high_words,
         "functions of order 6 and above": shape.order > 5,
-        "saturating results of raw codes of fewer than 32 bits": shape.saturates and narrow,
     }
     return next((name for name, has in parts.items() if has), "")
