@@ -25,6 +25,8 @@ from plans import (
     ROW_LIMIT_QUADRATIC,
     integer_plan,
     integer_shape,
+    random_function,
+    random_matrix_rows,
     random_plan,
     random_rows,
     vectors,
@@ -210,6 +212,42 @@ def test_the_loader_accepts_what_the_model_does(name: str) -> None:
         verdicts.append(found)
     assert verdicts.count(True) > 20
     assert verdicts.count(False) > 100
+
+
+@pytest.mark.parametrize("name", [name for name, shape in WRITTEN.items() if shape.inverse])
+def test_what_cannot_be_inverted_is_known(name: str) -> None:
+    """K from full words to small ones, whose inverse does not fit, and anything for K."""
+    rng = random.Random(name)
+    shape = WRITTEN[name]
+    spec = defined(random_plan(rng, shape))
+    verdicts = []
+    for size in (1.0, 0.7, 0.5, 0.35, 0.25, 0.1, 0.0, None) * 6:
+        rows = [
+            [random_function(rng, shape.order, INT32_MAX, full=False) for _ in range(12)]
+            if size is None
+            else random_matrix_rows(rng, shape.order, size)
+            for _ in range(shape.segments)
+        ]
+        plan = integer_plan(shape, rows)
+        calib = constants_of(constant_words(plan), shape)
+        assert spec["calib_fits"](calib)
+        codes = [rng.randint(plan.temp_min_code, plan.temp_max_code) for _ in range(3)]
+        for code, (state, _) in zip(codes, states_of(plan, codes), strict=True):
+            found = spec["state_fits"](Pointer(state[0].row))
+            assert spec["code_invertible"](calib, code) == found
+            assert spec["state_is"](state, calib, code)
+            verdicts.append(found)
+    assert {True, False} == set(verdicts)
+
+
+def test_rows_of_zeros() -> None:
+    zero = defined(plan_of("inverse-order-2"))["rows_are_zero"]
+    rows = [[0] * 4 for _ in range(3)]
+    assert zero(Pointer(rows))
+    for i, j in itertools.product(range(3), range(4)):
+        rows[i][j] = -1
+        assert not zero(Pointer(rows))
+        rows[i][j] = 0
 
 
 def test_words_and_crc_of_an_image() -> None:

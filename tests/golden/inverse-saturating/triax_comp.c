@@ -12,6 +12,7 @@
 #define ROW_LIMIT INT64_C(4294967288)
 
 /* The int32_t with these 32 bits: two's complement whatever the compiler does in a cast. */
+/*@ assigns \nothing; ensures \result == (bits <= INT32_MAX ? bits : bits - 4294967296); */
 static int32_t s32(uint32_t bits)
 {
     const uint32_t inverted = UINT32_MAX - bits;
@@ -19,35 +20,41 @@ static int32_t s32(uint32_t bits)
 }
 
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
+/*@ assigns \nothing; ensures \result == floor_32(value); */
 static int32_t high_word(int64_t value)
 {
     return (value < 0) ? (-1 - (int32_t)((-1 - value) >> 32)) : (int32_t)(value >> 32);
 }
 
 /* floor(value / 2^2) */
+/*@ assigns \nothing; ensures \result == floor_2(value); */
 static int64_t asr64_2(int64_t value)
 {
     return (value < 0) ? (-1 - ((-1 - value) >> 2)) : (value >> 2);
 }
 
 /* floor(value / 2^29) */
+/*@ assigns \nothing; ensures \result == floor_29(value); */
 static int64_t asr64_29(int64_t value)
 {
     return (value < 0) ? (-1 - ((-1 - value) >> 29)) : (value >> 29);
 }
 
 /* floor(value / 2^30) */
+/*@ assigns \nothing; ensures \result == floor_30(value); */
 static int64_t asr64_30(int64_t value)
 {
     return (value < 0) ? (-1 - ((-1 - value) >> 30)) : (value >> 30);
 }
 
 /* floor(value / 2^31) */
+/*@ assigns \nothing; ensures \result == floor_31(value); */
 static int64_t asr64_31(int64_t value)
 {
     return (value < 0) ? (-1 - ((-1 - value) >> 31)) : (value >> 31);
 }
 
+/*@ assigns \nothing; ensures \result == clamp(value, INT32_MIN, INT32_MAX); */
 static int32_t saturate32(int64_t value)
 {
     int64_t result = value;
@@ -61,27 +68,39 @@ static int32_t saturate32(int64_t value)
 }
 
 /* The status of a sample of which a result was saturated; `status` is one of these four. */
+/*@ requires status == 0 || status == TRIAX_STATUS_RAW_RANGE || status == TRIAX_STATUS_SATURATED || status == TRIAX_STATUS_RAW_RANGE + TRIAX_STATUS_SATURATED;
+    assigns \nothing;
+    ensures status == 0 ==> \result == TRIAX_STATUS_SATURATED;
+    ensures status == TRIAX_STATUS_RAW_RANGE ==> \result == TRIAX_STATUS_RAW_RANGE + TRIAX_STATUS_SATURATED;
+    ensures status == TRIAX_STATUS_SATURATED ==> \result == TRIAX_STATUS_SATURATED;
+    ensures status == TRIAX_STATUS_RAW_RANGE + TRIAX_STATUS_SATURATED ==> \result == TRIAX_STATUS_RAW_RANGE + TRIAX_STATUS_SATURATED; */
 static uint32_t with_saturated(uint32_t status)
 {
     return status | TRIAX_STATUS_SATURATED;
 }
 
+/*@ assigns \nothing; ensures \result == mag(value); */
 static int64_t magnitude(int32_t value)
 {
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
+/*@ assigns \nothing; ensures \result == prod(a, b); */
 static int64_t times(int32_t a, int32_t b)
 {
     return (int64_t)a * b;
 }
 
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
+/*@ requires step_bound(c, mag(p)) <= INT32_MAX; assigns \nothing;
+    ensures \result == step(c, x_q31, p) && mag(\result) <= step_bound(c, mag(p)); */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
     return c + high_word(times(x_q31, p));
 }
 
+/*@ requires \valid_read(c + (0 .. TRIAX_ORDER)) && horner_fits(c); assigns \nothing;
+    ensures \result == polynomial(c, x_q31); */
 static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
 {
     int32_t p = c[2];
@@ -90,6 +109,16 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
     return p;
 }
 
+/*@ requires \valid(row + (0 .. 2)) && \valid_read(segment) && \separated(row + (0 .. 2), segment);
+    requires 0 <= j < 4 && horner_fits(&segment->coefficient[j][0]) && horner_fits(&segment->coefficient[4 + j][0]) && horner_fits(&segment->coefficient[8 + j][0]);
+    assigns (&row[0][0])[0 .. 11];
+    ensures row[0][j] == \old(polynomial(&segment->coefficient[j][0], x_q31));
+    ensures \forall integer k; 0 <= k < j ==> row[0][k] == \old(row[0][k]);
+    ensures row[1][j] == \old(polynomial(&segment->coefficient[4 + j][0], x_q31));
+    ensures \forall integer k; 0 <= k < j ==> row[1][k] == \old(row[1][k]);
+    ensures row[2][j] == \old(polynomial(&segment->coefficient[8 + j][0], x_q31));
+    ensures \forall integer k; 0 <= k < j ==> row[2][k] == \old(row[2][k]);
+ */
 static void evaluate_column(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment, uint32_t j,
                             int32_t x_q31)
 {
@@ -99,6 +128,13 @@ static void evaluate_column(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment
 }
 
 /* A column at a time: the loop's overhead is shared by three functions. */
+/*@ requires \valid(row + (0 .. 2)) && \valid_read(segment) && \separated(row + (0 .. 2), segment);
+    requires functions_fit(segment);
+    assigns (&row[0][0])[0 .. 11];
+    ensures column_is{Post,Pre}(&row[0][0], segment, 0, 4, x_q31);
+    ensures column_is{Post,Pre}(&row[1][0], segment, 4, 4, x_q31);
+    ensures column_is{Post,Pre}(&row[2][0], segment, 8, 4, x_q31);
+ */
 static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
                           int32_t x_q31)
 {
@@ -109,12 +145,15 @@ static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t
 }
 
 /* |a|, |b|, |c|, |d| < 2^31, so the difference stays below 2^63. */
+/*@ requires mag(a) <= INT32_MAX && mag(b) <= INT32_MAX; assigns \nothing; ensures \result == cofactor(a, b, c, d); */
 static int32_t cofactor(int32_t a, int32_t b, int32_t c, int32_t d)
 {
     return saturate32(asr64_31(times(a, d) - times(b, c)));
 }
 
 /* Element i, j of the adjugate: the cofactor of element j, i of K. */
+/*@ requires \valid_read(row + (0 .. 2)) && words_fit(row) && i < 3 && j < 3; assigns \nothing;
+    ensures \result == adjugate_at(row, i, j); */
 static int32_t cofactor_at(int32_t row[3][TRIAX_ROW_WORDS], uint32_t i, uint32_t j)
 {
     const uint32_t i2 = (i + 2u) % 3u;
@@ -124,6 +163,10 @@ static int32_t cofactor_at(int32_t row[3][TRIAX_ROW_WORDS], uint32_t i, uint32_t
     return cofactor(row[j1][i1], row[j1][i2], row[j2][i1], row[j2][i2]);
 }
 
+/*@ requires \valid_read(row + (0 .. 2)) && \valid(adjugate + (0 .. 2)) && words_fit(row);
+    requires \separated(row + (0 .. 2), adjugate + (0 .. 2));
+    assigns (&adjugate[0][0])[0 .. 8];
+    ensures adjugate_is{Post,Pre}(adjugate, row) && rows_same{Post,Pre}(row); */
 static void adjugate_of(int32_t row[3][TRIAX_ROW_WORDS], int32_t adjugate[3][3])
 {
     uint32_t i;
@@ -136,6 +179,8 @@ static void adjugate_of(int32_t row[3][TRIAX_ROW_WORDS], int32_t adjugate[3][3])
 }
 
 /* Expanded along the first row; a quarter of each product, so that the sum fits. */
+/*@ requires \valid_read(row + (0 .. 2)) && \valid_read(adjugate + (0 .. 2)); assigns \nothing;
+    ensures \result == expanded(row[0], row[1], row[2], adjugate[0][0], adjugate[1][0], adjugate[2][0]); */
 static int32_t determinant_of(const int32_t row[3], int32_t adjugate[3][3])
 {
     int64_t determinant = 0;
@@ -147,6 +192,7 @@ static int32_t determinant_of(const int32_t row[3], int32_t adjugate[3][3])
 }
 
 /* 2^61 / determinant towards zero, the determinant kept away from zero. */
+/*@ assigns \nothing; ensures \result == reciprocal_of(determinant); */
 static int32_t reciprocal(int32_t determinant)
 {
     int64_t divisor = magnitude(determinant);
@@ -159,18 +205,25 @@ static int32_t reciprocal(int32_t determinant)
 }
 
 /* An element of K^-1: half up. */
-static int32_t gain(int32_t adjugate, int32_t inverse)
+/*@ assigns \nothing; ensures \result == gain_of(adjugate, inverse); */
+static int32_t element(int32_t adjugate, int32_t inverse)
 {
     return saturate32(asr64_31(times(adjugate, inverse) + INT64_C(1073741824)));
 }
 
 /* An element of -K^-1 U0: half up, and half an output LSB for the rounding of triax_apply. */
+/*@ requires -4611686018427387904 <= product <= 4611686018427387904; assigns \nothing; ensures \result == rounded_offset(product); */
 static int32_t offset_of(int64_t product)
 {
     return saturate32(-asr64_30(product + INT64_C(536870912)));
 }
 
 /* A row of K^-1 and -K^-1 U0; returns what must stay below ROW_LIMIT. */
+/*@ requires \valid(row + (0 .. 3)) && \valid_read(adjugate + (0 .. 2)) && \valid_read(u0 + (0 .. 2));
+    requires \separated(row + (0 .. 3), adjugate + (0 .. 2)) && \separated(row + (0 .. 3), u0 + (0 .. 2));
+    assigns row[0 .. 3];
+    ensures inverse_row_is(row, adjugate, u0, inverse);
+    ensures \result == mag(row[0]) + mag(row[1]) + mag(row[2]) + 2 * mag(row[3]); */
 static int64_t invert_row(int32_t row[TRIAX_ROW_WORDS], const int32_t adjugate[3], int32_t inverse,
                           const int32_t u0[3])
 {
@@ -178,7 +231,7 @@ static int64_t invert_row(int32_t row[TRIAX_ROW_WORDS], const int32_t adjugate[3
     int64_t row_sum = 0;
     uint32_t j;
     for (j = 0u; j < 3u; j++) {
-        row[j] = gain(adjugate[j], inverse);
+        row[j] = element(adjugate[j], inverse);
         product += asr64_2(times(row[j], u0[j]));
         row_sum += magnitude(row[j]);
     }
@@ -187,6 +240,12 @@ static int64_t invert_row(int32_t row[TRIAX_ROW_WORDS], const int32_t adjugate[3
 }
 
 /* Turns rows of K and U0 into rows of K^-1 and -K^-1 U0. Returns 0 when a row does not fit. */
+/*@ requires \valid(row + (0 .. 2)) && words_fit(row);
+    assigns (&row[0][0])[0 .. 11];
+    ensures inverse_is(row, \old(row[0][0]), \old(row[0][1]), \old(row[0][2]), \old(row[1][0]), \old(row[1][1]), \old(row[1][2]), \old(row[2][0]), \old(row[2][1]), \old(row[2][2]), \old(row[0][3]), \old(row[1][3]), \old(row[2][3]));
+    ensures \result == 0 || \result == 1;
+    ensures \result == 1 ==> state_fits(row);
+    ensures \result == 1 <==> \old(invertible(row[0][0], row[0][1], row[0][2], row[1][0], row[1][1], row[1][2], row[2][0], row[2][1], row[2][2], row[0][3], row[1][3], row[2][3])); */
 static uint32_t invert(int32_t row[3][TRIAX_ROW_WORDS])
 {
     const int32_t u0[3] = {row[0][3], row[1][3], row[2][3]};
@@ -206,12 +265,14 @@ static uint32_t invert(int32_t row[3][TRIAX_ROW_WORDS])
 }
 
 /* code - TRIAX_RAW_MIN modulo 2^32: a code below the range is far above it. Neither branch wraps. */
+/*@ assigns \nothing; ensures \result == above_min(code); */
 static uint32_t above_min(int32_t code)
 {
     return (code < TRIAX_RAW_MIN) ? (uint32_t)(((int64_t)code - TRIAX_RAW_MIN) + INT64_C(4294967296))
                                  : (uint32_t)((int64_t)code - TRIAX_RAW_MIN);
 }
 
+/*@ assigns \nothing; ensures \result == clamp(code, TRIAX_RAW_MIN, TRIAX_RAW_MAX); */
 static int32_t clamp_raw(int32_t code)
 {
     int32_t result = code;
@@ -224,6 +285,7 @@ static int32_t clamp_raw(int32_t code)
     return result;
 }
 
+/*@ requires \valid(row + (0 .. 2)); assigns (&row[0][0])[0 .. 11]; ensures rows_are_zero(row) && state_fits(row); */
 static void clear_rows(int32_t row[3][TRIAX_ROW_WORDS])
 {
     uint32_t i;
@@ -236,6 +298,12 @@ static void clear_rows(int32_t row[3][TRIAX_ROW_WORDS])
 }
 
 /* The functions at a temperature, inverted; rows of zeros, and 0, when a row does not fit. */
+/*@ requires \valid(row + (0 .. 2)) && \valid_read(segment) && \separated(row + (0 .. 2), segment);
+    requires functions_fit(segment);
+    assigns (&row[0][0])[0 .. 11];
+    ensures \old(functions_invertible(segment, x_q31)) ==> \result == 1 && functions_inverted{Post,Pre}(row, segment, x_q31);
+    ensures !\old(functions_invertible(segment, x_q31)) ==> \result == 0 && rows_are_zero(row);
+    ensures state_fits(row); */
 static uint32_t invert_at(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
                           int32_t x_q31)
 {
@@ -248,11 +316,20 @@ static uint32_t invert_at(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t
     return fits;
 }
 
+/*@ requires \valid_read(segment) && scaled_fits(code, segment->origin_code, segment->gain); assigns \nothing;
+    ensures \result == x_at(segment, code); */
 static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)
 {
     return (code - segment->origin_code) * segment->gain;
 }
 
+/*@ requires \valid(state) && \valid_read(calib) && \separated(state, calib) && calib_fits(calib);
+    assigns *state;
+    ensures \old(code_invertible(calib, clamp(temp_code, calib->temp_min_code, calib->temp_max_code))) ==> \result == \old(temperature_status(calib, temp_code));
+    ensures \old(code_invertible(calib, clamp(temp_code, calib->temp_min_code, calib->temp_max_code))) ==> state_is{Post,Pre}(state, calib, \old(clamp(temp_code, calib->temp_min_code, calib->temp_max_code)));
+    ensures !\old(code_invertible(calib, clamp(temp_code, calib->temp_min_code, calib->temp_max_code))) ==> \result == (\old(temperature_status(calib, temp_code)) | TRIAX_STATUS_BAD_IMAGE);
+    ensures !\old(code_invertible(calib, clamp(temp_code, calib->temp_min_code, calib->temp_max_code))) ==> rows_are_zero(&state->row[0]);
+    ensures state_fits(&state->row[0]); */
 uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib, int32_t temp_code)
 {
     const triax_segment_t *segment = &calib->segment[0];
@@ -275,6 +352,14 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
     return status;
 }
 
+/*@ requires \valid_read(state) && \valid_read(raw_code + (0 .. 2)) && \valid(accel + (0 .. 2)) && state_fits(&state->row[0]);
+    requires \separated(state, accel + (0 .. 2));
+    assigns accel[0 .. 2];
+    ensures accel[0] == \old(result(&state->row[0][0], code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2])));
+    ensures accel[1] == \old(result(&state->row[1][0], code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2])));
+    ensures accel[2] == \old(result(&state->row[2][0], code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2])));
+    ensures \result == \old(raw_status(raw_code[0], raw_code[1], raw_code[2]) +
+      saturated_status(exact(&state->row[0][0], code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2])), exact(&state->row[1][0], code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2])), exact(&state->row[2][0], code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2])))); */
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3])
 {
     uint32_t status = TRIAX_STATUS_OK;

@@ -206,7 +206,7 @@ static int32_t reciprocal(int32_t determinant)
 }
 
 /* An element of K^-1: half up. */
-static int32_t gain(int32_t adjugate, int32_t inverse)
+static int32_t element(int32_t adjugate, int32_t inverse)
 {
     return saturate32(asr64_31(times(adjugate, inverse) + INT64_C(1073741824)));
 }
@@ -225,7 +225,7 @@ static int64_t invert_row(int32_t row[TRIAX_ROW_WORDS], const int32_t adjugate[3
     int64_t row_sum = 0;
     uint32_t j;
     for (j = 0u; j < 3u; j++) {
-        row[j] = gain(adjugate[j], inverse);
+        row[j] = element(adjugate[j], inverse);
         product += asr64_2(times(row[j], u0[j]));
         row_sum += magnitude(row[j]);
     }

@@ -43,9 +43,11 @@ def loader_not_covered(shape: Shape) -> str:
 
 def not_covered(shape: Shape) -> str:
     """Which part of a shape has no complete contracts; "" where all have them."""
+    inverse = shape.inverse is not None
     parts = {
-        "the inverse form": shape.inverse is not None,
         "quadratic terms": shape.quadratic,
+        "constant functions in the inverse form": inverse and not shape.order,
+        "a term in dT/dt in the inverse form": inverse and shape.rate,
         "a term in dT/dt with constant functions": shape.rate and not shape.order,
         "a term in dT/dt with sums of high words": shape.rate and shape.high_words,
         "functions of order 6 and above": shape.order > 5,
