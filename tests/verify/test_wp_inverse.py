@@ -69,7 +69,9 @@ FAULTS = {
     ),
     "a reciprocal without its sign": (C, "reciprocal", "? -quotient", "? quotient"),
     "a determinant that may be 0": (C, "reciprocal", "divisor <", "divisor + 1 <"),
-    "a gain rounded down": (C, "element", "inverse) + INT64_C(1073741824)", "inverse) + INT64_C(0)"),
+    "a gain rounded down": (
+        C, "element", "inverse) + INT64_C(1073741824)", "inverse) + INT64_C(0)"
+    ),
     "half an output LSB less": (C, "offset_of", "asr64_30(product", "1 + asr64_30(product"),
     "one word of U0 for all": (C, "invert_row", "times(row[j], u0[j])", "times(row[j], u0[0])"),
     "a negative gain takes room away": (
