@@ -71,6 +71,7 @@ LONG = {
     "rig/test_safety.py",
     "rig/test_session.py",
     "rig/test_unattended.py",
+    "targets/test_imu_on_targets.py",
     "targets/test_targets.py",
     "targets/test_two_sensors.py",
     "test_angles_delivery.py",

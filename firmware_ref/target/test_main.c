@@ -15,6 +15,14 @@
 #ifdef CASE_GYRO
 #include "triax_gyro_calib.h"
 #include "triax_gyro_selftest.h"
+/* With a prefix they are names of the accelerometer's. */
+#undef triax_calib_t
+#undef triax_state_t
+#undef triax_calib_load
+#undef TRIAX_CALIB
+#undef TRIAX_IMAGE_SIZE
+#undef TRIAX_RAW_MIN
+#undef triax_selftest
 #define triax_calib_t triax_gyro_calib_t
 #define triax_state_t triax_gyro_state_t
 #define triax_calib_load triax_gyro_calib_load

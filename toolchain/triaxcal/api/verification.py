@@ -11,14 +11,14 @@ from typing import Any
 from triaxcal.base.progress import Progress
 from triaxcal.base.publish import publish, renew
 from triaxcal.base.tomltable import has_table
-from triaxcal.delivery.imu import deliver_imu
+from triaxcal.delivery.imu import deliver_imu, refuse_no_device
 from triaxcal.delivery.unit import deliver
 from triaxcal.device.record import read_record, record_path
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.report.dynamic import dynamic_files
 from triaxcal.report.dynamicpage import dynamic_page
 from triaxcal.report.files import SOMETIMES, all_files, passport_files
-from triaxcal.report.imuc import C_FILES, refuse_no_device
+from triaxcal.report.imuc import C_FILES
 from triaxcal.report.passport.content import passport
 from triaxcal.unit.folder import find_unit
 from triaxcal.verify import certificate

@@ -25,9 +25,11 @@ def test(unit: Path | None, build: Path) -> None:
     """Compare the C on every core with Python, bit for bit.
 
     Every compiler and optimisation is tried, with the C of UNIT or, without it, of the shipped
-    units in units/. The exit code is 1 unless every build was done and passed.
+    units in units/. Of an IMU these are the routines of both triads. The exit code is 1 unless
+    every build was done and passed.
     """
     from triaxcal.base.publish import publish  # noqa: PLC0415  numpy and jinja2 only when needed
+    from triaxcal.cli.progress import bar  # noqa: PLC0415
     from triaxcal.targets.matrix import (  # noqa: PLC0415
         PASSED,
         Outcome,
@@ -35,10 +37,14 @@ def test(unit: Path | None, build: Path) -> None:
         shipped_builds,
         unit_builds,
     )
-    from triaxcal.targets.shapes import shipped_cases, unit_case  # noqa: PLC0415
+    from triaxcal.targets.shapes import shipped_cases, unit_cases  # noqa: PLC0415
     from triaxcal.targets.table import counts, matrix_json, matrix_table  # noqa: PLC0415
 
-    builds = unit_builds(unit_case(unit)) if unit else shipped_builds(shipped_cases(Path("units")))
+    if unit:
+        with bar() as calibrating:
+            builds = [b for case in unit_cases(unit, calibrating) for b in unit_builds(case)]
+    else:
+        builds = shipped_builds(shipped_cases(Path("units")))
 
     def progress(outcome: Outcome, done: int) -> None:
         if outcome.status != PASSED or done % 10 == 0 or sys.stderr.isatty():

@@ -20,7 +20,7 @@ from triaxcal.delivery.imuverdict import ImuVerdict, judge_imu, refusal_of
 from triaxcal.delivery.inputs import files_sha256
 from triaxcal.dynamic.calibrate import NotSettledError
 from triaxcal.dynamic.description import DynamicDescription, read_dynamic
-from triaxcal.dynamic.device import Device
+from triaxcal.dynamic.device import REQUIRED, Device
 from triaxcal.dynamic.unit import DynamicUnit, calibrate_described
 from triaxcal.evidence.check import Evidence
 from triaxcal.evidence.examine import examine
@@ -108,6 +108,37 @@ def deliver_imu(folder: Path, progress: Progress | None = None) -> ImuDelivery:
         As `read_dynamic` and `deliver_described`.
     """
     return deliver_described(read_dynamic(folder), progress)
+
+
+def refuse_no_device(unit: DynamicDescription) -> None:
+    """Refuse a unit that gets no C where C is asked for.
+
+    Raises
+    ------
+    RefusedError
+    """
+    if unit.device is None:
+        raise RefusedError(
+            str(unit.path),
+            "has no [device], so no C is generated",
+            expected="[device] with " + ", ".join(REQUIRED),
+            remedy="add it: docs/how-to/imu.md",
+        )
+
+
+def deliver_imu_c(folder: Path, progress: Progress | None = None) -> ImuC:
+    """As `deliver_imu`, for its C alone.
+
+    Raises
+    ------
+    RefusedError
+        As `deliver_imu` and `refuse_no_device`.
+    """
+    unit = read_dynamic(folder)
+    refuse_no_device(unit)
+    made = deliver_described(unit, progress)
+    assert made.c is not None
+    return made.c
 
 
 def deliver_described(unit: DynamicDescription, progress: Progress | None = None) -> ImuDelivery:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from triaxcal import __version__
-from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes, sha256_of_files
 from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import CrossCheck
@@ -13,7 +12,6 @@ from triaxcal.codegen.imu import ImuBuild
 from triaxcal.codegen.names import names_of, shape_id
 from triaxcal.delivery.imu import METHOD, ImuC, ImuDelivery
 from triaxcal.delivery.imuangles import imu_angles, not_in_them
-from triaxcal.dynamic.description import DynamicDescription
 from triaxcal.dynamic.device import REQUIRED
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
@@ -31,22 +29,6 @@ C_FILES = (
 """What a unit with [device] receives besides; * is its prefix."""
 NO_C = "none: unit.toml has no [device]; add it with " + ", ".join(REQUIRED)
 FORMAT = 1
-
-
-def refuse_no_device(unit: DynamicDescription) -> None:
-    """Refuse a unit that gets no C where C is asked for.
-
-    Raises
-    ------
-    RefusedError
-    """
-    if unit.device is None:
-        raise RefusedError(
-            str(unit.path),
-            "has no [device], so no C is generated",
-            expected="[device] with " + ", ".join(REQUIRED),
-            remedy="add it: docs/how-to/imu.md",
-        )
 
 
 def imu_c_files(made: ImuDelivery) -> dict[str, bytes]:

@@ -8,12 +8,16 @@ from functools import cache
 from pathlib import Path
 
 from triaxcal.base.errors import RefusedError
+from triaxcal.base.progress import Progress
+from triaxcal.base.tomltable import has_table
 from triaxcal.codegen.angles import angles_plan, render_angles
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.image import image_bytes
+from triaxcal.codegen.imu import ImuBuild
 from triaxcal.codegen.names import Names, names_of
 from triaxcal.codegen.render import arithmetic_of, render_routine, routine_file
 from triaxcal.codegen.selftest import render_selftest
+from triaxcal.delivery.imu import deliver_imu_c
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.delivery.order import choose_functions
 from triaxcal.fitting.core.calibration import Calibration
@@ -27,6 +31,7 @@ from triaxcal.readings.measurements import MEASUREMENTS_FILE, MeasurementSet, re
 from triaxcal.unit.angles import PITCH_ROLL, ZENITH_TOOL_FACE, AnglesChoice
 from triaxcal.unit.arithmetic import HIGH_WORDS
 from triaxcal.unit.description import UnitDescription, read_unit
+from triaxcal.unit.folder import find_unit
 
 
 @dataclass(frozen=True)
@@ -175,6 +180,31 @@ def shipped_cases(units: Path) -> tuple[Case, ...]:
 def unit_case(folder: Path) -> Case:
     """The shape of the unit in `folder`."""
     return made_case(folder, folder.absolute().name, "as described", lambda u: u, NO_TERMS)
+
+
+def unit_cases(folder: Path, progress: Progress | None = None) -> tuple[Case, ...]:
+    """The shape of the unit in `folder`; of an IMU those of accelerometer and gyro.
+
+    Raises
+    ------
+    RefusedError
+        When the unit's files are refused, or its calibration; for an IMU without [device].
+    """
+    if has_table(find_unit(folder), "dynamic"):
+        return imu_cases(folder.absolute().name, deliver_imu_c(folder, progress).build)
+    return (unit_case(folder),)
+
+
+def imu_cases(name: str, build: ImuBuild) -> tuple[Case, Case]:
+    """The shapes of both triads of an IMU; its angles are made with the accelerometer's."""
+    gyro = f"{names_of(build.gyro).triad}_"
+    texts = {f: c.decode() for f, c in build.files.items() if f.endswith((".h", ".c"))}
+    of_gyro = {f: text for f, text in texts.items() if f.startswith(gyro)}
+    of_accel = {f: text for f, text in texts.items() if f not in of_gyro}
+    accel = Case(
+        f"{name}, accelerometer", "", build.accel, of_accel, image_bytes(build.accel), build.angles
+    )
+    return accel, Case(f"{name}, gyro", "", build.gyro, of_gyro, image_bytes(build.gyro))
 
 
 @cache
