@@ -45,10 +45,11 @@ WRITTEN = {name: shape for name, shape in COVERING.items() if not (shape.quadrat
 """Shapes whose specification is written."""
 
 SEGMENTED = "two segments, 24-bit codes"
+GYRO_SEGMENTED = "gyro, two segments, 32-bit codes"
 WRITTEN[SEGMENTED] = integer_shape(segments=2, order=2)
 WRITTEN |= {
     "gyro": replace(integer_shape(order=2), gyro=True),
-    "gyro, two segments, 32-bit codes": replace(
+    GYRO_SEGMENTED: replace(
         integer_shape(segments=2, order=1, raw=(INT32_MIN, INT32_MAX)), gyro=True
     ),
     "gyro, saturating, order 0": replace(integer_shape(order=0, output_shift=31), gyro=True),
@@ -197,10 +198,23 @@ def test_specification_and_model_agree(name: str) -> None:
     compare_constants(name)
 
 
-@pytest.mark.parametrize("name", [SEGMENTED, "direct-cubic-24-bit"])
+LOADED = (
+    SEGMENTED,
+    "direct-cubic-24-bit",
+    "direct-order-0",
+    "direct-32-bit-two-segments",
+    "direct-16-bit",
+    "high-words-two-segments",
+    "gyro",
+    GYRO_SEGMENTED,
+)
+"""Of every order that the loader is proven for, sums of high words and gyros."""
+
+
+@pytest.mark.parametrize("name", LOADED)
 def test_the_loader_accepts_what_the_model_does(name: str) -> None:
     """Images that are damaged, at every limit, wild, and with an identity."""
-    plan = random_plan(random.Random(name), WRITTEN[name])
+    plan = plan_of(name)
     spec = defined(plan)
     verdicts = []
     for case in image_cases(plan, image_bytes(plan)):
@@ -358,15 +372,20 @@ LOADER_FAULTS = {
     "functions of another row": ("row_words_fit(image, s, 8)", "row_words_fit(image, s, 4)"),
     "any identity": ("==> identity_fits(image))", "==> size > 0)"),
     "no header": ("&& header_fits(image) &&", "&&"),
+    "terms not looked at": ("&& terms_words_fit(image)", ""),
+    "the last of terms left out": (
+        "sum_of_terms(image, i, 3) <= 5",
+        "sum_of_terms(image, i, 2) <= 5",
+    ),
 }
 
 
 @pytest.mark.parametrize("name", list(LOADER_FAULTS))
 def test_a_mistake_in_what_is_accepted_is_seen(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     old, new = LOADER_FAULTS[name]
-    plan = random_plan(random.Random(SEGMENTED), WRITTEN[SEGMENTED])
-    text = specification(plan, opaque=False)
+    shape = "gyro" if "terms" in name else SEGMENTED
+    text = specification(plan_of(shape), opaque=False)
     assert text.count(old) == 1
     monkeypatch.setattr(f"{__name__}.specification", lambda *_, **__: text.replace(old, new))
     with pytest.raises(AssertionError):
-        test_the_loader_accepts_what_the_model_does(SEGMENTED)
+        test_the_loader_accepts_what_the_model_does(shape)

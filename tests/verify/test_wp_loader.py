@@ -2,52 +2,81 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from plans import integer_shape
+from plans import INT32_MAX, INT32_MIN, integer_shape
 from triaxcal.codegen.annotations import loader_not_covered
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.render import annotated_routine, specification
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.verify import wp
-from triaxcal.verify.outcome import FAILED
+from triaxcal.verify.outcome import FAILED, PASSED
 from verify.conftest import needs
 from verify.test_wp import nothing_known
-from verify.test_wp_codes import workspace
-from verify.wp_cases import SPECIFICATION, C, plant
+from verify.test_wp_terms import workspace
+from verify.wp_cases import SPECIFICATION, C, plant, refuse_proof
 
 __all__ = ["nothing_known"]
 
 PROVERS = needs("frama-c", "why3", "cvc4", "z3")
 SHAPE = integer_shape(order=2, segments=2)
 LOADER = (
-    "word_at", "int_at", "crc32", "horner_bound", "x_fits", "segment_fits", "read_segment",
-    "constants_fit", "identity_fits", "image_fits", "read_calib", "calib_check", "calib_load",
+    "word_at", "int_at", "crc32", "horner_bound", "x_fits", "segment_fits", "terms_fit",
+    "read_function", "read_segment", "constants_fit", "identity_fits", "image_fits",
+    "read_terms", "read_calib", "calib_check", "calib_load",
 )  # fmt: skip
+SHAPES = {
+    "constants": integer_shape(order=0),
+    "order 1": integer_shape(order=1),
+    "order 1, three segments": integer_shape(order=1, segments=3),
+    "order 2, two segments": SHAPE,
+    "order 4": integer_shape(order=4),
+    "order 5, two segments": integer_shape(order=5, segments=2),
+    "sums of high words": integer_shape(order=2, segments=2, high_words=True),
+    "saturating": integer_shape(order=3, output_shift=30, raw=(INT32_MIN, INT32_MAX)),
+    "gyro, constants": replace(integer_shape(order=0), gyro=True),
+    "gyro, cubic": replace(integer_shape(order=3), gyro=True),
+    "gyro, two segments": replace(integer_shape(order=1, segments=2), gyro=True),
+}
+GYRO = "gyro, cubic"
+
+
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_the_loader_has_contracts_where_it_is_covered(tmp_path: Path, name: str) -> None:
+    shape = SHAPES[name]
+    plan = workspace(shape, tmp_path / "work").plan
+    assert not loader_not_covered(shape)
+    present = wp.functions_of(annotated_routine(plan), names_of(plan).linked)
+    own = {"terms_fit", "read_terms"} if not shape.gyro else set()
+    assert [name for name in present if name in LOADER] == [n for n in LOADER if n not in own]
+    assert "accepted" in specification(plan, opaque=True)
 
 
 @pytest.mark.parametrize(
     ("shape", "reason"),
     [
-        (SHAPE, ""),
-        (integer_shape(order=0), ""),
-        (integer_shape(order=1), "functions of order 1, 4 and above"),
-        (integer_shape(order=4), "functions of order 1, 4 and above"),
+        (replace(SHAPE, rate=True), "a term in dT/dt"),
+        (replace(SHAPE, quadratic=True), "quadratic terms"),
     ],
 )
-def test_the_loader_has_contracts_where_it_is_covered(
-    tmp_path: Path, shape: Shape, reason: str
-) -> None:
-    plan = workspace(shape, tmp_path / "work").plan
+def test_the_loader_has_none_elsewhere(shape: Shape, reason: str) -> None:
     assert loader_not_covered(shape) == reason
-    text = annotated_routine(plan)
-    present = wp.functions_of(text, names_of(plan).linked)
-    assert [name for name in present if name in LOADER] == ([] if reason else list(LOADER))
-    assert ("accepted" in specification(plan, opaque=True)) == (not reason)
-    # The whole of the loader has them or nothing of it: no step of the proof is left alone.
-    assert ("/*@" in text[text.index("uint32_t word_at") :]) == (not reason)
+
+
+@PROVERS
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_every_goal_of_the_loader_is_proven(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    functions_of = wp.functions_of
+    monkeypatch.setattr(wp, "functions_of", lambda *a: [f for f in functions_of(*a) if f in LOADER])
+    outcome = wp.check(workspace(SHAPES[name], tmp_path / "work"))
+    assert outcome.result == PASSED, outcome
+    assert {"calib_load", "read_segment", "lemmas"} <= set(outcome.figures["goals"])
 
 
 FAULTS = {
@@ -99,7 +128,56 @@ FAULTS = {
         SPECIFICATION, "lemmas", "\\forall integer s; 0 <= s < n ==> segment_passes",
         "\\forall integer s; 1 <= s < n ==> segment_passes",
     ),
+    "a word less of each function": (
+        C, "read_function", "k <= (size_t)TRIAX_ORDER", "k < (size_t)TRIAX_ORDER",
+    ),
+    "words of the function before": (
+        C, "read_segment", "at += (size_t)TRIAX_ORDER + 1u", "at += (size_t)TRIAX_ORDER",
+    ),
 }  # fmt: skip
+OF_GYRO = {
+    "a term not counted": (
+        C,
+        "terms_fit",
+        "k < 3u; k++) {\n            row_sum",
+        "k < 2u; k++) {\n            row_sum",
+    ),
+    "terms with their signs": (
+        C,
+        "terms_fit",
+        "magnitude(int_at(image, TERMS_AT + (3u * i) + k))",
+        "int_at(image, TERMS_AT + (3u * i) + k)",
+    ),
+    "terms one beyond the limit": (C, "terms_fit", "INT64_C(536870912)", "INT64_C(536870913)"),
+    "terms of two rows": (
+        C,
+        "terms_fit",
+        "i < 3u; i++) {\n        int64_t row_sum = 0;\n        size_t k",
+        "i < 2u; i++) {\n        int64_t row_sum = 0;\n        size_t k",
+    ),
+    "terms not looked at": (C, "constants_fit", "terms_fit(image) == 0u", "fits == 2u"),
+    "rows and columns exchanged": (
+        C,
+        "read_terms",
+        "int_at(image, TERMS_AT + (3u * i) + k);",
+        "int_at(image, TERMS_AT + (3u * k) + i);",
+    ),
+    "terms that are not read": (C, "read_calib", "    read_terms(calib, image);\n", ""),
+    "specification: terms one word further": (
+        SPECIFICATION,
+        "read_terms",
+        "= 69 + 3 * i + k",
+        "= 70 + 3 * i + k",
+    ),
+    "specification: twice the room": (
+        SPECIFICATION,
+        "terms_fit",
+        "i, 3) <= 536870912",
+        "i, 3) <= 1073741824",
+    ),
+    "specification: any terms": (SPECIFICATION, "constants_fit", "&& terms_words_fit(image)", ""),
+}
+FAULTS |= OF_GYRO
 """Text that has the mistake, function whose goals fail (or the lemmas), and the mistake."""
 
 
@@ -110,17 +188,19 @@ def test_a_planted_mistake_is_not_proven(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     text, function, old, new = FAULTS[name]
-    work = workspace(SHAPE, tmp_path / "work")
+    work = workspace(SHAPES[GYRO] if name in OF_GYRO else SHAPE, tmp_path / "work")
     original = {C: annotated_routine, SPECIFICATION: specification}[text]
     assert str(original(work.plan, **({} if text == C else {"opaque": False}))).count(old) == 1
 
+    if function != "lemmas":
+        refuse_proof(work, monkeypatch, FAULTS[name])
+        return
     plant(monkeypatch, text, old, new)
     monkeypatch.setattr(wp, "GOAL_S", 5)
-    of_lemmas = function == "lemmas"
     lemmas_of = wp.lemmas_of
     # A part without functions is one of lemmas; the last has those of the constants.
-    monkeypatch.setattr(wp, "lemmas_of", lambda t: lemmas_of(t)[-1:] if of_lemmas else [])
-    monkeypatch.setattr(wp, "functions_of", lambda *_: [] if of_lemmas else [function])
+    monkeypatch.setattr(wp, "lemmas_of", lambda t: lemmas_of(t)[-1:])
+    monkeypatch.setattr(wp, "functions_of", lambda *_: [])
     outcome = wp.check(work)
     assert outcome.result == FAILED
     assert "not proven: " in outcome.finding

@@ -324,6 +324,18 @@ static uint32_t segment_fits(const triax_segment_t *segment)
     return fits;
 }
 
+/*@ requires \valid(c + (0 .. TRIAX_ORDER)) && \valid_read(image + (0 .. TRIAX_IMAGE_SIZE - 1));
+    requires 0 <= at && at + TRIAX_ORDER < TRIAX_IMAGE_SIZE / 4 && \separated(c + (0 .. TRIAX_ORDER), image + (0 .. TRIAX_IMAGE_SIZE - 1));
+    assigns c[0 .. TRIAX_ORDER];
+    ensures function_is{Post,Pre}(c, image, at); */
+static void read_function(int32_t c[TRIAX_ORDER + 1], const uint8_t *image, size_t at)
+{
+    size_t k;
+    for (k = 0u; k <= (size_t)TRIAX_ORDER; k++) {
+        c[k] = int_at(image, at + k);
+    }
+}
+
 /*@ requires \valid(segment) && \valid_read(image + (0 .. TRIAX_IMAGE_SIZE - 1)) && 0 <= s < TRIAX_SEGMENTS;
     requires \separated(segment, image + (0 .. TRIAX_IMAGE_SIZE - 1));
     assigns *segment;
@@ -337,11 +349,8 @@ static void read_segment(triax_segment_t *segment, const uint8_t *image, size_t 
     segment->gain = int_at(image, at + 2u);
     at += 3u;
     for (i = 0u; i < 12u; i++) {
-        uint32_t k;
-        for (k = 0u; k <= (uint32_t)TRIAX_ORDER; k++) {
-            segment->coefficient[i][k] = int_at(image, at);
-            at++;
-        }
+        read_function(segment->coefficient[i], image, at);
+        at += (size_t)TRIAX_ORDER + 1u;
     }
 }
 

@@ -268,6 +268,14 @@ static uint32_t segment_fits(const triax_segment_t *segment)
     return fits;
 }
 
+static void read_function(int32_t c[TRIAX_ORDER + 1], const uint8_t *image, size_t at)
+{
+    size_t k;
+    for (k = 0u; k <= (size_t)TRIAX_ORDER; k++) {
+        c[k] = int_at(image, at + k);
+    }
+}
+
 static void read_segment(triax_segment_t *segment, const uint8_t *image, size_t s)
 {
     size_t at = SEGMENTS_AT + (s * SEGMENT_WORDS);
@@ -277,11 +285,8 @@ static void read_segment(triax_segment_t *segment, const uint8_t *image, size_t 
     segment->gain = int_at(image, at + 2u);
     at += 3u;
     for (i = 0u; i < 12u; i++) {
-        uint32_t k;
-        for (k = 0u; k <= (uint32_t)TRIAX_ORDER; k++) {
-            segment->coefficient[i][k] = int_at(image, at);
-            at++;
-        }
+        read_function(segment->coefficient[i], image, at);
+        at += (size_t)TRIAX_ORDER + 1u;
     }
 }
 

@@ -314,6 +314,14 @@ static uint32_t terms_fit(const uint8_t *image)
     return fits;
 }
 
+static void read_function(int32_t c[TRIAX_ORDER + 1], const uint8_t *image, size_t at)
+{
+    size_t k;
+    for (k = 0u; k <= (size_t)TRIAX_ORDER; k++) {
+        c[k] = int_at(image, at + k);
+    }
+}
+
 static void read_segment(triax_segment_t *segment, const uint8_t *image, size_t s)
 {
     size_t at = SEGMENTS_AT + (s * SEGMENT_WORDS);
@@ -323,11 +331,8 @@ static void read_segment(triax_segment_t *segment, const uint8_t *image, size_t 
     segment->gain = int_at(image, at + 2u);
     at += 3u;
     for (i = 0u; i < 12u; i++) {
-        uint32_t k;
-        for (k = 0u; k <= (uint32_t)TRIAX_ORDER; k++) {
-            segment->coefficient[i][k] = int_at(image, at);
-            at++;
-        }
+        read_function(segment->coefficient[i], image, at);
+        at += (size_t)TRIAX_ORDER + 1u;
     }
 }
 
@@ -401,6 +406,17 @@ static uint32_t image_fits(const uint8_t *image, size_t size)
     return fits;
 }
 
+static void read_terms(triax_calib_t *calib, const uint8_t *image)
+{
+    size_t i;
+    size_t k;
+    for (i = 0u; i < 3u; i++) {
+        for (k = 0u; k < 6u; k++) {
+            calib->quadratic[i][k] = int_at(image, TERMS_AT + (6u * i) + k);
+        }
+    }
+}
+
 static void read_calib(triax_calib_t *calib, const uint8_t *image)
 {
     size_t s;
@@ -410,12 +426,7 @@ static void read_calib(triax_calib_t *calib, const uint8_t *image)
     for (s = 0u; s < (size_t)TRIAX_SEGMENTS; s++) {
         read_segment(&calib->segment[s], image, s);
     }
-    for (s = 0u; s < 3u; s++) {
-        size_t k;
-        for (k = 0u; k < 6u; k++) {
-            calib->quadratic[s][k] = int_at(image, TERMS_AT + (6u * s) + k);
-        }
-    }
+    read_terms(calib, image);
 }
 
 uint32_t triax_calib_check(const uint8_t *image, size_t size)

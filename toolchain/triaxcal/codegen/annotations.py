@@ -34,9 +34,8 @@ def loader_not_covered(shape: Shape) -> str:
     """Which part of a shape has no contracts in its loader; "" where all have them."""
     parts = {
         "the inverse form": shape.inverse is not None,
-        "further terms": shape.adds_to_sums or shape.rate,
-        "sums of high words": shape.high_words,
-        "functions of order 1, 4 and above": shape.order not in (0, 2, 3),
+        "quadratic terms": shape.quadratic,
+        "a term in dT/dt": shape.rate,
     }
     return next((name for name, has in parts.items() if has), "")
 

@@ -45,7 +45,7 @@ OF_VALUES = (
     "s32", "high_word", "asr32", "asr64", "saturate32", "with_saturated", "magnitude", "times",
     "evaluate", "x_q31_of", "rate_q31_of", "above_min", "beyond_range", "out_of_range",
     "copy_rows", "nearest_raw", "clamp_raw", "cofactor", "reciprocal", "element", "offset_of",
-    "word_at", "crc32", "horner_bound", "x_fits",
+    "word_at", "crc32", "horner_bound", "x_fits", "rate_fits",
 )  # fmt: skip
 """Functions proven with every definition."""
 OF_MEMORY = (
@@ -57,7 +57,8 @@ OF_MEMORY = (
 )  # fmt: skip
 """Functions proven with what lemmas say of the definitions."""
 OF_LOADER = (
-    "int_at", "segment_fits", "read_segment", "constants_fit", "identity_fits", "image_fits",
+    "int_at", "segment_fits", "terms_fit", "read_function", "read_segment", "constants_fit",
+    "identity_fits", "image_fits", "read_terms", "read_rate",
     "read_calib", "calib_check", "calib_load",
 )  # fmt: skip
 """The same for what reads memory in the loader."""
