@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from plans import integer_plan, integer_shape
+from plans import COVERING, integer_plan, integer_shape
 from triaxcal.codegen.render import annotated_routine, specification
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.verify import wp
@@ -28,9 +28,10 @@ SHAPES = {
     "constants": integer_shape(order=0),
     "order 4": integer_shape(order=4),
     "order 5, 32 bits, two segments": integer_shape(order=5, segments=2, raw=(-(2**31), 2**31 - 1)),
+    "order 9, eight segments": COVERING["direct-order-9-eight-segments"],
     "sums of high words": integer_shape(order=0, high_words=True, raw=(-8_000_000, 8_200_000)),
 }
-CUBIC, ODD, CONSTANT, FIFTH, HIGH = (list(SHAPES)[i] for i in (0, 1, 3, 5, 6))
+CUBIC, ODD, CONSTANT, FIFTH, HIGH = (list(SHAPES)[i] for i in (0, 1, 3, 5, 7))
 
 
 def workspace(shape: Shape, folder: Path) -> Workspace:

@@ -36,6 +36,7 @@ def loader_not_covered(shape: Shape) -> str:
         "the inverse form": shape.inverse is not None,
         "quadratic terms": shape.quadratic,
         "a term in dT/dt": shape.rate,
+        "functions of order 6 and above": shape.order > 5,
     }
     return next((name for name, has in parts.items() if has), "")
 
@@ -49,6 +50,5 @@ def not_covered(shape: Shape) -> str:
         "a term in dT/dt in the inverse form": inverse and shape.rate,
         "a term in dT/dt with constant functions": shape.rate and not shape.order,
         "a term in dT/dt with sums of high words": shape.rate and shape.high_words,
-        "functions of order 6 and above": shape.order > 5,
     }
     return next((name for name, has in parts.items() if has), "")
