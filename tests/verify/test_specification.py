@@ -205,10 +205,12 @@ LOADED = (
     "direct-32-bit-two-segments",
     "direct-16-bit",
     "high-words-two-segments",
+    "inverse-order-2",
+    "inverse-32-bit-three-segments",
     "gyro",
     GYRO_SEGMENTED,
 )
-"""Of every order that the loader is proven for, sums of high words and gyros."""
+"""Orders that the loader is proven for, sums of high words, the inverse form and gyros."""
 
 
 @pytest.mark.parametrize("name", LOADED)

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 
 import pytest
 
-from plans import INT32_MAX, INT32_MIN, integer_shape
+from plans import COVERING, INT32_MAX, INT32_MIN, integer_shape, random_plan
 from triaxcal.codegen.annotations import loader_not_covered
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.render import annotated_routine, specification
 from triaxcal.fixedpoint.shape import Shape
 from triaxcal.verify import wp
 from triaxcal.verify.outcome import FAILED, PASSED
+from triaxcal.verify.workspace import Workspace
 from verify.conftest import needs
 from verify.test_wp import nothing_known
-from verify.test_wp_terms import workspace
-from verify.wp_cases import SPECIFICATION, C, plant, refuse_proof
+from verify.test_wp_terms import plan_of
+from verify.wp_cases import SPECIFICATION, C, plant, refuse_proof, workspace_of
 
 __all__ = ["nothing_known"]
 
@@ -28,6 +30,7 @@ LOADER = (
     "read_function", "read_segment", "constants_fit", "identity_fits", "image_fits",
     "read_terms", "read_calib", "calib_check", "calib_load",
 )  # fmt: skip
+INVERSE = "inverse, three segments"
 SHAPES = {
     "constants": integer_shape(order=0),
     "order 1": integer_shape(order=1),
@@ -37,11 +40,18 @@ SHAPES = {
     "order 5, two segments": integer_shape(order=5, segments=2),
     "sums of high words": integer_shape(order=2, segments=2, high_words=True),
     "saturating": integer_shape(order=3, output_shift=30, raw=(INT32_MIN, INT32_MAX)),
+    INVERSE: COVERING["inverse-32-bit-three-segments"],
     "gyro, constants": replace(integer_shape(order=0), gyro=True),
     "gyro, cubic": replace(integer_shape(order=3), gyro=True),
     "gyro, two segments": replace(integer_shape(order=1, segments=2), gyro=True),
 }
 GYRO = "gyro, cubic"
+
+
+def workspace(shape: Shape, folder: Path) -> Workspace:
+    """The routine of a shape, with constants that WP does not read."""
+    plan = random_plan(Random(1), shape) if shape.inverse else plan_of(shape)
+    return workspace_of(plan, folder)
 
 
 @pytest.mark.parametrize("name", list(SHAPES))
@@ -177,8 +187,25 @@ OF_GYRO = {
     ),
     "specification: any terms": (SPECIFICATION, "constants_fit", "&& terms_words_fit(image)", ""),
 }
-FAULTS |= OF_GYRO
+OF_INVERSE = {
+    "a function that is not looked at": (
+        C, "segment_fits", "j < 4u; j++) {\n            const", "j < 3u; j++) {\n            const",
+    ),
+    "a bound beyond int32": (C, "segment_fits", "bound > (int64_t)INT32_MAX", "bound < 0"),
+    "a function of the row before": (
+        C, "segment_fits", "coefficient[(4u * i) + j]", "coefficient[(3u * i) + j]",
+    ),
+    "specification: functions of two rows": (
+        SPECIFICATION, "segment_fits", "row_passes(s, 4 * (n - 1))", "row_passes(s, 3 * (n - 1))",
+    ),
+}  # fmt: skip
+FAULTS |= OF_GYRO | OF_INVERSE
 """Text that has the mistake, function whose goals fail (or the lemmas), and the mistake."""
+
+
+def shape_of(fault: str) -> str:
+    """Name of the shape that a mistake is planted in."""
+    return GYRO if fault in OF_GYRO else INVERSE if fault in OF_INVERSE else "order 2, two segments"
 
 
 @PROVERS
@@ -188,7 +215,7 @@ def test_a_planted_mistake_is_not_proven(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     text, function, old, new = FAULTS[name]
-    work = workspace(SHAPES[GYRO] if name in OF_GYRO else SHAPE, tmp_path / "work")
+    work = workspace(SHAPES[shape_of(name)], tmp_path / "work")
     original = {C: annotated_routine, SPECIFICATION: specification}[text]
     assert str(original(work.plan, **({} if text == C else {"opaque": False}))).count(old) == 1
 

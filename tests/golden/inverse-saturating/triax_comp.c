@@ -412,18 +412,24 @@ uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int3
 #define SEGMENTS_AT ((size_t)HEADER_WORDS + 2u)
 #define SEGMENT_WORDS ((size_t)3u + (12u * ((size_t)TRIAX_ORDER + 1u)))
 
+/*@ requires \valid_read(image + (4 * index .. 4 * index + 3)) && index < TRIAX_FILE_SIZE / 4; assigns \nothing;
+    ensures \result == word(image, index); */
 static uint32_t word_at(const uint8_t *image, size_t index)
 {
     const uint8_t *const p = &image[4u * index];
     return (uint32_t)p[0] | ((uint32_t)p[1] << 8) | ((uint32_t)p[2] << 16) | ((uint32_t)p[3] << 24);
 }
 
+/*@ requires \valid_read(image + (4 * index .. 4 * index + 3)) && index < TRIAX_FILE_SIZE / 4; assigns \nothing;
+    ensures \result == int_word(image, index); */
 static int32_t int_at(const uint8_t *image, size_t index)
 {
     return s32(word_at(image, index));
 }
 
 /* CRC-32 of IEEE 802.3, reflected. */
+/*@ requires \valid_read(data + (0 .. size - 1)); assigns \nothing;
+    ensures \result == crc_of(data, size); */
 static uint32_t crc32(const uint8_t *data, size_t size)
 {
     uint32_t crc = 0xFFFFFFFFu;
@@ -439,6 +445,8 @@ static uint32_t crc32(const uint8_t *data, size_t size)
 }
 
 /* Bound of |p| over |x| < 2^31, or INT64_MAX when a step of Horner's rule could overflow. */
+/*@ requires \valid_read(c + (0 .. TRIAX_ORDER)); assigns \nothing;
+    ensures 0 <= \result && (\result <= INT32_MAX <==> horner_fits(c)) && (horner_fits(c) ==> \result == bound(c)); */
 static int64_t horner_bound(const int32_t c[TRIAX_ORDER + 1])
 {
     int64_t bound = magnitude(c[2]);
@@ -454,6 +462,8 @@ static int64_t horner_bound(const int32_t c[TRIAX_ORDER + 1])
 }
 
 /* Whether x = (code - origin_code) * gain stays within Q31 from code first to code last. */
+/*@ requires \valid_read(segment); assigns \nothing;
+    ensures \result != 0 <==> x_fits(segment->origin_code, segment->gain, first, last); */
 static uint32_t x_fits(const triax_segment_t *segment, int32_t first, int32_t last)
 {
     const int64_t below = (int64_t)segment->origin_code - first;
@@ -469,6 +479,7 @@ static uint32_t x_fits(const triax_segment_t *segment, int32_t first, int32_t la
     return fits;
 }
 
+/*@ requires \valid_read(segment); assigns \nothing; ensures \result != 0 <==> segment_fits(segment); */
 static uint32_t segment_fits(const triax_segment_t *segment)
 {
     uint32_t fits = 1u;
@@ -485,6 +496,10 @@ static uint32_t segment_fits(const triax_segment_t *segment)
     return fits;
 }
 
+/*@ requires \valid(c + (0 .. TRIAX_ORDER)) && \valid_read(image + (0 .. TRIAX_IMAGE_SIZE - 1));
+    requires 0 <= at && at + TRIAX_ORDER < TRIAX_IMAGE_SIZE / 4 && \separated(c + (0 .. TRIAX_ORDER), image + (0 .. TRIAX_IMAGE_SIZE - 1));
+    assigns c[0 .. TRIAX_ORDER];
+    ensures function_is{Post,Pre}(c, image, at); */
 static void read_function(int32_t c[TRIAX_ORDER + 1], const uint8_t *image, size_t at)
 {
     size_t k;
@@ -493,6 +508,10 @@ static void read_function(int32_t c[TRIAX_ORDER + 1], const uint8_t *image, size
     }
 }
 
+/*@ requires \valid(segment) && \valid_read(image + (0 .. TRIAX_IMAGE_SIZE - 1)) && 0 <= s < TRIAX_SEGMENTS;
+    requires \separated(segment, image + (0 .. TRIAX_IMAGE_SIZE - 1));
+    assigns *segment;
+    ensures segment_is{Post,Pre}(segment, image, s); */
 static void read_segment(triax_segment_t *segment, const uint8_t *image, size_t s)
 {
     size_t at = SEGMENTS_AT + (s * SEGMENT_WORDS);
@@ -508,6 +527,7 @@ static void read_segment(triax_segment_t *segment, const uint8_t *image, size_t 
 }
 
 /* The plan's own range proof, repeated on whatever the image holds. */
+/*@ requires \valid_read(image + (0 .. TRIAX_IMAGE_SIZE - 1)); assigns \nothing; ensures \result != 0 <==> constants_fit(image); */
 static uint32_t constants_fit(const uint8_t *image)
 {
     const int32_t temp_min_code = int_at(image, HEADER_WORDS);
@@ -529,6 +549,7 @@ static uint32_t constants_fit(const uint8_t *image)
 }
 
 /* Whether the identity is undamaged and belongs to the constants before it: it repeats their CRC. */
+/*@ requires \valid_read(image + (0 .. TRIAX_FILE_SIZE - 1)); assigns \nothing; ensures \result != 0 <==> identity_fits(image); */
 static uint32_t identity_fits(const uint8_t *image)
 {
     const size_t at = TRIAX_IMAGE_SIZE / 4u;
@@ -546,6 +567,7 @@ static uint32_t identity_fits(const uint8_t *image)
 }
 
 /* Whether size, header and CRC are right, and the identity where there is one. */
+/*@ requires \valid_read(image + (0 .. size - 1)); assigns \nothing; ensures \result != 0 <==> image_fits(image, size); */
 static uint32_t image_fits(const uint8_t *image, size_t size)
 {
     static const uint32_t header[HEADER_WORDS] = {
@@ -574,6 +596,10 @@ static uint32_t image_fits(const uint8_t *image, size_t size)
     return fits;
 }
 
+/*@ requires \valid(calib) && \valid_read(image + (0 .. TRIAX_IMAGE_SIZE - 1));
+    requires \separated(calib, image + (0 .. TRIAX_IMAGE_SIZE - 1));
+    assigns *calib;
+    ensures calib_is{Post,Pre}(calib, image); */
 static void read_calib(triax_calib_t *calib, const uint8_t *image)
 {
     size_t s;
@@ -585,6 +611,9 @@ static void read_calib(triax_calib_t *calib, const uint8_t *image)
     }
 }
 
+/*@ requires \valid_read(image + (0 .. size - 1)); assigns \nothing;
+    ensures \result == TRIAX_STATUS_OK || \result == TRIAX_STATUS_BAD_IMAGE;
+    ensures \result == TRIAX_STATUS_OK <==> accepted(image, size); */
 uint32_t triax_calib_check(const uint8_t *image, size_t size)
 {
     uint32_t status = TRIAX_STATUS_BAD_IMAGE;
@@ -597,6 +626,12 @@ uint32_t triax_calib_check(const uint8_t *image, size_t size)
     return status;
 }
 
+/*@ requires \valid(calib) && \valid_read(image + (0 .. size - 1)) && \separated(calib, image + (0 .. size - 1));
+    assigns *calib;
+    ensures \result == TRIAX_STATUS_OK || \result == TRIAX_STATUS_BAD_IMAGE;
+    ensures \result == TRIAX_STATUS_OK <==> \old(accepted(image, size));
+    ensures \result == TRIAX_STATUS_OK ==> calib_is{Post,Pre}(calib, image) && calib_fits(calib);
+    ensures \result != TRIAX_STATUS_OK ==> *calib == \old(*calib); */
 uint32_t triax_calib_load(triax_calib_t *calib, const uint8_t *image, size_t size)
 {
     const uint32_t status = triax_calib_check(image, size);

@@ -33,7 +33,6 @@ def blanked_contracts(text: str) -> str:
 def loader_not_covered(shape: Shape) -> str:
     """Which part of a shape has no contracts in its loader; "" where all have them."""
     parts = {
-        "the inverse form": shape.inverse is not None,
         "quadratic terms": shape.quadratic,
         "a term in dT/dt": shape.rate,
         "functions of order 6 and above": shape.order > 5,
