@@ -41,7 +41,7 @@ from triaxcal.fixedpoint.shape import Shape
 from verify.acsl import Pointer, definitions, quotient
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
-WRITTEN = {name: shape for name, shape in COVERING.items() if not (shape.quadratic or shape.rate)}
+WRITTEN = {name: shape for name, shape in COVERING.items() if not shape.rate}
 """Shapes whose specification is written."""
 
 SEGMENTED = "two segments, 24-bit codes"
@@ -101,6 +101,9 @@ def constants_of(words: Sequence[int], shape: Shape) -> Pointer:
     if shape.gyro:
         terms = words[2 + shape.segments * step :]
         calib.sensitivity = [list(terms[3 * i : 3 * i + 3]) for i in range(3)]
+    if shape.quadratic:
+        terms = words[2 + shape.segments * step :]
+        calib.quadratic = [list(terms[6 * i : 6 * i + 6]) for i in range(3)]
     return Pointer([calib])
 
 
@@ -108,9 +111,13 @@ def states_of(plan: Plan, codes: Sequence[int]) -> Iterator[tuple[Pointer, int]]
     """The model's state and status at each temperature code."""
     state, status = set_temperature(plan, np.array(codes, dtype=np.int64))
     rows = np.concatenate([state.gain, state.offset[:, :, None]], axis=2).tolist()
-    sensitivity = [] if plan.sensitivity is None else plan.sensitivity.tolist()
+    terms = {
+        name: words.tolist()
+        for name in ("sensitivity", "quadratic")
+        if (words := getattr(plan, name)) is not None
+    }
     for row, bits in zip(rows, status.tolist(), strict=True):
-        yield Pointer([SimpleNamespace(row=row, sensitivity=sensitivity)]), bits
+        yield Pointer([SimpleNamespace(row=row, **terms)]), bits
 
 
 def compare_results(name: str) -> None:
@@ -151,6 +158,10 @@ def compare_results(name: str) -> None:
             assert spec["terms_are"](state_at, calib)
             assert spec["terms_fit"](Pointer(state_at[0].sensitivity))
             more = [(spec["added"](Pointer(k), *force_at),) for k in state_at[0].sensitivity]
+        if shape.quadratic:
+            assert spec["terms_are"](state_at, calib)
+            assert spec["terms_fit"](Pointer(state_at[0].quadratic))
+            more = [(spec["added"](Pointer(q), state_at, *u),) for q in state_at[0].quadratic]
         pairs = list(zip(rows, more, strict=True))
         assert [spec["result"](Pointer(row), *u, *also) for row, also in pairs] == result
         exact = [spec["exact"](Pointer(row), *u, *also) for row, also in pairs]
@@ -362,6 +373,29 @@ def test_a_mistake_in_the_specification_is_seen(name: str, monkeypatch: pytest.M
     monkeypatch.setattr(f"{__name__}.specification", lambda *_, **__: text.replace(old, new))
     with pytest.raises((AssertionError, IndexError)):
         test_specification_and_model_agree(SEGMENTED)
+
+
+QUADRATIC_FAULTS = {
+    "xy for xz": ("product_of(x, z)", "product_of(x, y)"),
+    "a word of another product": ("prod(q[1], yy)", "prod(q[1], xx)"),
+    "products without the offset": ("x, y, z)) + r[3];", "x, y, z));"),
+    "a product one more": ("= floor_32(prod(a, b));", "= floor_32(prod(a, b)) + 1;"),
+    "a linear result of another axis": ("linear(&t->row[2][0]", "linear(&t->row[1][0]"),
+    "terms subtracted": (" + more + ", " - more + "),
+    "half an output LSB left out": (" + 17179869184;", ";"),
+    "a limit one lower": ("mag(k[5]) <= 2147483647", "mag(k[5]) < 2147483647"),
+    "one word not counted": ("mag(k[4]) + mag(k[5])", "mag(k[4])"),
+}
+
+
+@pytest.mark.parametrize("name", list(QUADRATIC_FAULTS))
+def test_a_mistake_in_quadratic_terms_is_seen(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    old, new = QUADRATIC_FAULTS[name]
+    text = specification(plan_of("quadratic-cubic"), opaque=False)
+    assert text.count(old) == 1
+    monkeypatch.setattr(f"{__name__}.specification", lambda *_, **__: text.replace(old, new))
+    with pytest.raises(AssertionError):
+        test_specification_and_model_agree("quadratic-cubic")
 
 
 LOADER_FAULTS = {

@@ -12,6 +12,7 @@
 #define ROW_LIMIT INT64_C(3221225472)
 
 /* The int32_t with these 32 bits: two's complement whatever the compiler does in a cast. */
+/*@ assigns \nothing; ensures \result == (bits <= INT32_MAX ? bits : bits - 4294967296); */
 static int32_t s32(uint32_t bits)
 {
     const uint32_t inverted = UINT32_MAX - bits;
@@ -19,33 +20,41 @@ static int32_t s32(uint32_t bits)
 }
 
 /* floor(value / 2^32): >> of a negative value is left to the compiler by C99. */
+/*@ assigns \nothing; ensures \result == floor_32(value); */
 static int32_t high_word(int64_t value)
 {
     return (value < 0) ? (-1 - (int32_t)((-1 - value) >> 32)) : (int32_t)(value >> 32);
 }
 
 /* floor(value / 2^3) */
+/*@ assigns \nothing; ensures \result == floor_3(value); */
 static int32_t asr32_3(int32_t value)
 {
     return (value < 0) ? (-1 - ((-1 - value) >> 3)) : (value >> 3);
 }
 
+/*@ assigns \nothing; ensures \result == mag(value); */
 static int64_t magnitude(int32_t value)
 {
     return (value < 0) ? -(int64_t)value : (int64_t)value;
 }
 
+/*@ assigns \nothing; ensures \result == prod(a, b); */
 static int64_t times(int32_t a, int32_t b)
 {
     return (int64_t)a * b;
 }
 
 /* c + x p / 2, floored: x in Q31, |c| + |p| / 2 + 1 <= INT32_MAX. */
+/*@ requires step_bound(c, mag(p)) <= INT32_MAX; assigns \nothing;
+    ensures \result == step(c, x_q31, p) && mag(\result) <= step_bound(c, mag(p)); */
 static int32_t horner_step(int32_t c, int32_t x_q31, int32_t p)
 {
     return c + high_word(times(x_q31, p));
 }
 
+/*@ requires \valid_read(c + (0 .. TRIAX_ORDER)) && horner_fits(c); assigns \nothing;
+    ensures \result == polynomial(c, x_q31); */
 static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
 {
     int32_t p = c[2];
@@ -54,6 +63,16 @@ static int32_t evaluate(const int32_t c[TRIAX_ORDER + 1], int32_t x_q31)
     return p;
 }
 
+/*@ requires \valid(row + (0 .. 2)) && \valid_read(segment) && \separated(row + (0 .. 2), segment);
+    requires 0 <= j < 4 && horner_fits(&segment->coefficient[j][0]) && horner_fits(&segment->coefficient[4 + j][0]) && horner_fits(&segment->coefficient[8 + j][0]);
+    assigns (&row[0][0])[0 .. 11];
+    ensures row[0][j] == \old(polynomial(&segment->coefficient[j][0], x_q31));
+    ensures \forall integer k; 0 <= k < j ==> row[0][k] == \old(row[0][k]);
+    ensures row[1][j] == \old(polynomial(&segment->coefficient[4 + j][0], x_q31));
+    ensures \forall integer k; 0 <= k < j ==> row[1][k] == \old(row[1][k]);
+    ensures row[2][j] == \old(polynomial(&segment->coefficient[8 + j][0], x_q31));
+    ensures \forall integer k; 0 <= k < j ==> row[2][k] == \old(row[2][k]);
+ */
 static void evaluate_column(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment, uint32_t j,
                             int32_t x_q31)
 {
@@ -63,6 +82,13 @@ static void evaluate_column(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment
 }
 
 /* A column at a time: the loop's overhead is shared by three functions. */
+/*@ requires \valid(row + (0 .. 2)) && \valid_read(segment) && \separated(row + (0 .. 2), segment);
+    requires functions_fit(segment);
+    assigns (&row[0][0])[0 .. 11];
+    ensures column_is{Post,Pre}(&row[0][0], segment, 0, 4, x_q31);
+    ensures column_is{Post,Pre}(&row[1][0], segment, 4, 4, x_q31);
+    ensures column_is{Post,Pre}(&row[2][0], segment, 8, 4, x_q31);
+ */
 static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t *segment,
                           int32_t x_q31)
 {
@@ -73,23 +99,27 @@ static void evaluate_rows(int32_t row[3][TRIAX_ROW_WORDS], const triax_segment_t
 }
 
 /* code - TRIAX_RAW_MIN modulo 2^32: a code below the range is far above it. Neither branch wraps. */
+/*@ assigns \nothing; ensures \result == above_min(code); */
 static uint32_t above_min(int32_t code)
 {
     return (code < TRIAX_RAW_MIN) ? (uint32_t)(((int64_t)code - TRIAX_RAW_MIN) + INT64_C(4294967296))
                                  : (uint32_t)((int64_t)code - TRIAX_RAW_MIN);
 }
 
+/*@ assigns \nothing; ensures \result == bits / 16777216; */
 static uint32_t beyond_range(uint32_t bits)
 {
     return bits >> 24u;
 }
 
 /* The range is 2^n codes: one test sees a code outside it on any axis. */
+/*@ assigns \nothing; ensures \result == 0 <==> in_range(ux, uy, uz); */
 static uint32_t out_of_range(int32_t ux, int32_t uy, int32_t uz)
 {
     return beyond_range((above_min(ux) | above_min(uy)) | above_min(uz));
 }
 
+/*@ assigns \nothing; ensures \result == clamp(code, TRIAX_RAW_MIN, TRIAX_RAW_MAX); */
 static int32_t nearest_raw(int32_t code)
 {
     int32_t result = code;
@@ -103,11 +133,15 @@ static int32_t nearest_raw(int32_t code)
 }
 
 /* The test changes nothing. Behind it gcc makes one instruction of both limits where the core has it. */
+/*@ assigns \nothing; ensures \result == clamp(code, TRIAX_RAW_MIN, TRIAX_RAW_MAX); */
 static int32_t clamp_raw(int32_t code)
 {
     return (beyond_range(above_min(code)) != 0u) ? nearest_raw(code) : code;
 }
 
+/*@ requires \valid(state) && \valid_read(calib) && \separated(state, calib);
+    assigns (&state->quadratic[0][0])[0 .. 17];
+    ensures terms_are{Post,Pre}(state, calib) && rows_kept{Post,Pre}(state); */
 static void copy_terms(triax_state_t *state, const triax_calib_t *calib)
 {
     uint32_t i;
@@ -119,11 +153,18 @@ static void copy_terms(triax_state_t *state, const triax_calib_t *calib)
     }
 }
 
+/*@ requires \valid_read(segment) && scaled_fits(code, segment->origin_code, segment->gain); assigns \nothing;
+    ensures \result == x_at(segment, code); */
 static int32_t x_q31_of(const triax_segment_t *segment, int32_t code)
 {
     return (code - segment->origin_code) * segment->gain;
 }
 
+/*@ requires \valid(state) && \valid_read(calib) && \separated(state, calib) && calib_fits(calib);
+    assigns *state;
+    ensures \result == \old(temperature_status(calib, temp_code));
+    ensures state_is{Post,Pre}(state, calib, \old(clamp(temp_code, calib->temp_min_code, calib->temp_max_code)));
+    ensures state_fits(&state->row[0]) && terms_are{Post,Pre}(state, calib) && terms_fit(&state->quadratic[0]); */
 uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib, int32_t temp_code)
 {
     const triax_segment_t *segment = &calib->segment[0];
@@ -149,6 +190,18 @@ uint32_t triax_set_temperature(triax_state_t *state, const triax_calib_t *calib,
  * The products xx, yy, zz, xy, xz, yz of the linear result, that before its rounding: its word is
  * at most 3 * 2^29 + 1 in magnitude, a product's below 5 * 2^27.
  */
+/*@ requires \valid_read(state) && \valid(product + (0 .. 5)) && \separated(state, product + (0 .. 5));
+    requires mag(floor_32(sum_x) + state->row[0][3]) <= 1610612737;
+    requires mag(floor_32(sum_y) + state->row[1][3]) <= 1610612737;
+    requires mag(floor_32(sum_z) + state->row[2][3]) <= 1610612737;
+    assigns product[0 .. 5];
+    ensures product[0] == \old(product_of(floor_32(sum_x) + state->row[0][3], floor_32(sum_x) + state->row[0][3])) && mag(product[0]) <= 805306369;
+    ensures product[1] == \old(product_of(floor_32(sum_y) + state->row[1][3], floor_32(sum_y) + state->row[1][3])) && mag(product[1]) <= 805306369;
+    ensures product[2] == \old(product_of(floor_32(sum_z) + state->row[2][3], floor_32(sum_z) + state->row[2][3])) && mag(product[2]) <= 805306369;
+    ensures product[3] == \old(product_of(floor_32(sum_x) + state->row[0][3], floor_32(sum_y) + state->row[1][3])) && mag(product[3]) <= 805306369;
+    ensures product[4] == \old(product_of(floor_32(sum_x) + state->row[0][3], floor_32(sum_z) + state->row[2][3])) && mag(product[4]) <= 805306369;
+    ensures product[5] == \old(product_of(floor_32(sum_y) + state->row[1][3], floor_32(sum_z) + state->row[2][3])) && mag(product[5]) <= 805306369;
+ */
 static void products_of(const triax_state_t *state, int64_t sum_x, int64_t sum_y, int64_t sum_z,
                         int32_t product[6])
 {
@@ -164,6 +217,11 @@ static void products_of(const triax_state_t *state, int64_t sum_x, int64_t sum_y
 }
 
 /* Below 5 * 2^58 in magnitude, as the words of a row sum to 2147483647 at most. */
+/*@ requires \valid_read(q + (0 .. 5)) && \valid_read(product + (0 .. 5)) && quadratic_fits(q);
+    requires mag(product[0]) <= 805306369 && mag(product[1]) <= 805306369 && mag(product[2]) <= 805306369 && mag(product[3]) <= 805306369 && mag(product[4]) <= 805306369 && mag(product[5]) <= 805306369;
+    assigns \nothing;
+    ensures \result == weighted(q, product[0], product[1], product[2], product[3], product[4], product[5]);
+    ensures mag(\result) <= 1729382258252447743; */
 static int64_t quadratic_sum(const int32_t q[6], const int32_t product[6])
 {
     return times(q[0], product[0]) + times(q[1], product[1]) +
@@ -172,6 +230,13 @@ static int64_t quadratic_sum(const int32_t q[6], const int32_t product[6])
 }
 
 /* floor(floor(v / 2^32) / 2^3) = floor(v / 2^35); half an output LSB is 4. */
+/*@ requires \valid_read(state) && \valid(accel + (0 .. 2));
+    requires state_fits(&state->row[0]) && terms_fit(&state->quadratic[0]) && \separated(state, accel + (0 .. 2));
+    assigns accel[0 .. 2];
+    ensures accel[0] == \old(result(&state->row[0][0], ux, uy, uz, added(&state->quadratic[0][0], state, ux, uy, uz)));
+    ensures accel[1] == \old(result(&state->row[1][0], ux, uy, uz, added(&state->quadratic[1][0], state, ux, uy, uz)));
+    ensures accel[2] == \old(result(&state->row[2][0], ux, uy, uz, added(&state->quadratic[2][0], state, ux, uy, uz)));
+ */
 static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32_t uz,
                        int32_t accel[3])
 {
@@ -191,6 +256,14 @@ static void apply_rows(const triax_state_t *state, int32_t ux, int32_t uy, int32
     accel[2] = asr32_3((high_word(sum_z) + state->row[2][3]) + 4);
 }
 
+/*@ requires \valid_read(state) && \valid_read(raw_code + (0 .. 2)) && \valid(accel + (0 .. 2)) && state_fits(&state->row[0]);
+    requires terms_fit(&state->quadratic[0]);
+    requires \separated(state, accel + (0 .. 2));
+    assigns accel[0 .. 2];
+    ensures accel[0] == \old(result(&state->row[0][0], code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2]), added(&state->quadratic[0][0], state, code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2]))));
+    ensures accel[1] == \old(result(&state->row[1][0], code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2]), added(&state->quadratic[1][0], state, code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2]))));
+    ensures accel[2] == \old(result(&state->row[2][0], code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2]), added(&state->quadratic[2][0], state, code_of(raw_code[0]), code_of(raw_code[1]), code_of(raw_code[2]))));
+    ensures \result == \old(raw_status(raw_code[0], raw_code[1], raw_code[2])); */
 uint32_t triax_apply(const triax_state_t *state, const int32_t raw_code[3], int32_t accel[3])
 {
     uint32_t status = TRIAX_STATUS_OK;

@@ -44,7 +44,9 @@ def not_covered(shape: Shape) -> str:
     """Which part of a shape has no complete contracts; "" where all have them."""
     inverse = shape.inverse is not None
     parts = {
-        "quadratic terms": shape.quadratic,
+        "quadratic terms in the inverse form": shape.quadratic and inverse,
+        "quadratic terms with a term in dT/dt": shape.quadratic and shape.rate,
+        "quadratic terms with saturating results": shape.quadratic and shape.saturates,
         "constant functions in the inverse form": inverse and not shape.order,
         "a term in dT/dt in the inverse form": inverse and shape.rate,
         "a term in dT/dt with constant functions": shape.rate and not shape.order,

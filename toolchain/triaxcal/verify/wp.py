@@ -50,7 +50,8 @@ OF_VALUES = (
 """Functions proven with every definition."""
 OF_MEMORY = (
     "horner_step", "evaluate_column", "evaluate_rows", "rounded", "apply_row",
-    "apply_rows", "set_temperature", "apply", "sensitivity_sum", "copy_terms",
+    "apply_rows", "set_temperature", "apply", "sensitivity_sum", "copy_terms", "products_of",
+    "quadratic_sum",
     "rate_offset_of", "add_rate", "set_temperature_rate",
     "cofactor_at", "adjugate_of", "determinant_of", "invert_row", "invert", "clear_rows",
     "invert_at",
