@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from plans import INT32_MAX, INT32_MIN, integer_shape
+from plans import integer_shape
 from triaxcal.codegen.annotations import not_covered
 from triaxcal.verify import wp
 from triaxcal.verify.outcome import PASSED
@@ -18,11 +18,9 @@ from verify.wp_cases import SPECIFICATION, C, refuse_proof
 __all__ = ["nothing_known"]
 
 PROVERS = needs("frama-c", "why3", "cvc4", "z3")
-ANY = (INT32_MIN, INT32_MAX)
 SHAPES = {
     "cubic, 24 bits": integer_shape(order=3, quadratic=True),
     "constants": integer_shape(order=0, quadratic=True),
-    "two segments, 32 bits": integer_shape(order=2, segments=2, raw=ANY, quadratic=True),
 }
 CUBIC = next(iter(SHAPES))
 

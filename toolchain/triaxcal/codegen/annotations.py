@@ -43,10 +43,13 @@ def loader_not_covered(shape: Shape) -> str:
 def not_covered(shape: Shape) -> str:
     """Which part of a shape has no complete contracts; "" where all have them."""
     inverse = shape.inverse is not None
+    whole = shape.raw_max - shape.raw_min == 2**32 - 1
     parts = {
         "quadratic terms in the inverse form": shape.quadratic and inverse,
         "quadratic terms with a term in dT/dt": shape.quadratic and shape.rate,
         "quadratic terms with saturating results": shape.quadratic and shape.saturates,
+        "quadratic terms with several segments": shape.quadratic and shape.segments > 1,
+        "quadratic terms of 32-bit raw codes": shape.quadratic and whole,
         "constant functions in the inverse form": inverse and not shape.order,
         "a term in dT/dt in the inverse form": inverse and shape.rate,
         "a term in dT/dt with constant functions": shape.rate and not shape.order,
