@@ -50,7 +50,7 @@ def test_every_goal_is_proven(tmp_path: Path, name: str) -> None:
 def test_every_goal_of_a_unit_is_proven(plant: Planter) -> None:
     outcome = wp.check(plant("inverse"))
     assert outcome.result == PASSED, outcome
-    assert "; not the loader: the inverse form" in outcome.finding
+    assert "not the loader" not in outcome.finding
 
 
 INNER = "; j++) {\n        /*@ loop invariant 0 <= i <= 3;"
