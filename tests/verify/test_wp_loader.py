@@ -119,6 +119,14 @@ FAULTS = {
     ),
     "constants not looked at": (C, "calib_check", "constants_fit(image) != 0u", "1u != 0u"),
     "what is refused is read": (C, "calib_load", "status == TRIAX", "status != TRIAX"),
+    "what is refused changes the last word": (
+        C, "calib_load", "read_calib(calib, image);",
+        "read_calib(calib, image);\n} else {\n    calib->segment[1].coefficient[11][2] = 0;",
+    ),
+    "what is refused changes a code": (
+        C, "calib_load", "read_calib(calib, image);",
+        "read_calib(calib, image);\n} else {\n    calib->segment[1].origin_code = 0;",
+    ),
     "specification: a byte one bit too low": (
         SPECIFICATION, "word_at", "1] << 8", "1] << 7",
     ),

@@ -22,11 +22,12 @@ from typing import Any
 from triaxcal.base.tools import TOOLS, MissingToolError, install_advice, missing_tools
 from triaxcal.codegen.annotations import loader_not_covered, not_covered
 from triaxcal.codegen.names import names_of
-from triaxcal.codegen.render import annotated_routine, specification
+from triaxcal.codegen.render import annotated_routine, render_routine, specification
 from triaxcal.fixedpoint.shape import Shape
-from triaxcal.verify.outcome import NOT_DONE, Outcome, judged
+from triaxcal.verify.outcome import FAILED, NOT_DONE, Outcome, judged
 from triaxcal.verify.tools import BrokenToolError, run, run_until
-from triaxcal.verify.workspace import Workspace
+from triaxcal.verify.workspace import ROUTINE, Workspace
+from triaxcal.verify.wp_texts import contracts_of, overlooked, unexpected_warning, without_goal
 
 KEY, TITLE = "wp", "WP: C = specification"
 KNOWN = {"frama-c": "25.", "why3": "1.5.", "cvc4": "1.8", "z3": "4.8.12"}
@@ -101,8 +102,20 @@ def check(work: Workspace) -> Outcome:
     if reason := not_covered(work.plan.shape):
         return Outcome(KEY, TITLE, NOT_DONE, f"not done for {reason}")
     found = versions()
+    file = work.named(ROUTINE)
+    if (work.folder / file).read_text(encoding="utf-8") != render_routine(work.plan)[file]:
+        finding = f"{file} is not the routine of this shape: nothing is proven of it"
+        return Outcome(KEY, TITLE, FAILED, finding)
     folder = work.folder / "wp"
     texts = write_texts(work, folder)
+    if doubts := overlooked(
+        texts[file],
+        names_of(work.plan).triad,
+        texts["specification.h"],
+        texts["opaque.h"],
+        loader=not loader_not_covered(work.plan.shape),
+    ):
+        raise BrokenToolError(f"contracts: {doubts[0]}")
     known = _known(texts, found)
     before = known.is_file()
     goals = json.loads(known.read_text(encoding="utf-8")) if before else _prove(work, folder, texts)
@@ -191,9 +204,10 @@ def prepared(work: Workspace, folder: Path) -> Place:
 
 
 def _known(texts: dict[str, str], versions: dict[str, str]) -> Path:
-    """Where the goals are kept that these texts gave to these programs."""
+    """Where the goals are kept that these texts gave to these programs, run by this module."""
+    runner = Path(__file__).read_text(encoding="utf-8")
     content = json.dumps(
-        [texts, versions, OPTIONS, GOAL_S, SMOKE_S, OF_VALUES, OF_MEMORY, OF_LOADER]
+        [texts, versions, OPTIONS, GOAL_S, SMOKE_S, OF_VALUES, OF_MEMORY, OF_LOADER, runner]
     )
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     name = hashlib.sha256(content.encode()).hexdigest()
@@ -228,7 +242,7 @@ def lemmas_of(texts: Mapping[str, str]) -> list[Part]:
 
 def functions_of(text: str, linked: str) -> list[str]:
     """Functions of the C that have a contract; exported ones without the triad's name."""
-    contract = r"^/\*@(?:[^*]|\*(?!/))*\*/\n(?:static )?(?:void|u?int\d+_t) (\w+)\("
+    contract = r"^/\*@(?:[^*]|\*(?!/))*\*/\n[A-Za-z_][^\n;=(){}]*?(\w+)\("
     triad = linked.rpartition("_")[0]
     return [name.removeprefix(f"{triad}_") for name in re.findall(contract, text, re.MULTILINE)]
 
@@ -296,10 +310,28 @@ def goals_of(place: Place, part: Part) -> dict[str, dict[str, str]]:
         passed = "no contradiction" if result == "Passed" else ""
         function = _function(test, place.linked, names)
         goals[test] = {"function": function, "prover": passed, "time": ""}
+    if missing := _without_goal(place, part, goals):
+        raise BrokenToolError(f"frama-c: not every goal of {', '.join(missing)}")
+    if warning := unexpected_warning(answer.text, of_lemmas=not names):
+        raise BrokenToolError(f"frama-c warns: {warning}")
     proven = sum(bool(goal["prover"]) for goal in goals.values())
     if (proven, len(goals)) != tuple(map(int, counted.groups())):
         raise BrokenToolError(f"frama-c: {counted[0]}, but {proven} of {len(goals)} reported")
     return goals
+
+
+def _without_goal(place: Place, part: Part, goals: Mapping[str, Mapping[str, str]]) -> list[str]:
+    """Functions or lemmas of a part that WP made too few goals of."""
+    if not part.functions:
+        asked = part.options[0].removeprefix("-wp-prop=")
+        text = (place.folder / part.specification).read_text(encoding="utf-8")
+        lemmas = _LEMMA.findall(text) if asked == "@lemma" else asked.split(",")
+        return [name for name in lemmas if f"lemma_{name}" not in goals]
+    text = (place.folder / place.file).read_text(encoding="utf-8")
+    contracts = contracts_of(text, place.linked.rpartition("_")[0])
+    _, names = _command(place, part, 0)
+    asked_of = {n: contracts[f] for n, f in zip(names, part.functions, strict=True)}
+    return without_goal(goals, asked_of)
 
 
 def _function(goal: str, linked: str, names: Sequence[str]) -> str:
