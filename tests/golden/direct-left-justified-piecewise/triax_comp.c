@@ -421,7 +421,7 @@ uint32_t triax_calib_check(const uint8_t *image, size_t size)
     ensures \result == TRIAX_STATUS_OK || \result == TRIAX_STATUS_BAD_IMAGE;
     ensures \result == TRIAX_STATUS_OK <==> \old(accepted(image, size));
     ensures \result == TRIAX_STATUS_OK ==> calib_is{Post,Pre}(calib, image) && calib_fits(calib);
-    ensures \result != TRIAX_STATUS_OK ==> *calib == \old(*calib); */
+    ensures \result != TRIAX_STATUS_OK ==> same_calib{Post,Pre}(calib); */
 uint32_t triax_calib_load(triax_calib_t *calib, const uint8_t *image, size_t size)
 {
     const uint32_t status = triax_calib_check(image, size);
