@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import pytest
 
-from triaxcal.codegen.annotations import loader_not_covered
+from plans import COVERING, random_plan
+from triaxcal.codegen.annotations import loader_not_covered, not_covered
 from triaxcal.codegen.names import names_of
 from triaxcal.codegen.render import annotated_routine, specification
 from triaxcal.verify import wp
@@ -29,7 +31,15 @@ from verify.test_wp_terms import plan_of
 __all__ = ["nothing_known"]
 
 PROVERS = needs("frama-c", "why3", "cvc4", "z3")
-SHAPES = {**test_wp_codes.SHAPES, **test_wp_terms.SHAPES, **test_wp_saturating.SHAPES}
+PLANS = {
+    name: plan_of(shape)
+    for module in (test_wp_codes, test_wp_terms, test_wp_saturating)
+    for name, shape in module.SHAPES.items()
+} | {
+    name: random_plan(random.Random(1), shape)
+    for name, shape in COVERING.items()
+    if not not_covered(shape)
+}
 
 
 def doubts(text: str = "", old: str = "", new: str = "") -> list[str]:
@@ -50,9 +60,9 @@ def _arguments(texts: dict[str, str]) -> tuple[str, str, str, str]:
     return texts["C"], "triax", texts["definitions"], texts["opaque"]
 
 
-@pytest.mark.parametrize("name", list(SHAPES))
+@pytest.mark.parametrize("name", list(PLANS))
 def test_nothing_is_overlooked(name: str) -> None:
-    plan = plan_of(SHAPES[name])
+    plan = PLANS[name]
     names = names_of(plan)
     text = annotated_routine(plan)
     definitions, opaque = (specification(plan, opaque=flag) for flag in (False, True))
