@@ -204,8 +204,9 @@ def prepared(work: Workspace, folder: Path) -> Place:
 
 
 def _known(texts: dict[str, str], versions: dict[str, str]) -> Path:
-    """Where the goals are kept that these texts gave to these programs, run by this module."""
-    runner = Path(__file__).read_text(encoding="utf-8")
+    """Where the goals are kept that these texts gave to these programs, run by this code."""
+    here = Path(__file__)
+    runner = [p.read_text(encoding="utf-8") for p in (here, here.with_name("wp_texts.py"))]
     content = json.dumps(
         [texts, versions, OPTIONS, GOAL_S, SMOKE_S, OF_VALUES, OF_MEMORY, OF_LOADER, runner]
     )
