@@ -38,6 +38,8 @@ SMOKE_S = 1
 """Time of a smoke test with each prover. A contradiction needs less; all else takes it all."""
 AT_ONCE = 2
 """Runs of WP beside each other."""
+A_RUN = 3
+"""Functions of a run. The runs then end together, each well within the time limit of a tool."""
 OPTIONS = (
     "-machdep", "x86_32", "-warn-right-shift-negative", "-warn-signed-downcast", "-wp", "-wp-rte",
     "-wp-model", "Typed", "-wp-prover", "cvc4,z3", "-wp-par", "1",
@@ -220,7 +222,7 @@ def _prove(work: Workspace, folder: Path, texts: Mapping[str, str]) -> dict[str,
     place = prepared(work, folder)
     present = functions_of(texts[place.file], place.linked)
     # The longest first, so that none is left alone at the end.
-    parts = [*reversed(parts_of(present)), *lemmas_of(texts)]
+    parts = [*lemmas_of(texts), *reversed(parts_of(present))]
     goals: dict[str, dict[str, str]] = {}
     with ThreadPoolExecutor(AT_ONCE) as pool:
         for found in pool.map(lambda part: goals_of(place, part), parts):
@@ -261,15 +263,20 @@ def parts_of(present: Sequence[str]) -> list[Part]:
         return tuple(p for p in present if re.sub(r"_\d+$", "", p) in names)
 
     options = ("-warn-unsigned-overflow", "-wp-prop=-@lemma")
+    groups = (
+        (of(OF_VALUES), "specification.h"),
+        (of(OF_MEMORY), "opaque.h"),
+        (of(OF_LOADER), "opaque.h"),
+    )
     parts = [
-        Part(of(OF_VALUES), "specification.h", options),
-        Part(of(OF_MEMORY), "opaque.h", options),
-        Part(of(OF_LOADER), "opaque.h", options),
+        Part(names[i : i + A_RUN], specification, options)
+        for names, specification in groups
+        for i in range(0, len(names), A_RUN)
     ]
     grouped = [name for part in parts for name in part.functions]
     if sorted(grouped) != sorted(present):
         raise ValueError(f"contracts of {present}, groups for {grouped}")
-    return [part for part in parts if part.functions]
+    return parts
 
 
 def _command(place: Place, part: Part, limit_s: int) -> tuple[list[str], list[str]]:
