@@ -88,7 +88,7 @@ MUTANTS: dict[str, list[Mutant]] = {
         Mutant(
             "saturation one low", "result = (int64_t)INT32_MIN;", "result = (int64_t)INT32_MIN + 1;"
         ),
-        Mutant("not flagged", "status |= TRIAX_STATUS_SATURATED;", ";"),
+        Mutant("not flagged", "return status | TRIAX_STATUS_SATURATED;", "return status;"),
         Mutant(
             "rounding of z left out",
             " + INT64_C(268435456);\n    sum_z = asr64_29",
