@@ -17,6 +17,7 @@ from triaxcal.verify import wp
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 from triaxcal.verify.shapes import ALL_SHAPES, Subject
 from triaxcal.verify.workspace import Workspace
+from triaxcal.verify.wp_texts import contracts_of
 from verify.conftest import Planter, needs
 from verify.wp_cases import workspace_of
 
@@ -213,15 +214,17 @@ def test_each_contract_with_opposite_conditions_fails(plant: Planter) -> None:
     folder = work.folder / "wp"
     text = wp.write_texts(work, folder)[work.named("triax_comp.c")]
     place = wp.prepared(work, folder)
-    head = r"^/\*@(?:[^*]|\*(?!/))*?requires (?:\w+: )?([^;]*);(?:[^*]|\*(?!/))*\*/\n[^\n(]* \w+\("
-    contracts = list(re.finditer(head, text, re.MULTILINE))
-    assert len(contracts) >= 20
-    for contract in contracts:
-        condition, whole = contract[1], contract[0]
-        opposite = whole.replace("requires", f"requires !({condition});\n    requires", 1)
-        (folder / place.file).write_text(text.replace(whole, opposite, 1), encoding="utf-8")
-        (name,) = wp.functions_of(whole, place.linked)
+    contracts = contracts_of(text, names_of(work.plan).triad)
+    conditions = {n: re.search(r"requires (?:\w+: )?([^;]*);", c) for n, c in contracts.items()}
+    assert len([name for name, found in conditions.items() if found]) >= 20
+    for name, found in conditions.items():
+        if not found:
+            continue
+        contract = contracts[name]
+        opposite = contract.replace("requires", f"requires !({found[1]});\n    requires", 1)
+        assert text.count(contract) == 1, name
+        (folder / place.file).write_text(text.replace(contract, opposite), encoding="utf-8")
         (part,) = wp.parts_of([name])
         goals = wp.goals_of(place, part)
-        failed = [goal for goal, found in goals.items() if not found["prover"]]
+        failed = [goal for goal, result in goals.items() if not result["prover"]]
         assert any(f"{name}_wp_smoke_default_requires" in goal for goal in failed), name

@@ -45,10 +45,7 @@ def not_in_them(done: DynamicUnit) -> tuple[str, ...]:
         "the noise of a sample",
         "drift since the recording",
         *(f"{title}, which the C does not correct" for title in seen),
-        *(
-            ["changes of the constants with temperature, of which none was estimated"]
-            * constant(done)
-        ),
+        *([_NO_CHANGES] * constant(done)),
     )
 
 

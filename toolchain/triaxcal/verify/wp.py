@@ -77,11 +77,12 @@ _TIME = re.compile(r"\(([\d.]+m?s)\)")
 
 @dataclass(frozen=True)
 class Part:
-    """One run of WP: functions, or the lemmas where there are none, and the specification."""
+    """One run of WP: functions or lemmas, and the specification."""
 
     functions: tuple[str, ...]
     specification: str
     options: tuple[str, ...] = ()
+    lemmas: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -237,17 +238,17 @@ def lemmas_of(texts: Mapping[str, str]) -> list[Part]:
     """
     known, opaque = (_LEMMA.findall(texts[name]) for name in ("specification.h", "opaque.h"))
     following = [name for name in opaque if name not in known]
-    parts = [Part((), "specification.h", ("-wp-prop=@lemma",))]
+    parts = [Part((), "specification.h", ("-wp-prop=@lemma",), tuple(known))]
     if following:
-        parts.append(Part((), "opaque.h", (f"-wp-prop={','.join(following)}",)))
+        option = f"-wp-prop={','.join(following)}"
+        parts.append(Part((), "opaque.h", (option,), tuple(following)))
     return parts
 
 
 def functions_of(text: str, linked: str) -> list[str]:
     """Functions of the C that have a contract; exported ones without the triad's name."""
-    contract = r"^/\*@(?:[^*]|\*(?!/))*\*/\n[A-Za-z_][^\n;=(){}]*?(\w+)\("
-    triad = linked.rpartition("_")[0]
-    return [name.removeprefix(f"{triad}_") for name in re.findall(contract, text, re.MULTILINE)]
+    contracts = contracts_of(text, linked.rpartition("_")[0])
+    return [name for name, contract in contracts.items() if contract]
 
 
 def parts_of(present: Sequence[str]) -> list[Part]:
@@ -318,7 +319,7 @@ def goals_of(place: Place, part: Part) -> dict[str, dict[str, str]]:
         passed = "no contradiction" if result == "Passed" else ""
         function = _function(test, place.linked, names)
         goals[test] = {"function": function, "prover": passed, "time": ""}
-    if missing := _without_goal(place, part, goals):
+    if missing := _without_goal(place, part, names, goals):
         raise BrokenToolError(f"frama-c: not every goal of {', '.join(missing)}")
     if warning := unexpected_warning(answer.text, of_lemmas=not names):
         raise BrokenToolError(f"frama-c warns: {warning}")
@@ -328,18 +329,15 @@ def goals_of(place: Place, part: Part) -> dict[str, dict[str, str]]:
     return goals
 
 
-def _without_goal(place: Place, part: Part, goals: Mapping[str, Mapping[str, str]]) -> list[str]:
-    """Functions or lemmas of a part that WP made too few goals of."""
-    if not part.functions:
-        asked = part.options[0].removeprefix("-wp-prop=")
-        text = (place.folder / part.specification).read_text(encoding="utf-8")
-        lemmas = _LEMMA.findall(text) if asked == "@lemma" else asked.split(",")
-        return [name for name in lemmas if f"lemma_{name}" not in goals]
+def _without_goal(
+    place: Place, part: Part, names: Sequence[str], goals: Mapping[str, Mapping[str, str]]
+) -> list[str]:
+    """Functions, with their link names, or lemmas of a part that WP made too few goals of."""
     text = (place.folder / place.file).read_text(encoding="utf-8")
     contracts = contracts_of(text, place.linked.rpartition("_")[0])
-    _, names = _command(place, part, 0)
     asked_of = {n: contracts[f] for n, f in zip(names, part.functions, strict=True)}
-    return without_goal(goals, asked_of)
+    lemmas = [name for name in part.lemmas if f"lemma_{name}" not in goals]
+    return [*without_goal(goals, asked_of), *lemmas]
 
 
 def _function(goal: str, linked: str, names: Sequence[str]) -> str:
