@@ -9,7 +9,8 @@ import numpy as np
 
 from dynamic_cases import UNIT_TOML, table_of, write_unit
 from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
-from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
+from triaxcal.delivery.imu import ImuDelivery, deliver_imu
+from triaxcal.delivery.imuc import ImuC
 from triaxcal.dynamic.blocks.base import LOWER
 from triaxcal.dynamic.recording import INSTANT, ImuRecording
 from triaxcal.dynamic.thermalbasis import GROUPS, OF_GYROS

@@ -25,7 +25,7 @@ from triaxcal.codegen.imu import ImuBuild, build_imu
 from triaxcal.codegen.names import Names
 from triaxcal.codegen.routines import start_generated_imu
 from triaxcal.delivery.imu import ImuDelivery
-from triaxcal.delivery.imuangles import _by_states, _of_constants, imu_angles, not_in_them
+from triaxcal.delivery.imuangles import _by_states, _of_constants, not_in_them
 from triaxcal.dynamic.blocks import accelnonlinearity
 from triaxcal.dynamic.blocks.base import BASE
 from triaxcal.dynamic.blocks.registry import EXTENSIONS
@@ -190,7 +190,7 @@ def test_uncertainty_is_that_of_constants_drawn_from_their_covariance(
 ) -> None:
     """Through the model and the angles themselves, at T0."""
     made = made_of(delivered[0])
-    known = imu_angles(made.done, made.c)
+    known = made.angles
     assert known is not None
     result, device = made.done.result, read_dynamic(delivered[1]).device
     assert device is not None
@@ -221,7 +221,7 @@ def test_uncertainty_is_that_of_constants_drawn_from_their_covariance(
 
 def test_the_uncertainty_is_stated(delivered: tuple[triaxcal.Delivered, Path]) -> None:
     done, _ = delivered
-    known = imu_angles(made_of(done).done, made_of(done).c)
+    known = made_of(done).angles
     assert known is not None
     shown = json.loads((done.folder / "verification.json").read_text())["angles"]["uncertainty"]
     assert shown["expanded_uncertainty_over_range_arcsec"] == known.over_range.tolist()

@@ -20,7 +20,9 @@ from triaxcal.base.screentext import wrapped
 from triaxcal.cli.main import main
 from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
 from triaxcal.delivery import imu as imudelivery
-from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
+from triaxcal.delivery import imuc
+from triaxcal.delivery.imu import ImuDelivery, deliver_imu
+from triaxcal.delivery.imuc import ImuC
 from triaxcal.dynamic.description import read_dynamic
 from triaxcal.dynamic.imumodel import imu_model
 from triaxcal.evidence.check import Check
@@ -384,15 +386,15 @@ def test_functions_too_far_from_the_model_are_refused(ran: Ran) -> None:
     curves = replace(model.accel.curves, coefficients=coefficients)
     steep = replace(model, accel=replace(model.accel, curves=curves))
     functions = compensate_imu(steep, "matrix", device.range_degc, (10.5, 8.8), (1e-6, 1e-8))
-    errors = imudelivery._model_errors(steep, functions, device, ran.c.build)
+    errors = imuc._model_errors(steep, functions, device, ran.c.build)
     with pytest.raises(RefusedError) as refusal:
-        imudelivery._refuse_model_errors(str(unit.path), errors)
+        imuc._refuse_model_errors(str(unit.path), errors)
     assert str(refusal.value) == (
         f"{unit.path}, [device] range_degc: N(T) of the accelerometer is {errors[0] * 1e6:.4g} "
         "micro-g off the fitted model; expected at most 1 micro-g; narrow the range, or check the "
         "temperature coefficients"
     )
-    imudelivery._refuse_model_errors(unit, (1e-6, 0.01))
+    imuc._refuse_model_errors(unit, (1e-6, 0.01))
 
 
 def test_without_a_device_no_c_is_written_and_it_is_said(ran: Ran) -> None:

@@ -9,7 +9,8 @@ import pytest
 
 from test_imu_delivery import DEG_PER_H, STANDARD_G, allowed, change, copied
 from triaxcal.codegen.routines import GeneratedImu, start_generated_imu
-from triaxcal.delivery.imu import ImuC, ImuDelivery, deliver_imu
+from triaxcal.delivery.imu import ImuDelivery, deliver_imu
+from triaxcal.delivery.imuc import ImuC
 from triaxcal.dynamic.imumodel import imu_model
 from triaxcal.model.methods.imu import ImuModel
 from triaxcal.model.metrological import unpack_constants

@@ -14,7 +14,7 @@ from thermal_cases import POINTS, at_point, ramp, true_at, truth_of
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.angles import GeneratedAngles
 from triaxcal.delivery.imu import deliver_imu
-from triaxcal.delivery.imuangles import accelerometer_uncertainty, imu_angles
+from triaxcal.delivery.imuangles import accelerometer_uncertainty
 from triaxcal.dynamic.blocks.base import ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX, LOWER
 from triaxcal.dynamic.thermalcurves import covariance_at, joint_covariance_at
 from triaxcal.dynamic.unit import calibrate_unit
@@ -98,7 +98,7 @@ def test_the_covariance_of_both_blocks_has_that_of_each(ran: Ran) -> None:
 @pytest.mark.parametrize("degc", BETWEEN)
 def test_the_angles_of_the_compiled_c_are_true_within_what_is_stated(ran: Ran, degc: float) -> None:
     """Pitch and roll of a true orientation, at temperatures that were not recorded."""
-    angles, known = ran.c.build.angles, imu_angles(ran.made.done, ran.c)
+    angles, known = ran.c.build.angles, ran.made.angles
     assert angles is not None
     assert known is not None
     rng = np.random.default_rng(2)

@@ -16,7 +16,8 @@ from triaxcal.base.plaindata import rebuilt
 from triaxcal.base.progress import Progress
 from triaxcal.base.publish import renew
 from triaxcal.delivery.fittedimu import FittedImu, read_saved_for_c
-from triaxcal.delivery.imu import ImuC, ImuDelivery, fit_described, imu_c
+from triaxcal.delivery.imu import ImuDelivery, fit_described
+from triaxcal.delivery.imuc import ImuC, imu_c
 from triaxcal.delivery.imuverdict import UNKNOWN, ImuVerdict
 from triaxcal.dynamic.blocks import north
 from triaxcal.dynamic.blocks.base import BASE

@@ -16,7 +16,7 @@ from triaxcal.base.errors import RefusedError
 from triaxcal.base.publish import publish
 from triaxcal.codegen.imu import ImuBuild, imu_answers
 from triaxcal.codegen.routines import Int32Array, UInt32Array
-from triaxcal.delivery.imu import ImuC, imu_c
+from triaxcal.delivery.imuc import ImuC, imu_c
 from triaxcal.fixedpoint.angles import AnglesPlan
 from triaxcal.unit.arithmetic import checked_arithmetic
 from triaxcal.unit.prefix import checked_prefix

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from triaxcal.delivery.imu import ImuC
+from triaxcal.delivery.imuc import ImuC
 from triaxcal.dynamic.blocks import accelasymmetry, accelnonlinearity, thermal
 from triaxcal.dynamic.blocks.base import ACCELEROMETER_BIAS, ACCELEROMETER_MATRIX, LOWER
 from triaxcal.dynamic.layout import Layout
@@ -28,12 +28,10 @@ _STEP_DEGC = 0.01
 _NO_CHANGES = "changes of the constants with temperature, of which none was estimated"
 
 
-def imu_angles(done: DynamicUnit, c: ImuC | None) -> AngleUncertainty | None:
+def imu_angles(done: DynamicUnit, c: ImuC) -> AngleUncertainty | None:
     """Uncertainty of the angles, at T0 and over the device's range; None where it makes none."""
-    choice = None if c is None else c.device.angles
-    if c is None or choice is None:
-        return None
-    return angle_uncertainty(accelerometer_uncertainty(done, c), choice)
+    choice = c.device.angles
+    return None if choice is None else angle_uncertainty(accelerometer_uncertainty(done, c), choice)
 
 
 def not_in_them(done: DynamicUnit) -> tuple[str, ...]:

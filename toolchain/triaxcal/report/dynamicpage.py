@@ -12,7 +12,7 @@ import numpy as np
 
 from triaxcal import __version__
 from triaxcal.delivery.imu import ImuDelivery
-from triaxcal.delivery.imuangles import imu_angles, not_in_them
+from triaxcal.delivery.imuangles import not_in_them
 from triaxcal.delivery.imuverdict import ON_RECORDING
 from triaxcal.delivery.verdict import NOT_CHECKED, NOT_SHOWN, PASSED, REFUSED
 from triaxcal.dynamic.calibrate import DynamicResult
@@ -207,7 +207,7 @@ def _warnings(made: ImuDelivery) -> list[str]:
 
 def _angles(made: ImuDelivery) -> dict[str, Any] | None:
     """Context of the section on the angles; None where the device makes none."""
-    found = imu_angles(made.done, made.c)
+    found = made.angles
     check = None if made.c is None else made.c.build.angles_check
     if found is None or check is None:
         return None

@@ -10,8 +10,9 @@ from triaxcal.codegen.compiler import FLAGS
 from triaxcal.codegen.crosscheck import CrossCheck
 from triaxcal.codegen.imu import ImuBuild
 from triaxcal.codegen.names import names_of, shape_id
-from triaxcal.delivery.imu import METHOD, ImuC, ImuDelivery
-from triaxcal.delivery.imuangles import imu_angles, not_in_them
+from triaxcal.delivery.imu import ImuDelivery
+from triaxcal.delivery.imuangles import not_in_them
+from triaxcal.delivery.imuc import METHOD, ImuC
 from triaxcal.dynamic.device import REQUIRED
 from triaxcal.fixedpoint.plan import Plan
 from triaxcal.fixedpoint.proof import Bound
@@ -90,7 +91,7 @@ def _verification_json(made: ImuDelivery, c: ImuC) -> bytes:
 def _angles(made: ImuDelivery, c: ImuC) -> dict[str, Any]:
     """As of a unit, and beside it what is known of the angles; nothing where there are none."""
     found = angles_document(c.build.angles, c.build.angles_check)
-    known = uncertainty_document(imu_angles(made.done, c))
+    known = uncertainty_document(made.angles)
     if known:
         missing = {"not_in_it": list(not_in_them(made.done))}
         found["angles"]["uncertainty"] = {**known["angles"], **missing}
@@ -199,7 +200,7 @@ def _own_thermometer(c: ImuC) -> list[str]:
 def _angle_lines(made: ImuDelivery, c: ImuC) -> list[str]:
     """Proven error of the routine, and how well the angles are known."""
     words = angles_words(c.build.angles, c.build.angles_check)
-    known = imu_angles(made.done, c)
+    known = made.angles
     if words is None or known is None:
         return []
     vectors = thousands(words.vectors, " ")
