@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import struct
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,7 +21,7 @@ from plans import (
     random_rows,
 )
 from triaxcal.codegen.image import constant_words, image_bytes
-from triaxcal.codegen.image_cases import layout_of
+from triaxcal.codegen.image_cases import image_cases, layout_of
 from triaxcal.codegen.image_edges import image_edges
 from triaxcal.codegen.render import specification
 from triaxcal.fixedpoint.integer_model import set_temperature
@@ -106,6 +107,46 @@ def compare_constants(plan: Plan) -> None:
 @pytest.mark.parametrize("name", list(SHAPES))
 def test_specification_and_model_agree(name: str) -> None:
     compare(name)
+
+
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_the_loader_accepts_what_the_model_does(name: str) -> None:
+    """Images that are damaged, at every limit, wild, and with an identity."""
+    plan = plan_of(name)
+    spec = defined(plan)
+    verdicts = []
+    for case in image_cases(plan, image_bytes(plan)):
+        # One byte of sixteen is damaged here, and of each word of the header.
+        if (damaged := re.fullmatch(r"bit of byte (\d+)", case.name)) and int(damaged[1]) % 16 > 0:
+            continue
+        found = spec["accepted"](Pointer(list(case.image)), len(case.image))
+        assert found == case.accepted, case.name
+        verdicts.append(found)
+    assert verdicts.count(True) > 20
+    assert verdicts.count(False) > 100
+
+
+LOADER_FAULTS = {
+    "rates not looked at": ("&& rate_words_fit(image)", ""),
+    "no room for a rate": ("s, 4, rate_bound(rate_word(image, 4))", "s, 4, 0"),
+    "the word of another axis": (
+        "s, 0, rate_bound(rate_word(image, 3))",
+        "s, 0, rate_bound(rate_word(image, 4))",
+    ),
+}
+"""A mistake in what the loader is said to accept."""
+
+
+@pytest.mark.parametrize("name", list(LOADER_FAULTS))
+def test_a_mistake_in_what_is_accepted_is_seen(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    old, new = LOADER_FAULTS[name]
+    text = specification(plan_of("cubic"), opaque=False)
+    assert text.count(old) == 1, text.count(old)
+    monkeypatch.setattr(
+        test_specification, "specification", lambda *_, **__: text.replace(old, new)
+    )
+    with pytest.raises(AssertionError):
+        test_the_loader_accepts_what_the_model_does("cubic")
 
 
 FAULTS = {

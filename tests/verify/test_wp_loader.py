@@ -27,8 +27,8 @@ PROVERS = needs("frama-c", "why3", "cvc4", "z3")
 SHAPE = integer_shape(order=2, segments=2)
 LOADER = (
     "word_at", "int_at", "crc32", "horner_bound", "x_fits", "segment_fits", "terms_fit",
-    "read_function", "read_segment", "constants_fit", "identity_fits", "image_fits",
-    "read_terms", "read_calib", "calib_check", "calib_load",
+    "reach_of", "rate_fits", "read_function", "read_segment", "constants_fit", "identity_fits",
+    "image_fits", "read_terms", "read_rate", "read_calib", "calib_check", "calib_load",
 )  # fmt: skip
 INVERSE = "inverse, three segments"
 SHAPES = {
@@ -44,8 +44,10 @@ SHAPES = {
     "gyro, constants": replace(integer_shape(order=0), gyro=True),
     "gyro, cubic": replace(integer_shape(order=3), gyro=True),
     "gyro, two segments": replace(integer_shape(order=1, segments=2), gyro=True),
+    "dT/dt, cubic": replace(integer_shape(order=3), rate=True),
+    "dT/dt, two segments": replace(SHAPE, rate=True),
 }
-GYRO = "gyro, cubic"
+GYRO, RATE = "gyro, cubic", "dT/dt, two segments"
 
 
 def workspace(shape: Shape, folder: Path) -> Workspace:
@@ -60,15 +62,17 @@ def test_the_loader_has_contracts_where_it_is_covered(tmp_path: Path, name: str)
     plan = workspace(shape, tmp_path / "work").plan
     assert not loader_not_covered(shape)
     present = wp.functions_of(annotated_routine(plan), names_of(plan).linked)
-    own = {"terms_fit", "read_terms"} if not shape.gyro else set()
-    assert [name for name in present if name in LOADER] == [n for n in LOADER if n not in own]
+    others = set() if shape.gyro else {"terms_fit", "read_terms"}
+    if not shape.rate:
+        others |= {"reach_of", "rate_fits", "read_rate"}
+    assert [name for name in present if name in LOADER] == [n for n in LOADER if n not in others]
     assert "accepted" in specification(plan, opaque=True)
 
 
 @pytest.mark.parametrize(
     ("shape", "reason"),
     [
-        (replace(SHAPE, rate=True), "a term in dT/dt"),
+        (replace(SHAPE, order=6), "functions of order 6 and above"),
         (replace(SHAPE, quadratic=True), "quadratic terms"),
     ],
 )
@@ -207,13 +211,49 @@ OF_INVERSE = {
         SPECIFICATION, "segment_fits", "row_passes(s, 4 * (n - 1))", "row_passes(s, 3 * (n - 1))",
     ),
 }  # fmt: skip
-FAULTS |= OF_GYRO | OF_INVERSE
+OF_RATE = {
+    "the smaller of two rates": (C, "reach_of", "return (below > above)", "return (below < above)"),
+    "rates of one sign": (C, "rate_fits", "(rate_min_code <= 0) &&", "(rate_min_code < 0) &&"),
+    "a rate of 2^31": (
+        C, "rate_fits", "(reach * rate_gain) <= (int64_t)INT32_MAX",
+        "(reach * rate_gain) <= INT64_C(2147483648)",
+    ),
+    "a row without its rate": (
+        C, "segment_fits", "row_sum = 2 * ((magnitude(rate_offset[i]) / 2) + 1)", "row_sum = 0"
+    ),
+    "the rate of the first row": (
+        C, "segment_fits", "magnitude(rate_offset[i])", "magnitude(rate_offset[0])"
+    ),
+    "an offset's word of another axis": (
+        C, "constants_fit", "int_at(image, RATE_AT + 4u)", "int_at(image, RATE_AT + 3u)"
+    ),
+    "rates not looked at": (C, "constants_fit", "RATE_AT + 2u)) == 0u", "RATE_AT + 2u)) == 2u"),
+    "least and greatest rate exchanged": (
+        C, "read_rate", "rate_min_code = int_at(image, RATE_AT)",
+        "rate_min_code = int_at(image, RATE_AT + 1u)",
+    ),
+    "an offset less": (
+        C, "read_rate",
+        "i < 3u; i++) {\n        calib->rate_", "i < 2u; i++) {\n        calib->rate_",
+    ),
+    "a rate that is not read": (C, "read_calib", "    read_rate(calib, image);\n", ""),
+    "specification: no room for a rate": (
+        SPECIFICATION, "lemmas", "s, 4, rate_bound(rate_word(image, 4)))", "s, 4, 0)",
+    ),
+    "specification: rates one word further": (
+        SPECIFICATION, "read_rate", "c->rate_gain, P) == rate_word{L}(image, 2)",
+        "c->rate_gain, P) == rate_word{L}(image, 3)",
+    ),
+    "specification: any rates": (SPECIFICATION, "constants_fit", "&& rate_words_fit(image)", ""),
+}  # fmt: skip
+FAULTS |= OF_GYRO | OF_INVERSE | OF_RATE
 """Text that has the mistake, function whose goals fail (or the lemmas), and the mistake."""
 
 
 def shape_of(fault: str) -> str:
     """Name of the shape that a mistake is planted in."""
-    return GYRO if fault in OF_GYRO else INVERSE if fault in OF_INVERSE else "order 2, two segments"
+    of = {GYRO: OF_GYRO, INVERSE: OF_INVERSE, RATE: OF_RATE}
+    return next((name for name, faults in of.items() if fault in faults), "order 2, two segments")
 
 
 @PROVERS

@@ -34,7 +34,6 @@ def loader_not_covered(shape: Shape) -> str:
     """Which part of a shape has no contracts in its loader; "" where all have them."""
     parts = {
         "quadratic terms": shape.quadratic,
-        "a term in dT/dt": shape.rate,
         "functions of order 6 and above": shape.order > 5,
     }
     return next((name for name, has in parts.items() if has), "")

@@ -48,7 +48,7 @@ OF_VALUES = (
     "s32", "high_word", "asr32", "asr64", "saturate32", "with_saturated", "magnitude", "times",
     "evaluate", "x_q31_of", "rate_q31_of", "above_min", "beyond_range", "out_of_range",
     "copy_rows", "nearest_raw", "clamp_raw", "cofactor", "reciprocal", "element", "offset_of",
-    "word_at", "crc32", "horner_bound", "x_fits", "rate_fits",
+    "word_at", "crc32", "horner_bound", "x_fits", "rate_fits", "reach_of",
 )  # fmt: skip
 """Functions proven with every definition."""
 OF_MEMORY = (
