@@ -27,6 +27,7 @@ SHAPES = {
     "saturating, 32 bits": integer_shape(
         form=INVERSE, order=3, output_shift=32, raw=(INT32_MIN, INT32_MAX), shifts=(30, 29, 60, 30)
     ),
+    "constants, saturating": COVERING["inverse-saturating-order-0"],
 }
 
 
