@@ -16,10 +16,10 @@ from triaxcal.cli.main import main
 from triaxcal.codegen.imu import ImuBuild, build_imu
 from triaxcal.simulation.unit import write_simulated_unit
 from triaxcal.unit.angles import PITCH_ROLL, AnglesChoice
-from triaxcal.verify import angles, cost, cppcheck, gappa, imu
+from triaxcal.verify import angles, cost, cppcheck, gappa, imu, wp_imu
 from triaxcal.verify.campaign import CHECKS
 from triaxcal.verify.image_reader import image_length
-from triaxcal.verify.outcome import FAILED, PASSED
+from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED
 from triaxcal.verify.workspace import Workspace
 from verify.conftest import UNITS, needs
 from verify.test_cost import counted
@@ -154,6 +154,30 @@ def test_a_planted_mistake_in_what_joins_the_triads_is_found(
     outcome = CHECK[key](broken(build, tmp_path, *change))
     assert outcome.result == FAILED
     assert any(says in detail for detail in outcome.details), outcome.details
+
+
+@needs("frama-c", "why3", "cvc4", "z3")
+@pytest.mark.slow
+def test_what_joins_the_triads_is_proven(build: ImuBuild, tmp_path: Path) -> None:
+    outcome = CHECK["wp"](imu.Both.create(tmp_path, build))
+    assert outcome.result == PASSED, outcome
+    assert set(outcome.figures["goals"]) == {"lemmas", "set_temperature", "apply", "calib_load"}
+
+
+@needs("frama-c", "why3", "cvc4", "z3")
+def test_of_another_file_nothing_is_proven(build: ImuBuild, tmp_path: Path) -> None:
+    outcome = CHECK["wp"](broken(build, tmp_path, "accel_status | (", "gyro_status | ("))
+    assert outcome.result == FAILED
+    said = "triax_imu.c is not the one for these shapes: nothing is proven of it"
+    assert outcome.finding == said
+
+
+def test_a_pair_without_contracts_is_not_proven(build: ImuBuild, tmp_path: Path) -> None:
+    shape = replace(build.accel.shape, quadratic=True, rate=True)
+    other = replace(build, accel=replace(build.accel, shape=shape))
+    outcome = wp_imu.check(tmp_path, other)
+    assert outcome.result == NOT_DONE
+    assert outcome.finding == ("not done for quadratic terms with a term in dT/dt (accelerometer)")
 
 
 @pytest.fixture(scope="module")

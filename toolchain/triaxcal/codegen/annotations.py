@@ -54,3 +54,22 @@ def not_covered(shape: Shape) -> str:
         "a term in dT/dt with sums of high words": shape.rate and shape.high_words,
     }
     return next((name for name, has in parts.items() if has), "")
+
+
+def imu_not_covered(accel: Shape, gyro: Shape) -> str:
+    """For which part of an IMU triax_imu.c has no contracts; "" where it has them.
+
+    It takes the contracts of both triads, so both have to have them.
+    """
+    if gyro.inverse is not None:
+        return "a gyro in the inverse form"
+    return _of_triads(not_covered(accel), not_covered(gyro))
+
+
+def imu_loader_not_covered(accel: Shape, gyro: Shape) -> str:
+    """For which part of an IMU the loader of triax_imu.c has no contract."""
+    return _of_triads(loader_not_covered(accel), loader_not_covered(gyro))
+
+
+def _of_triads(accel: str, gyro: str) -> str:
+    return f"{accel} (accelerometer)" if accel else f"{gyro} (gyro)" if gyro else ""

@@ -9,6 +9,12 @@ import numpy as np
 from triaxcal.base.errors import RefusedError
 from triaxcal.codegen.angles import angles_plan, render_angles
 from triaxcal.codegen.angles_check import AnglesCheck, check_angles
+from triaxcal.codegen.annotations import (
+    imu_loader_not_covered,
+    imu_not_covered,
+    with_contracts,
+    without_annotations,
+)
 from triaxcal.codegen.compiler import library_folder, start_reference
 from triaxcal.codegen.constants import Provenance, render_constants
 from triaxcal.codegen.crosscheck import RANDOM_VECTORS, CrossCheck, cross_check, vector_sets
@@ -158,9 +164,7 @@ def render_imu(
         texts |= render_constants(plan, triad.temperature_sensor, provenance)
         texts |= render_selftest(plan, provenance)
     names = names_of(accel)
-    context = imu_context(accel, gyro, two_thermometers=two_thermometers)
-    shapes = f"shapes {names.shape} and {names_of(gyro).shape}"
-    texts |= dict(render(name, shapes, names, **context) for name in IMU_FILES)
+    texts |= delivered_imu(accel, gyro, two_thermometers=two_thermometers)
     texts |= {} if angles is None else render_angles(angles, names)
     files = {name: text.encode() for name, text in texts.items()}
     files[names.file(IMU_IMAGE_FILE)] = b"".join(
@@ -168,6 +172,28 @@ def render_imu(
         for plan, triad, provenance in each
     )
     return files
+
+
+def delivered_imu(accel: Plan, gyro: Plan, *, two_thermometers: bool) -> dict[str, str]:
+    """Texts of `IMU_FILES` by name, with contracts where they are proven."""
+    covered = not imu_not_covered(accel.shape, gyro.shape)
+    kept = with_contracts if covered else without_annotations
+    texts = annotated_imu(accel, gyro, two_thermometers=two_thermometers)
+    return {name: kept(text) for name, text in texts.items()}
+
+
+def annotated_imu(accel: Plan, gyro: Plan, *, two_thermometers: bool) -> dict[str, str]:
+    """The same with every step of the proof."""
+    names = names_of(accel)
+    context = imu_context(accel, gyro, two_thermometers=two_thermometers)
+    context |= {
+        "accel_shape": accel.shape,
+        "gyro_shape": gyro.shape,
+        "loader_proven": not imu_loader_not_covered(accel.shape, gyro.shape),
+        "unproven": without_annotations,
+    }
+    shapes = f"shapes {names.shape} and {names_of(gyro).shape}"
+    return dict(render(name, shapes, names, **context) for name in IMU_FILES)
 
 
 def rate_bound(gyro: Plan, own: Bound, accel: Bound) -> tuple[float, float, float]:

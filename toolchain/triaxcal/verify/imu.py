@@ -21,7 +21,7 @@ from triaxcal.codegen.render import render_routine
 from triaxcal.codegen.shim import write_shim
 from triaxcal.codegen.templates import environment
 from triaxcal.unit.arithmetic import LIMBS, PORTABLE
-from triaxcal.verify import analyzers, cppcheck, eva
+from triaxcal.verify import analyzers, cppcheck, eva, wp, wp_imu
 from triaxcal.verify.campaign import delivery_outcomes, guarded, verify_work
 from triaxcal.verify.image_reader import image_length
 from triaxcal.verify.outcome import Outcome
@@ -180,6 +180,7 @@ CHECKS: tuple[tuple[str, str, Callable[[Both], Outcome]], ...] = (
             ("eva_image", "Eva: any image", "verify_imu_image", PORTABLE),
         )
     ),
+    (wp.KEY, wp.TITLE, lambda w: wp_imu.check(w.folder, w.build)),
     ("cppcheck", "cppcheck: MISRA C:2012", _cppcheck),
     (
         "gcc_analyzer",

@@ -13,7 +13,7 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,6 +68,8 @@ OF_LOADER = (
 """The same for what reads memory in the loader."""
 SMOKE = "_wp_smoke_"
 """Name of a goal that asks whether anything follows from nothing: WP must not prove it."""
+Goals = Mapping[str, Mapping[str, str]]
+"""Goals by name: function, prover and time of each."""
 _LEMMA = re.compile(r"lemma (\w+)")
 _LINE = re.compile(r"^\[wp\] \[(.+?)\] Goal (\w+)( : Valid.*)?", re.MULTILINE)
 _SMOKE = re.compile(r"^\[wp\] \[(\w+)\] Smoke-test typed_(\w+)", re.MULTILINE)
@@ -119,10 +121,40 @@ def check(work: Workspace) -> Outcome:
         loader=not loader_not_covered(work.plan.shape),
     ):
         raise BrokenToolError(f"contracts: {doubts[0]}")
+    return outcome_of(
+        texts,
+        found,
+        lambda: _prove(work, folder, texts),
+        not_loader=loader_not_covered(work.plan.shape),
+        unreached_of=lambda goals: _unreached(work.plan.shape, goals),
+    )
+
+
+def outcome_of(
+    texts: Mapping[str, str],
+    found: Mapping[str, str],
+    prove: Callable[[], Goals],
+    *,
+    not_loader: str = "",
+    unreached_of: Callable[[Goals], list[str]] = lambda _: [],
+) -> Outcome:
+    """Outcome of the goals of texts, which are proven unless they are known.
+
+    Parameters
+    ----------
+    texts, found : dict
+        What WP reads, and the versions of the programs.
+    prove : function
+        Gives each goal with its function, its prover (none where unproven) and the time it took.
+    not_loader : str
+        Why the loader has no contracts, where it has none.
+    unreached_of : function
+        Which failed smoke tests of goals are no failure.
+    """
     known = _known(texts, found)
     before = known.is_file()
-    goals = json.loads(known.read_text(encoding="utf-8")) if before else _prove(work, folder, texts)
-    unreached = _unreached(work.plan.shape, goals)
+    goals = json.loads(known.read_text(encoding="utf-8")) if before else prove()
+    unreached = unreached_of(goals)
     unproven = [n for n, goal in goals.items() if not goal["prover"] and n not in unreached]
     if not before and not unproven:
         known.parent.mkdir(parents=True, exist_ok=True)
@@ -139,12 +171,12 @@ def check(work: Workspace) -> Outcome:
     )
     if unreached:
         finding += f", {len(unreached)} where nothing needs to be saturated"
-    if reason := loader_not_covered(work.plan.shape):
-        finding += f"; not the loader: {reason}"
+    if not_loader:
+        finding += f"; not the loader: {not_loader}"
     if unproven:
         finding += f"; not proven: {unproven[0]}"
     figures: dict[str, Any] = {
-        "versions": found,
+        "versions": dict(found),
         "goals": dict(sorted(counts.items())),
         "smoke_tests": len(smoke),
     }
@@ -200,18 +232,36 @@ def write_texts(work: Workspace, folder: Path) -> dict[str, str]:
 
 
 def prepared(work: Workspace, folder: Path) -> Place:
-    """The folder with what Why3 needs to find the provers."""
+    """The folder of a triad's texts with what Why3 needs to find the provers."""
+    return place_in(folder, work.named("triax_comp.c"), names_of(work.plan).linked)
+
+
+def place_in(folder: Path, file: str, linked: str) -> Place:
+    """The same of any C file."""
     config = {"WHY3CONFIG": str(folder / "why3.conf")}
     run(["why3", "config", "detect"], folder, config)
-    return Place(folder, work.named("triax_comp.c"), names_of(work.plan).linked, config)
+    return Place(folder, file, linked, config)
 
 
-def _known(texts: dict[str, str], versions: dict[str, str]) -> Path:
+def _known(texts: Mapping[str, str], versions: Mapping[str, str]) -> Path:
     """Where the goals are kept that these texts gave to these programs, run by this code."""
     here = Path(__file__)
-    runner = [p.read_text(encoding="utf-8") for p in (here, here.with_name("wp_texts.py"))]
+    runner = [
+        p.read_text(encoding="utf-8")
+        for p in (here, here.with_name("wp_texts.py"), here.with_name("wp_imu.py"))
+    ]
     content = json.dumps(
-        [texts, versions, OPTIONS, GOAL_S, SMOKE_S, OF_VALUES, OF_MEMORY, OF_LOADER, runner]
+        [
+            dict(texts),
+            dict(versions),
+            OPTIONS,
+            GOAL_S,
+            SMOKE_S,
+            OF_VALUES,
+            OF_MEMORY,
+            OF_LOADER,
+            runner,
+        ]
     )
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     name = hashlib.sha256(content.encode()).hexdigest()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from itertools import takewhile
 
 _COMMENT = re.compile(r"//[^\n]*|/\*(?!@).*?\*/", re.DOTALL)
 _TAKEN = re.compile(r"//@|\b(?:admit|axiom)\b")
@@ -57,7 +58,7 @@ def overlooked(
     Parameters
     ----------
     loader : bool
-        Whether the loader, from `word_at` on, has contracts.
+        Whether the loader has contracts: from `word_at` on, of an IMU `calib_load`.
     """
     found = []
     for text in (routine, definitions, opaque):
@@ -66,7 +67,8 @@ def overlooked(
         found += [f"{said[0]} compares structures" for said in _STRUCTURES.finditer(annotations)]
     contracts = contracts_of(routine, triad)
     names = list(contracts)
-    needed = names if loader else names[: names.index("word_at")]
+    of_loader = {"word_at", "calib_load"}
+    needed = names if loader else list(takewhile(lambda name: name not in of_loader, names))
     found += [f"no contract of {name}" for name in needed if not contracts[name]]
     known = statements_of(definitions)
     for name, statement in statements_of(opaque).items():
