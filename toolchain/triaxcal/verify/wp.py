@@ -338,7 +338,8 @@ def _command(place: Place, part: Part, limit_s: int) -> tuple[list[str], list[st
     chosen = ("-wp-fct", ",".join(names)) if names else ()
     command = [
         TOOLS["frama-c"].find(), *OPTIONS, "-wp-timeout", str(limit_s), *part.options, *chosen,
-        f"-cpp-extra-args=-include {part.specification}", place.file,
+        f"-cpp-extra-args=-include {part.specification}{' -DLEMMAS' if part.lemmas else ''}",
+        place.file,
     ]  # fmt: skip
     return command, names
 
