@@ -21,8 +21,9 @@ PROVERS = needs("frama-c", "why3", "cvc4", "z3")
 SHAPES = {
     "cubic, 24 bits": integer_shape(order=3, quadratic=True),
     "constants": integer_shape(order=0, quadratic=True),
+    "two segments, 24 bits": integer_shape(order=2, segments=2, quadratic=True),
 }
-CUBIC = next(iter(SHAPES))
+CUBIC, SEGMENTED = (list(SHAPES)[i] for i in (0, 2))
 
 
 @PROVERS
@@ -52,11 +53,22 @@ FAULTS = {
     "a product left out": (CUBIC, C, "quadratic_sum", " + times(q[5], product[5])", ""),
     "a word of another product": (CUBIC, C, "quadratic_sum", "times(q[3], ", "times(q[2], "),
     "a term left out": (CUBIC, C, "copy_terms", "k < 6u; k", "k < 5u; k"),
+    "the segment of a lower code": (
+        SEGMENTED, C, "set_temperature",
+        "code >= calib->segment[i].first_code", "code > calib->segment[i].first_code",
+    ),
+    "no terms in the state": (
+        SEGMENTED, C, "set_temperature", "    copy_terms(state, calib);\n", ""
+    ),
     "terms of another axis": (
         CUBIC, C, "apply_rows",
         "quadratic_sum(state->quadratic[1]", "quadratic_sum(state->quadratic[0]",
     ),
     "half an output LSB less": (CUBIC, C, "apply_rows", "row[2][3]) + 4)", "row[2][3]) + 3)"),
+    "specification: the segment before": (
+        SEGMENTED, SPECIFICATION, "set_temperature",
+        "code >= c->segment[n - 1].first_code", "code > c->segment[n - 1].first_code",
+    ),
     "specification: xy for xz": (
         CUBIC, SPECIFICATION, "apply_rows", "product_of(x, z)", "product_of(x, y)"
     ),

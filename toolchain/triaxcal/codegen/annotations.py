@@ -47,7 +47,6 @@ def not_covered(shape: Shape) -> str:
         "quadratic terms in the inverse form": shape.quadratic and inverse,
         "quadratic terms with a term in dT/dt": shape.quadratic and shape.rate,
         "quadratic terms with saturating results": shape.quadratic and shape.saturates,
-        "quadratic terms with several segments": shape.quadratic and shape.segments > 1,
         "quadratic terms of 32-bit raw codes": shape.quadratic and whole,
         "a term in dT/dt in the inverse form": inverse and shape.rate,
         "a term in dT/dt with constant functions": shape.rate and not shape.order,
