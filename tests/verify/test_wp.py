@@ -16,6 +16,7 @@ from triaxcal.codegen.render import annotated_routine, render_routine, specifica
 from triaxcal.verify import wp
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
 from triaxcal.verify.shapes import ALL_SHAPES, Subject
+from triaxcal.verify.tools import run
 from triaxcal.verify.workspace import Workspace
 from triaxcal.verify.wp_texts import contracts_of
 from verify.conftest import Planter, needs
@@ -124,6 +125,19 @@ def test_another_version_of_a_prover_is_not_done(
     monkeypatch.setitem(wp.KNOWN, "cvc4", "1.9")
     with pytest.raises(MissingToolError, match=r"cvc4 1\.9 is known, found: .*1\.8"):
         wp.check(plant(COVERED))
+
+
+@pytest.mark.parametrize("text", ["", "{}", '{"a": {"prover": "z3"', '{"a": "proven"}', "[]"])
+def test_a_file_of_goals_that_is_not_whole_proves_nothing(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "goals.json"
+    assert wp._kept(file) == {}
+    file.write_text(text)
+    assert wp._kept(file) == {}
+
+
+def test_a_program_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(MissingToolError, match=r"^no-such-objdump not found$"):
+        run([str(tmp_path / "no-such-objdump"), "-d"], tmp_path)
 
 
 @PROVERS

@@ -143,9 +143,9 @@ def test_annotations_are_comments_only(name: str) -> None:
 
 def test_what_is_not_covered_has_no_contracts() -> None:
     accel, gyro = PAIRS[NEITHER]
-    quadratic = integer_shape(quadratic=True, segments=2)
+    quadratic = integer_shape(quadratic=True, raw=(-(2**31), 2**31 - 1))
     assert imu_not_covered(accel, gyro) == imu_loader_not_covered(accel, gyro) == ""
-    reason = "quadratic terms with several segments (accelerometer)"
+    reason = "quadratic terms of 32-bit raw codes (accelerometer)"
     assert imu_not_covered(quadratic, gyro) == reason
     inverse = gyro_of(COVERING["inverse-order-2"])
     assert imu_not_covered(accel, inverse) == "a gyro in the inverse form"

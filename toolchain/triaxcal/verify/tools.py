@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Timer
 
+from triaxcal.base.tools import MissingToolError
+
 TIME_LIMIT_S = 900
 """Beyond this a tool is hanging: the slowest takes seconds."""
 
@@ -34,6 +36,7 @@ def run(
 
     Raises
     ------
+    MissingToolError
     BrokenToolError
         When it does not end within `TIME_LIMIT_S` or is killed by a signal.
     """
@@ -49,6 +52,8 @@ def run(
             timeout=TIME_LIMIT_S,
             check=False,
         )
+    except FileNotFoundError as error:
+        raise MissingToolError(f"{Path(command[0]).name} not found") from error
     except subprocess.TimeoutExpired as error:
         raise BrokenToolError(
             f"{Path(command[0]).name} did not end within {TIME_LIMIT_S} s"

@@ -152,8 +152,9 @@ def outcome_of(
         Which failed smoke tests of goals are no failure.
     """
     known = _known(texts, found)
-    before = known.is_file()
-    goals = json.loads(known.read_text(encoding="utf-8")) if before else prove()
+    kept = _kept(known)
+    before = bool(kept)
+    goals = kept or prove()
     unreached = unreached_of(goals)
     unproven = [n for n, goal in goals.items() if not goal["prover"] and n not in unreached]
     if not before and not unproven:
@@ -241,6 +242,19 @@ def place_in(folder: Path, file: str, linked: str) -> Place:
     config = {"WHY3CONFIG": str(folder / "why3.conf")}
     run(["why3", "config", "detect"], folder, config)
     return Place(folder, file, linked, config)
+
+
+def _kept(known: Path) -> Goals:
+    """Proven goals of a run before; none where there is no such file, or it is not whole."""
+    try:
+        found = json.loads(known.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    whole = isinstance(found, dict) and all(
+        isinstance(goal, dict) and goal.keys() >= {"function", "prover", "time"}
+        for goal in found.values()
+    )
+    return found if whole else {}
 
 
 def _known(texts: Mapping[str, str], versions: Mapping[str, str]) -> Path:
