@@ -6,10 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from builds import UNITS
 from triaxcal.base.errors import RefusedError
 from triaxcal.base.jsontext import json_bytes
 from triaxcal.base.tools import MissingToolError, Tool
+from triaxcal.cli.main import main
 from triaxcal.verify import campaign
 from triaxcal.verify.campaign import CHECKS, exit_code, verify_files
 from triaxcal.verify.outcome import FAILED, NOT_DONE, PASSED, Outcome
@@ -113,6 +116,23 @@ def test_delivered_means_the_same_files_whatever_was_added(tmp_path: Path) -> No
     assert is_delivered(tmp_path, files)
     assert not is_delivered(tmp_path, {**files, "triax_comp.c": b"int y;\n"})
     assert not is_delivered(tmp_path, {**files, FILE: content({**BASE, "limit": 0.2})})
+
+
+@pytest.mark.parametrize("command", ["verify", "certify"])
+def test_an_edited_file_is_refused_and_left(tmp_path: Path, command: str) -> None:
+    arguments = [str(UNITS / "AT-CHERNIAK"), "--build", str(tmp_path)]
+    assert CliRunner().invoke(main, ["calib", *arguments]).exit_code == 0
+    file = tmp_path / "AT-CHERNIAK" / "triax_comp.c"
+    text = file.read_text(encoding="utf-8")
+    edited = text.replace("+ offset", "- offset", 1).encode()
+    assert edited != text.encode()
+    file.write_bytes(edited)
+    done = CliRunner().invoke(main, [command, *arguments])
+    assert isinstance(done.exception, RefusedError)
+    assert str(done.exception).startswith(
+        f"{file}: is not the file that was delivered, so nothing was verified; expected SHA-256 "
+    )
+    assert file.read_bytes() == edited
 
 
 def test_a_damaged_record_is_refused(tmp_path: Path) -> None:

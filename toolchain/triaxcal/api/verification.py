@@ -26,7 +26,7 @@ from triaxcal.verify.campaign import delivery_outcomes, exit_code, verify_files
 from triaxcal.verify.certificate_readme import certificate_readme
 from triaxcal.verify.imu import imu_delivery_outcomes, triads, verify_imu
 from triaxcal.verify.outcome import Outcome
-from triaxcal.verify.record import entries, is_delivered, record
+from triaxcal.verify.record import entries, is_delivered, record, refuse_edited
 from triaxcal.verify.table import table
 from triaxcal.verify.workspace import Workspace
 
@@ -109,7 +109,7 @@ def verify_unit(
     Raises
     ------
     RefusedError
-        As `deliver`; for an IMU without [device].
+        As `deliver`; for an IMU without [device]; where a delivered file was changed since.
     """
     delivered = _deliver(Path(folder), Path(build), progress)
     with tempfile.TemporaryDirectory(prefix="triaxcal-verify-") as work:
@@ -131,7 +131,7 @@ def certify(
     Raises
     ------
     RefusedError
-        As `deliver`; for an IMU without [device].
+        As `verify_unit`.
     """
     delivered = _deliver(Path(folder), Path(build), progress)
     groups: dict[str, Sequence[Outcome]] = {}
@@ -155,6 +155,7 @@ def _deliver(unit: Path, build: Path, progress: Progress | None) -> _Delivered:
     delivery = deliver(unit)
     target = build / delivery.unit.name
     device = read_record(record_path(target))
+    refuse_edited(target)
     files = all_files(delivery, passport(delivery, {}, device))
     if not is_delivered(target, files):
         publish(files, target, SOMETIMES)
@@ -175,6 +176,7 @@ def _deliver_imu(unit: Path, build: Path, progress: Progress | None) -> _Deliver
     assert made.c is not None
     built = made.c.build
     target = build / made.done.unit.name
+    refuse_edited(target)
     files = dynamic_files(made)
     if not is_delivered(target, files):
         publish(files, target, C_FILES)

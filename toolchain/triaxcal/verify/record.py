@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import tempfile
@@ -35,6 +36,27 @@ def is_delivered(target: Path, files: Mapping[str, bytes]) -> bool:
         elif found != content:
             return False
     return True
+
+
+def refuse_edited(target: Path) -> None:
+    """Refuse a folder of which a file is no longer the one that was delivered there.
+
+    Raises
+    ------
+    RefusedError
+    """
+    path = target / FILE
+    if not path.is_file():
+        return
+    for name, digest in _load(path.read_bytes(), path).get("files_sha256", {}).items():
+        file = target / name
+        if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() != digest:
+            raise RefusedError(
+                str(file),
+                "is not the file that was delivered, so nothing was verified",
+                expected=f"SHA-256 {digest[:16]}..., as in {FILE}",
+                remedy="delete it and run this again: the delivered one is then written",
+            )
 
 
 def entries(outcomes: Sequence[Outcome]) -> dict[str, Any]:
