@@ -198,6 +198,15 @@ def test_unit_case_is_the_shipped_shape() -> None:
     assert unit_case(ROOT / "units" / "AT-SIM").image == image_bytes(case_named(CUBIC).plan)
 
 
+def test_unit_case_has_the_terms_of_the_fit(tmp_path: Path) -> None:
+    unit = tmp_path / "SQUARES"
+    shutil.copytree(ROOT / "units" / "AT-CHERNIAK", unit)
+    text = (unit / "unit.toml").read_text(encoding="utf-8")
+    terms = '\n[firmware]\nterms = "own-squares"\n'
+    (unit / "unit.toml").write_text(text + terms, encoding="utf-8")
+    assert unit_case(unit).plan.shape.quadratic
+
+
 def test_a_core_under_qemu() -> None:
     need(*M3.tools("gcc"))
     case = case_named("AT-CHERNIAK")

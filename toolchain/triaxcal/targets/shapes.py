@@ -20,6 +20,7 @@ from triaxcal.codegen.selftest import render_selftest
 from triaxcal.delivery.imu import deliver_imu_c
 from triaxcal.delivery.inputs import inputs_sha256
 from triaxcal.delivery.order import choose_functions
+from triaxcal.delivery.unit import deliver
 from triaxcal.fitting.core.calibration import Calibration
 from triaxcal.fitting.tilter.calibrate import calibrate
 from triaxcal.fixedpoint.angles import AnglesPlan
@@ -178,8 +179,17 @@ def shipped_cases(units: Path) -> tuple[Case, ...]:
 
 
 def unit_case(folder: Path) -> Case:
-    """The shape of the unit in `folder`."""
-    return made_case(folder, folder.absolute().name, "as described", lambda u: u, NO_TERMS)
+    """The shape of the unit in `folder`, with the terms that its fit has.
+
+    Raises
+    ------
+    RefusedError
+        As `deliver`.
+    """
+    made = deliver(folder)
+    texts = {f: c.decode() for f, c in made.files.items() if f.endswith((".h", ".c"))}
+    name, plan = folder.absolute().name, made.plan
+    return Case(name, "as described", plan, texts, image_bytes(plan), made.firmware.angles)
 
 
 def unit_cases(folder: Path, progress: Progress | None = None) -> tuple[Case, ...]:
