@@ -11,7 +11,7 @@ from typing import Any
 from triaxcal.base.progress import Progress
 from triaxcal.base.publish import publish, renew
 from triaxcal.base.tomltable import has_table
-from triaxcal.delivery.imu import deliver_imu, refuse_no_device
+from triaxcal.delivery.imu import deliver_described, refuse_no_device
 from triaxcal.delivery.unit import deliver
 from triaxcal.device.record import read_record, record_path
 from triaxcal.dynamic.description import read_dynamic
@@ -171,12 +171,13 @@ def _deliver(unit: Path, build: Path, progress: Progress | None) -> _Delivered:
 
 
 def _deliver_imu(unit: Path, build: Path, progress: Progress | None) -> _Delivered:
-    refuse_no_device(read_dynamic(unit))
-    made = deliver_imu(unit, progress)
+    described = read_dynamic(unit)
+    refuse_no_device(described)
+    target = build / described.name
+    refuse_edited(target)  # before minutes of filtering, not after
+    made = deliver_described(described, progress)
     assert made.c is not None
     built = made.c.build
-    target = build / made.done.unit.name
-    refuse_edited(target)
     files = dynamic_files(made)
     if not is_delivered(target, files):
         publish(files, target, C_FILES)
